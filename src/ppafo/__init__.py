@@ -79,14 +79,14 @@ _HOMES = {
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk_population"),
     "ppafo.walking.walk": ("walk",),
 }
-"""Module of each public name; ``__init__.pyi``, which type checkers read, is written from it."""
+"""Module of each public name, from which ``__init__.pyi`` is generated."""
 
 _HOME_OF = dict(sorted((name, module) for module, names in _HOMES.items() for name in names))
 __all__ = list(_HOME_OF)
 
 
 def _compiler_of_c(name: str) -> Compiler:
-    """Return the C compiler ``gcc``, ``clang`` or ``zig``, imported only when needed."""
+    """Return the C compiler ``gcc``, ``clang`` or ``zig``, imported at its first use."""
     from ppafo.translation.native import compiler
 
     return compiler(name)
@@ -97,7 +97,7 @@ offer({name: partial(_compiler_of_c, name) for name in ("gcc", "clang", "zig")})
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its module the first time it is used."""
+    """Load a public name from its module at its first use."""
     if name not in _HOME_OF:
         raise AttributeError(f"module 'ppafo' has no attribute '{name}'")
     home = _HOME_OF[name]
@@ -117,5 +117,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """List the public names, loaded or not."""
+    """Return the public names, loaded or not."""
     return sorted([*__all__, "__version__"])

@@ -1,4 +1,4 @@
-"""Start of the command line, ``ppafo`` or ``python -m ppafo``; Ctrl-C during imports prints no traceback."""
+"""Start of the command line, ``ppafo`` or ``python -m ppafo``, without a traceback on Ctrl-C."""
 
 import os
 import sys
@@ -7,7 +7,7 @@ from ppafo import interrupts
 
 
 def start() -> int:
-    """Run the command line and return its exit code, 130 after a signal to end."""
+    """Run the command line and return its exit code, 130 after a termination signal."""
     # The next file that is opened would take the number of a closed stream, and what is printed would go into it.
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:

@@ -1,11 +1,11 @@
-"""Exceptions raised intentionally by ppafo: one class tree, one-line messages."""
+"""Exceptions raised intentionally by ppafo, in one class tree, with one-line messages."""
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 
 class PpafoError(Exception):
-    """Error that a user can correct; the message states the fault and the remedy in one line.
+    """Base class of ppafo's errors: fault and remedy in a one-line message.
 
     ``parts`` are the separate statements of a message with several. ``argument`` is the faulty argument of the call, if
     the message itself does not name it.
@@ -16,11 +16,11 @@ class PpafoError(Exception):
 
 
 class ArgumentError(PpafoError):
-    """Unusable argument of a function or command; the message names the argument and describes the accepted values."""
+    """Unusable argument of a function or command; the message names it and the accepted values."""
 
 
 class UnitError(PpafoError):
-    """Text that is no quantity or has an unsuitable unit; file readers prefix file and key."""
+    """Text that is not a quantity, or has an unsuitable unit."""
 
 
 class ParameterError(PpafoError):
@@ -36,7 +36,7 @@ class ScenarioError(PpafoError):
 
 
 class SimulationError(PpafoError):
-    """Run that could not be carried out, for example because no model could be compiled."""
+    """Run that could not be carried out, for example without a compiled model."""
 
 
 class ProgramError(SimulationError):
@@ -57,7 +57,7 @@ class IdentificationError(PpafoError):
 
 @contextlib.contextmanager
 def at_fault(argument: str) -> Iterator[None]:
-    """Record the faulty argument on an error raised within a ``with`` block; an outer block overrides an inner one.
+    """Record the faulty argument on errors raised in a ``with`` block; an outer block takes precedence.
 
     The argument check of the called function puts this name before the message.
     """
@@ -70,7 +70,7 @@ def at_fault(argument: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[Exception]) -> Iterator[None]:
-    """Convert exceptions of a ``with`` block to another error, prefixed by ``place``: a file, a key, an option."""
+    """Convert exceptions of a ``with`` block to another error, prefixed by ``place`` (file, key or option)."""
     try:
         yield
     except caught as error:
@@ -78,7 +78,7 @@ def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[E
 
 
 def check_all(chains: Iterable[Sequence[Callable[[], None]]]) -> None:
-    """Run all checks; raise one PpafoError of the class of the first fault, with the messages of all faults.
+    """Run all checks; raise a PpafoError of the class of the first fault, with the messages of all faults.
 
     Each check of a chain relies on the previous ones and is skipped once one of them has failed.
     """
@@ -92,7 +92,7 @@ def check_all(chains: Iterable[Sequence[Callable[[], None]]]) -> None:
 
 @contextlib.contextmanager
 def noted_in(found: list[PpafoError]) -> Iterator[None]:
-    """Append an error raised within a ``with`` block to a list, for ``raise_noted``, and continue after the block."""
+    """Append an error raised in a ``with`` block to a list, for ``raise_noted``, and continue."""
     try:
         yield
     except PpafoError as error:
@@ -100,7 +100,7 @@ def noted_in(found: list[PpafoError]) -> Iterator[None]:
 
 
 def raise_noted(found: Sequence[PpafoError]) -> None:
-    """Raise one PpafoError, of the class of the first error, with all messages in the list, each once."""
+    """Raise a PpafoError of the class of the first error, with all messages of a list."""
     parts = tuple(dict.fromkeys(part for error in found for part in error.parts or (str(error),)))
     if len(parts) == 1:
         # One alone keeps its traceback and its class.

@@ -13,13 +13,13 @@ _COMMANDS = ("ppafo", "ppafo.exe", "ppafo-script.py")
 
 
 def end(_number: int, _frame: object) -> None:
-    """End the process immediately on an interrupt; no work has started yet."""
+    """End the process immediately on an interrupt during start-up."""
     os.write(2, _LINE)
     os._exit(_EXIT_CODE)
 
 
 def is_command_line() -> bool:
-    """Return whether this process was started as ``ppafo`` or ``python -m ppafo`` rather than imports the package."""
+    """Return whether this process is the command line, ``ppafo`` or ``python -m ppafo``, and not an import."""
     started = sys.orig_argv
     by_module = any(started[place : place + 2] == ["-m", "ppafo"] for place in range(1, len(started) - 1))
     return by_module or os.path.basename(sys.argv[0] if sys.argv else "") in _COMMANDS  # noqa: PTH119

@@ -1,4 +1,4 @@
-"""Runs whose results must be bitwise equal on every computer, and their reference hashes in ``golden_bits.json``."""
+"""Golden runs, bitwise equal on every computer, with reference hashes in ``golden_bits.json``."""
 
 import hashlib
 import json
@@ -32,20 +32,20 @@ VARIED = {
         ),
     ),
 }
-"""Scenarios with special settings, for features that no shipped scenario uses."""
+"""Golden runs of scenarios with special settings, for features that no bundled scenario uses."""
 TASK_SEQUENCES = {"first-steps": "proportional"}
-"""Names of the task sequences that are run, each with the walk that performs it."""
+"""Golden runs of task sequences, with the walk that performs each."""
 WALKED = 4.0
-"""Duration of a walk [s]."""
+"""Duration of a golden walk [s]."""
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all runs."""
+    """Return the names of all golden runs."""
     return (*list_scenarios(), *VARIED, *list_walks(), *TASK_SEQUENCES)
 
 
 def plain_batch(name: str) -> Batch:
-    """Return one run of a scenario, or the first seconds of a walk, by name."""
+    """Return a golden run by name: a scenario, or the first seconds of a walk."""
     if name in VARIED:
         scenario, settings = VARIED[name]
         return batch_of(plan_run(load_scenario(scenario, settings)))
@@ -56,12 +56,12 @@ def plain_batch(name: str) -> Batch:
 
 
 def digest(result: BatchResult) -> str:
-    """Return the hash of all numbers of a result; all NaNs count as equal, whatever their bits."""
+    """Return the hash of all numbers of a result; all NaNs are equal."""
     return hash_of((result.states, result.record))
 
 
 def hash_of(arrays: tuple[NDArray[np.float64], ...]) -> str:
-    """Return the hash of arrays; all NaNs count as equal."""
+    """Return the hash of arrays; all NaNs are equal."""
     found = hashlib.sha256()
     for values in arrays:
         # Little-endian on every computer.
@@ -74,13 +74,13 @@ Hashes = Mapping[str, Mapping[str, str | int]]
 
 
 def golden_hashes() -> Hashes:
-    """Return the reference hashes by name of the run."""
+    """Load the reference hashes by name of the golden run."""
     found: dict[str, dict[str, str | int]] = json.loads(GOLDEN.read_text(encoding="utf-8"))
     return found
 
 
 def found_bits() -> Iterator[tuple[str, bool]]:
-    """Yield the name of each run, and whether this computer reproduces its reference hash; takes some seconds."""
+    """Yield the name of each golden run, and whether this computer reproduces its hash."""
     golden = golden_hashes()
     for name in names():
         yield name, digest(run_batch(plain_batch(name))) == golden[name]["run"]

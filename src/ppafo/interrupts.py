@@ -1,4 +1,4 @@
-"""Handling of termination signals: Ctrl-C, a termination request and a closed terminal, all in the same way.
+"""Termination signals: Ctrl-C, termination request and closed terminal, handled alike.
 
 Each signal raises KeyboardInterrupt in the main thread and is recorded. The record is needed because the exception is
 lost in finalisers, in compiled code that does not propagate it, and in libraries that catch it. Work in blocks checks
@@ -17,11 +17,11 @@ from ppafo.first_moments import end
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 _received: list[int] = []
-"""Numbers of the received signals; a list, since appending to it cannot be interrupted."""
+"""Numbers of the signals received; a list, because append cannot be interrupted."""
 
 
 def listen() -> None:
-    """Make termination signals raise KeyboardInterrupt; signals that the parent process ignores stay ignored."""
+    """Install handlers that raise KeyboardInterrupt; signals ignored by the parent process stay ignored."""
     for name in SIGNALS:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler, end):
@@ -31,7 +31,7 @@ def listen() -> None:
 
 
 def listen_no_more() -> None:
-    """Ignore further termination signals: the work is done, and the process is about to end."""
+    """Ignore further termination signals at the end of the process."""
     for name in SIGNALS:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is _interrupt:
@@ -39,12 +39,12 @@ def listen_no_more() -> None:
 
 
 def is_interrupted() -> bool:
-    """Return True if a signal arrived, even if its KeyboardInterrupt was lost."""
+    """Return whether a signal arrived, even if its KeyboardInterrupt was lost."""
     return bool(_received)
 
 
 def check() -> None:
-    """Raise KeyboardInterrupt if a signal arrived; callable in any thread, between two blocks of work."""
+    """Raise KeyboardInterrupt if a signal arrived; for any thread, between blocks of work."""
     if _received:
         raise KeyboardInterrupt
 
@@ -55,20 +55,20 @@ def _interrupt(number: int, _frame: FrameType | None) -> None:
 
 
 def _without_dropped_interrupts(dropped: Any) -> None:
-    """Suppress the report of a dropped KeyboardInterrupt, since the signal is recorded; report other exceptions."""
+    """Suppress the report of a lost KeyboardInterrupt, which is recorded; report other exceptions."""
     if not issubclass(dropped.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(dropped)
 
 
 def _without_interrupts(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
-    """Suppress the report of a KeyboardInterrupt dropped by Cython code, as in SciPy's Sobol sequence."""
+    """Suppress the report of a KeyboardInterrupt lost in Cython code, as in SciPy's Sobol sequence."""
     if not issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, traceback)
 
 
 @contextmanager
 def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
-    """Turn the first termination signal, such as Ctrl-C, into a stop request; a second one raises KeyboardInterrupt."""
+    """Turn the first termination signal into a stop request; a second signal raises KeyboardInterrupt."""
     requested = threading.Event()
 
     def request(_number: int, _frame: object) -> None:

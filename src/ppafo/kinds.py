@@ -1,4 +1,4 @@
-"""Catalogues of components (kinds): valves, controllers, effects ... of this package and of installed plug-ins.
+"""Catalogues of components (kinds): valves, controllers, effects, ... of this package and of plug-ins.
 
 A catalogue gives the location of each kind of this package as ``module:KIND`` and loads a kind when it is looked up: a
 run loads only its own valve and controller. A subpackage that no other one imports is reached only through such a
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 logger = logging.getLogger("ppafo")
 
 Kind = TypeVar("Kind")
-"""Entry of a catalogue: a component with a ``name``, or a function of another package named by its entry point."""
+"""Entry of a catalogue: component with a ``name``, or function of another package."""
 
 
 class Kinds(MutableMapping[str, Kind], Generic[Kind]):
-    """Catalogue of components (kinds) by name; a component is imported when it is looked up.
+    """Catalogue of components (kinds) by name, each imported at its first use.
 
     ``group`` is the group of entry points, ``word`` the name of a kind in messages, ``kind_type`` the class of the
     kinds. ``own`` maps the names of this package's kinds, in order, to kinds or to their locations, ``module:KIND``.
@@ -48,7 +48,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             del self._own[name], self._places[name]
 
     def __getitem__(self, name: str) -> Kind:
-        """Return a component by name; KeyError for an unknown name, KindError for one that cannot be used."""
+        """Return a component by name. Raises KeyError for an unknown name, KindError for an unusable component."""
         if name in self._absent:
             raise KindError(f"{self.word} '{name}' is part of {self._absent[name]}, which is not installed")
         if name not in self._kinds:
@@ -67,25 +67,25 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         del self._kinds[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over component names: this package's, then those loaded from other packages."""
+        """Iterate over component names: of this package, then of other packages."""
         return iter((*self._own, *(name for name in self._kinds if name not in self._own)))
 
     def __len__(self) -> int:
-        """Return the number of component names over which the catalogue iterates."""
+        """Return the number of component names."""
         return len(self._own.keys() | self._kinds.keys())
 
     def loaded(self) -> dict[str, Kind]:
-        """Return the loaded components by name: this package's first, in order."""
+        """Return the loaded components by name, first those of this package."""
         return {name: self._kinds[name] for name in self if name in self._kinds}
 
     def loaded_or_own(self) -> dict[str, Kind]:
-        """Return the loaded components by name; if none is loaded, all components of this package."""
+        """Return the loaded components by name; without any, all components of this package."""
         if not self._kinds:
             self.load_own()
         return self.loaded()
 
     def is_own(self, name: str) -> bool:
-        """Return whether a name belongs to a component of this package."""
+        """Return whether a name is a component of this package."""
         return name in self._own
 
     def load_own(self) -> None:
@@ -93,7 +93,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         self._kinds |= {name: kind_at(location) for name, location in self._places.items() if name not in self._kinds}
 
     def load_all(self) -> tuple[str, ...]:
-        """Load every installed component; return and log one line for each that cannot be used."""
+        """Load every installed component; return and log a line for each unusable component."""
         self.load_own()
         problems = []
         for point in _entry_points(self.group, _installed_path()):
@@ -132,7 +132,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return self._checked(load, f"{self.word} '{one_line(point.name)}' of {_package(point)}", point.name)
 
     def _checked(self, load: Callable[[], Any], where: str, called: str) -> Kind:
-        """Return a loaded component; KindError if loading fails, its class is wrong, or its name is not ``called``."""
+        """Load a component and check its class and its name ``called``. Raises KindError if it is unusable."""
         try:
             kind: Kind = load()
         except KindError as error:
@@ -154,7 +154,7 @@ def package_of(location: str) -> str:
 
 
 def is_installed(location: str) -> bool:
-    """Tell whether the package of a location is installed."""
+    """Return whether the package of a location is installed."""
     return _is_there(package_of(location))
 
 
@@ -186,7 +186,7 @@ def declared_kinds(group: str) -> dict[str, str]:
 
 
 def kind_at(location: str) -> Any:
-    """Return the object at a location ``module:NAME`` in this package."""
+    """Import the object at a location ``module:NAME`` of this package."""
     module, _, name = location.partition(":")
     return getattr(importlib.import_module(module), name)
 
@@ -197,7 +197,7 @@ def _installed_path() -> tuple[str, ...]:
 
 @lru_cache(maxsize=32)
 def _entry_points(group: str, _path: tuple[str, ...]) -> tuple["EntryPoint", ...]:
-    """Entry points of a group for a search path, sorted by name."""
+    """Return the entry points of a group for a search path, sorted by name."""
     from importlib.metadata import entry_points
 
     # The path is part of the key, as it may grow while the program runs. What lies in the working folder is no package

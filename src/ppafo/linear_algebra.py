@@ -1,4 +1,4 @@
-"""Thread limit of linear algebra libraries: one thread for the small matrices of a fit, a search or a study.
+"""Thread limit of linear algebra libraries: one thread for the small matrices of fits and studies.
 
 If every processor runs models, several threads per small matrix product would only slow each other down.
 """
@@ -14,7 +14,7 @@ Result = TypeVar("Result")
 
 
 def on_one_thread(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """Return a function that runs with a single thread in each loaded linear algebra library (BLAS).
+    """Decorate a function to run with a single thread in linear algebra libraries (BLAS).
 
     The limit applies to the whole process and is restored when the function returns or raises. Runs of the engine have
     their own threads, which are not limited.

@@ -1,4 +1,4 @@
-"""Loading of a scenario by name or file, for any motion of the ankle: device alone, or on a walking leg.
+"""Loading of scenarios by name or file: device alone, or on a walking leg.
 
 The extensive code of walks is only loaded on request.
 """
@@ -26,7 +26,7 @@ from ppafo.wording import nearest_name
 
 
 def list_all_scenarios() -> tuple[str, ...]:
-    """Return the names of the shipped scenarios: devices alone first, then walks."""
+    """Return the names of bundled scenarios, then of bundled walks."""
     from ppafo.walking.loading import list_walks
 
     return *of_vanes.list_scenarios(), *list_walks()
@@ -40,7 +40,7 @@ def load_scenario(
     parameter_set: ParameterSet | str | Path | None = None,
     plugins: Plugins = (),
 ) -> Scenario:
-    """Return a scenario or walk, by the name of a shipped one or by the path of a TOML file, in SI units.
+    """Load a scenario or walk, by bundled name or path of a TOML file, in SI units.
 
     Arguments:
         scenario: name of a shipped scenario or walk, or a .toml file
@@ -88,7 +88,7 @@ def load_scenario(
 
 @checked
 def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *, plugins: Plugins = ()) -> Scenario:
-    """Scenario or walk from nested dictionaries laid out as a scenario file.
+    """Build a scenario or walk from nested dictionaries in the layout of a scenario file.
 
     Arguments:
         content: tables of the file; quantities are texts with their unit, ``{"angle": "75 deg"}``, and relative paths
@@ -117,7 +117,7 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *,
 
 
 def _layout(document: Mapping[str, Any]) -> of_vanes.Layout:
-    """Return the layout of a document, according to its kind of motion."""
+    """Return the file layout of a document, by its kind of motion."""
     if not is_walk(kind_at(document, "motion")):
         return of_vanes.VANE
     from ppafo.walking.loading import WALKING
@@ -126,17 +126,17 @@ def _layout(document: Mapping[str, Any]) -> of_vanes.Layout:
 
 
 def scenario_or_load(scenario: Scenario | str | Path, overrides: Iterable[str] = ()) -> Scenario:
-    """Return a loaded scenario unchanged, or load one by name or path; ScenarioError for overrides of a loaded one."""
+    """Return a loaded scenario unchanged, or load it. Raises ScenarioError for overrides of a loaded scenario."""
     return of_vanes.scenario_or_load(scenario, overrides, load_scenario)
 
 
 def placed(name: str, folder: Path) -> str:
-    """Return the name of a shipped scenario or walk, or the path of a file; relative paths start from a folder."""
+    """Make the relative path of a scenario file relative to ``folder``; a bundled name is unchanged."""
     return beside(name, folder, of_vanes.list_scenarios())
 
 
 def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
-    """Return a scenario rebuilt from the content of its file, with further overrides on top of its own.
+    """Rebuild a scenario from the content of its file, with more overrides after its own.
 
     A Python object as its controller is kept.
     """
@@ -150,7 +150,7 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
 
 
 def usage_text(scenario: Scenario) -> str:
-    """Return the command that runs a scenario with its overrides, and the tables of a file that include these."""
+    """Return the command that runs a scenario with its overrides, and the equivalent tables of a file."""
     origin, command = scenario.origin, scenario.motion.motion_kind.command
     words = [word for override in origin.overrides for word in ("--set", override)]
     name = origin.file or scenario.name
@@ -161,7 +161,7 @@ _IN_FILE = "# or in the file of a scenario, in place of the tables of these name
 
 
 def _changed_tables(scenario: Scenario) -> Iterator[str]:
-    """Yield the TOML lines of the tables in which a scenario file would differ with the overrides of a scenario."""
+    """Yield the TOML lines of file tables changed by the overrides of a scenario."""
     request = of_vanes.request_again(scenario.origin)
     declared = _layout(request.content).declared
     given, changed = (
@@ -182,7 +182,7 @@ def _changed_tables(scenario: Scenario) -> Iterator[str]:
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scenario file, for a vane alone or for a leg that walks."""
+    """Return the JSON Schema of a scenario file, for a vane alone or a walking leg."""
     from ppafo.walking import declaration as of_walks
 
     definitions: dict[str, Any] = {}

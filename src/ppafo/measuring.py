@@ -1,4 +1,4 @@
-"""Metrics of a recording, given directly, as a file or as a result folder."""
+"""Metrics of a recording, given as an object, a file or a result folder."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def evaluate(
     recording: "Recording | DataFrame | Dataset | str | Path", *, columns: ColumnsLike | None = None
 ) -> dict[str, Metric]:
-    """Return every metric [SI] that the channels of a recording allow, by name; none for a single sample.
+    """Compute every metric [SI] that the channels of a recording allow, by name; none for a single sample.
 
     Arguments:
         recording: a Recording, or a file, a result folder, a pandas DataFrame or an xarray Dataset with one

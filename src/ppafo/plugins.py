@@ -1,4 +1,4 @@
-"""User modules (plug-ins): ``module:OBJECT`` in a file is imported only if the user has named the module.
+"""Plug-ins: user modules that files may refer to as ``module:OBJECT``, once the user has named them.
 
 Files may come from other people and must not run code. A word in a file therefore finds an object only if the user
 named its module: on the command line, as ``plugins`` of a call in Python, or by importing the module.
@@ -21,10 +21,10 @@ from ppafo.errors import KindError
 from ppafo.wording import one_line
 
 Plugins = Iterable[str | Path]
-"""Files (``laws.py``) or modules (``my_laws.hysteresis``) of the user."""
+"""Plug-ins as files (``laws.py``) or module names (``my_laws.hysteresis``)."""
 
 VARIABLE = "PPAFO_PLUGINS"
-"""Environment variable by which child processes inherit the names of the plug-in modules."""
+"""Environment variable that passes the names of plug-ins to child processes."""
 
 _NAME = r"[^\W\d]\w*(?:\.[^\W\d]\w*)*"
 _MODULE, OBJECT = re.compile(_NAME), re.compile(rf"{_NAME}:[^\W\d]\w*")
@@ -34,7 +34,7 @@ _SUFFIX, _PACKAGE = ".py", "__init__.py"
 
 @dataclass(frozen=True, slots=True)
 class _Plugin:
-    """User module by name, with the folder that contains it; without a folder the usual search path is used."""
+    """Plug-in by module name, with its folder; without folder on the usual search path."""
 
     module: str
     folder: str = ""
@@ -44,20 +44,20 @@ _named: dict[str, _Plugin] = {}
 
 
 def name_plugins(plugins: Plugins | str | Path) -> None:
-    """Allow words in files to refer to objects of these modules, not yet imported; KindError for a missing module."""
+    """Allow files to refer to objects of plug-ins, which are not yet imported. Raises KindError if missing."""
     for plugin in (plugins,) if isinstance(plugins, str | Path) else plugins:
         for found in _found(plugin):
             add_plugin(found)
 
 
 def name_modules_in(text: str) -> None:
-    """Allow the modules of all words ``module:OBJECT`` in a text from the user, such as the value of ``--set``."""
+    """Allow the modules of all words ``module:OBJECT`` in a text typed by the user, such as a ``--set`` value."""
     for module in _OBJECT_IN_TEXT.findall(text):
         add_plugin(_of_module(module))
 
 
 def add_plugin(plugin: _Plugin) -> None:
-    """Allow a module with a known folder; KindError if another folder has a module of the same name."""
+    """Allow a plug-in. Raises KindError if another folder has a module of the same name."""
     earlier = {item.module: item for item in named_plugins()}.get(plugin.module)
     if earlier is not None and earlier.folder and plugin.folder and earlier.folder != plugin.folder:
         raise KindError(f"plugin '{plugin.module}': is in {earlier.folder} and in {plugin.folder}; rename one of them")
@@ -67,7 +67,7 @@ def add_plugin(plugin: _Plugin) -> None:
 
 
 def named_plugins() -> tuple[_Plugin, ...]:
-    """Return the modules named so far, in this process or in its parent process."""
+    """Return the plug-ins named so far, in this process or its parent."""
     for text in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
         module, _, folder = text.partition("=")
         _named.setdefault(module, _Plugin(module, folder))
@@ -75,7 +75,7 @@ def named_plugins() -> tuple[_Plugin, ...]:
 
 
 def _found(plugin: str | Path) -> tuple[_Plugin, ...]:
-    """Return the module of a path or name, under each of its names; KindError if there is none."""
+    """Return the plug-in of a path or module name, under all its names. Raises KindError if absent."""
     text = str(plugin)
     path = Path(text).absolute()
     if (path / _PACKAGE).is_file():
@@ -96,7 +96,7 @@ def _found(plugin: str | Path) -> tuple[_Plugin, ...]:
 
 
 def _of_path(path: Path) -> _Plugin:
-    """Return the module of a file, with the names of its enclosing packages."""
+    """Return the plug-in of a file, with the names of enclosing packages."""
     parts, folder = [path.stem], path.parent
     while (folder / _PACKAGE).is_file():
         parts.insert(0, folder.name)
@@ -105,7 +105,7 @@ def _of_path(path: Path) -> _Plugin:
 
 
 def _of_module(module: str) -> _Plugin:
-    """Return the module of a name: from the working folder only if nothing installed has the same name."""
+    """Return the plug-in of a module name; from the working folder only if not installed."""
     top, here = module.partition(".")[0], str(Path.cwd())
     if _is_installed(top) or importlib.machinery.PathFinder.find_spec(top, [here]) is None:
         return _Plugin(module)
@@ -113,7 +113,7 @@ def _of_module(module: str) -> _Plugin:
 
 
 def _is_installed(top: str) -> bool:
-    """Tell whether a module is found without the working folder."""
+    """Return whether a module is found without the working folder."""
     if top in sys.modules or top in sys.builtin_module_names:
         return True
     with without_working_folder():
@@ -121,11 +121,7 @@ def _is_installed(top: str) -> bool:
 
 
 def object_of(word: str) -> Any:
-    """Return the object of a word ``module:OBJECT``; KindError if the user did not name its module.
-
-    A module that was not named is not imported. A module that is already loaded counts as named: no code of it is run.
-    Exceptions raised during the import of a module are passed on to the caller.
-    """
+    """Return the object of a word ``module:OBJECT``. Raises KindError unless the user named its module."""
     module, _, name = word.partition(":")
     named = {plugin.module: plugin for plugin in named_plugins()}
     # Who names a package means its modules too.
@@ -144,7 +140,7 @@ def object_of(word: str) -> Any:
 
 
 def _remedy(module: str) -> str:
-    """Return the command-line or Python argument that allows a module: its path if in the working folder."""
+    """Return the argument that allows a module: its path if in the working folder."""
     file = Path(*module.split(".")).with_suffix(_SUFFIX)
     if not file.is_file():
         return module if Path(module.partition(".")[0]).is_dir() else f"PATH/{file.as_posix()}"
@@ -170,7 +166,7 @@ def _imported(module: str, folder: str) -> Any:
 
 @contextmanager
 def without_working_folder() -> Iterator[None]:
-    """Remove the working folder from Python's search path within a ``with`` block."""
+    """Remove the working folder from Python's search path in a ``with`` block."""
     before = sys.path[:]
     sys.path[:] = [folder for folder in before if not is_working_folder(folder)]
     try:
@@ -180,7 +176,7 @@ def without_working_folder() -> Iterator[None]:
 
 
 def is_working_folder(folder: str | Path) -> bool:
-    """Return whether an entry of Python's search path is the working folder, whose files may be untrusted.
+    """Return whether an entry of Python's search path is the working folder, with possibly untrusted files.
 
     False for the source folder of an editable installation, even if the command runs in it.
     """
@@ -194,7 +190,7 @@ def is_working_folder(folder: str | Path) -> bool:
 # Python reads path files when it starts, and every lookup of a kind in a notebook asks for them.
 @lru_cache(maxsize=4)
 def _pth_folders(*packages: str) -> frozenset[Path]:
-    """Return the folders that ``.pth`` files in package folders add to Python's search path."""
+    """Return the folders that ``.pth`` files in package folders add to the search path."""
     folders = set()
     for file in (file for folder in packages for file in Path(folder).glob("*.pth")):
         lines = file.read_text(encoding="utf-8", errors="replace").splitlines()

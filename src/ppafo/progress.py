@@ -1,4 +1,4 @@
-"""Progress of long tasks: one common report, and the display in a terminal line."""
+"""Progress of long tasks: report, and display in a terminal line."""
 
 import time
 from collections.abc import Callable
@@ -8,12 +8,12 @@ from typing import TextIO, final
 from ppafo import interrupts
 
 _BETWEEN_LINES = 5.0
-"""Time [s] between two lines if the output is not a terminal."""
+"""Time between progress lines if the output is not a terminal [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Progress of a task: activity, number of items done and in total, and elapsed time [s].
+    """Progress of a task: activity, items done and in total, and elapsed time [s].
 
     ``total`` is 0 if unknown. Of the ``done`` items, ``earlier`` were done before the start and ``failed`` failed.
     ``elapsed`` is the time since the start [s].
@@ -46,12 +46,12 @@ Report = Callable[[Progress], None]
 
 
 def report_nothing(_progress: Progress) -> None:
-    """Ignore the report, if no progress was requested."""
+    """Ignore a progress report."""
 
 
 @final
 class ProgressLine:
-    """Display of progress on a stream: one updated line in a terminal, else a new line now and then."""
+    """Progress display on a stream: an updated line in a terminal, else a new line every few seconds."""
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
         self._stream, self._clock = stream, clock
@@ -59,7 +59,7 @@ class ProgressLine:
         self._open = False
 
     def __call__(self, progress: Progress) -> None:
-        """Display the progress; KeyboardInterrupt if a termination signal has arrived."""
+        """Display the progress. Raises KeyboardInterrupt after a termination signal."""
         interrupts.check()
         if self._stream.isatty():
             self._stream.write(f"\r\x1b[Kppafo: {progress.line()}")
@@ -75,14 +75,14 @@ class ProgressLine:
         self._stream.flush()
 
     def close(self) -> None:
-        """End the terminal line, so that later output starts on a new line."""
+        """End the progress line, so that later output starts on a new line."""
         if self._open:
             self._stream.write("\n")
             self._open = False
 
 
 def time_text(seconds: float) -> str:
-    """Return a time [s] as text in its two largest units: 42 s, 3 min 10 s, 5 h 20 min."""
+    """Format a time [s] in its two largest units: 42 s, 3 min 10 s, 5 h 20 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -1,4 +1,4 @@
-"""Execution of scenarios, given by name, by file or loaded: a vane alone or a leg that walks."""
+"""Execution of scenarios by name, file or object: a vane alone or a walking leg."""
 
 import contextlib
 import math
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from ppafo.simulation.tracking.remedies import Remedy
 
 MOST_TRIED = 16
-"""Largest number of remedies of a run that are simulated."""
+"""Largest number of remedies simulated for a verdict."""
 _STRIDES_TRIED = 8.0
-"""Number of strides of a walk simulated to try a remedy."""
+"""Number of strides simulated for a remedy of a walk."""
 
 
 @checked
@@ -60,7 +60,7 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
 
 
 def gains(scenario: Scenario) -> "Gains | None":
-    """Return the gains in use of a scenario's torque controller; None for a controller without such gains."""
+    """Return the gains of a scenario's torque controller; None for a controller without gains."""
     from ppafo.simulation.gains import gains_of
 
     law = scenario.law
@@ -68,7 +68,7 @@ def gains(scenario: Scenario) -> "Gains | None":
 
 
 def most_reversals(scenario: Scenario) -> float:
-    """Return the limit of ``command_reversals`` above which a loop oscillates; inf for a controller that may switch."""
+    """Return the largest ``command_reversals`` without oscillation; inf for a controller that may switch."""
     from ppafo.simulation import tracking as rules
 
     law = scenario.law
@@ -78,7 +78,7 @@ def most_reversals(scenario: Scenario) -> float:
 
 
 def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
-    """Return a tracking verdict with the first remedy that makes the run follow its reference; each is simulated.
+    """Return a tracking verdict with the first remedy that succeeds in a simulation.
 
     Remedies are the overrides named in the verdict; for a walk, only the first strides are simulated. If only a
     remedy of a less certain cause succeeds, that cause becomes the cause of the verdict. If none succeeds, the verdict
@@ -127,7 +127,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
 
 
 def _trial_run(scenario: Scenario) -> RunSettings:
-    """Return the run times for a trial of a remedy: unchanged for a task, the first strides for a walk."""
+    """Return the run settings for a remedy: unchanged for a task, first strides for a walk."""
     run, duration = scenario.run, _STRIDES_TRIED * scenario.motion.stride_time
     if scenario.follows_reference or not 0.0 < duration < run.duration:
         return run
@@ -139,7 +139,7 @@ def _trial_run(scenario: Scenario) -> RunSettings:
 def simulate_many(
     scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None, plugins: Plugins = ()
 ) -> list[Result]:
-    """Run many scenarios in parallel, given as objects, names or files; each result is exactly as if run alone.
+    """Run many scenarios in parallel, each with the result of a single run.
 
     Arguments:
         scenarios: Scenario objects, names of shipped ones, or .toml files

@@ -1,4 +1,4 @@
-"""Wording of messages: arguments as the caller wrote them, nearest names, counts, lists of names, one-line text."""
+"""Wording of messages: argument names, nearest names, counts, lists of names, one-line text."""
 
 import contextlib
 import difflib
@@ -10,16 +10,16 @@ from os.path import commonprefix
 from typing import Literal
 
 LONGEST_SHOWN = 40
-"""Maximum number of characters of a name or cell quoted in a message."""
+"""Largest number of characters quoted in a message from a name or cell."""
 
 
 def count_of(number: int, noun: str) -> str:
-    """Return a number with its noun in singular or plural: ``1 decay`` or ``3 decays``."""
+    """Format a count with its noun: ``1 decay`` or ``3 decays``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def said_missing(names: Sequence[str]) -> str:
-    """Return a statement that items are missing: ``'a', 'b' and 'c' are missing``."""
+    """Format a statement on missing items: ``'a', 'b' and 'c' are missing``."""
     quoted = [f"'{name}'" for name in names]
     listed = " and ".join(filter(None, (", ".join(quoted[:-1]), quoted[-1])))
     return f"{listed} is missing" if len(quoted) == 1 else f"{listed} are missing"
@@ -30,13 +30,13 @@ _OF_DATA_SHEETS: Mapping[str, str] = {
     "kv": "4.48 L/(s bar) for each Kv [m^3/h, bar]",
     "qn": "qn/254 L/(s bar) for qn [L/min] from 6 to 5 bar gauge",
 }
-"""Data-sheet flow coefficients converted to C of ISO 6358 at b = 0.3; see ``parameters/flow_coefficients.py``."""
+"""Conversion of data-sheet flow coefficients to C of ISO 6358 at b = 0.3, as text."""
 _C, _B = "sonic_conductance", "critical_ratio"
 _SPELT_OTHERWISE = {"kvs": "kv", "qnn": "qn", "nominal_flow": "qn", "flow_coefficient": "cv", "flow_factor": "kv"}
 
 
 def nearest_name(name: str, allowed: Iterable[str]) -> str:
-    """Return a hint such as ``, did you mean 'angle'?``; empty if no allowed name is near.
+    """Return a hint such as ``, did you mean 'angle'?`` for an unknown name; empty if no name is near.
 
     A text that resembles no allowed name may be one word of a name: its first, or any other.
     """
@@ -68,7 +68,7 @@ def _likeness(name: str, word: str) -> float:
 
 
 def first_twice(names: Iterable[str]) -> str | None:
-    """Return the first repeated name; None if all differ. Runs in linear time."""
+    """Return the first repeated name; None if all differ."""
     seen: set[str] = set()
     for name in names:
         if name in seen:
@@ -78,13 +78,13 @@ def first_twice(names: Iterable[str]) -> str | None:
 
 
 def one_line(text: object) -> str:
-    """Return a text for a message: on one line, with a mark for each unprintable character."""
+    """Convert a text to one line for a message, with a mark for each unprintable character."""
     words = " ".join(str(text).split())
     return "".join(character if character.isprintable() else "\N{REPLACEMENT CHARACTER}" for character in words)
 
 
 def reason(error: OSError | ValueError) -> str:
-    """Return the reason of a failed file access, as the end of a sentence."""
+    """Return the reason of a failed file access as the end of a sentence."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error)
     return text[:1].lower() + text[1:]
 
@@ -95,7 +95,7 @@ _reader: ContextVar[_Reader] = ContextVar("_reader", default="caller")
 
 @contextlib.contextmanager
 def read_by(reader: _Reader) -> Iterator[None]:
-    """Word errors within a ``with`` block for a Python caller, a function of the package, or the command line.
+    """Set the reader of messages in a ``with`` block: Python caller, package function, or command line.
 
     Messages name arguments for a Python caller and options on the command line, and neither for a function of the
     package, whose arguments the user never gave.
@@ -108,12 +108,12 @@ def read_by(reader: _Reader) -> Iterator[None]:
 
 
 def read_by_caller() -> bool:
-    """True for a call from a user's own Python code, which names the arguments."""
+    """Return whether messages are for a Python caller, who names arguments."""
     return _reader.get() == "caller"
 
 
 def argument_text(name: str, value: str = "", option: str = "") -> str:
-    """Return an argument, optionally with its value, as written by the caller.
+    """Format an argument, optionally with its value, as its caller wrote it.
 
     On the command line this is the ``option``, by default the name with dashes: ``--peak-flow '4 g/s'``.
 
@@ -131,7 +131,7 @@ _configuration: ContextVar[str] = ContextVar("_configuration", default="")
 
 @contextlib.contextmanager
 def said_of_configuration(name: str) -> Iterator[None]:
-    """Word messages within a ``with`` block for one of several configurations: name it, and address overrides to it."""
+    """Set the configuration that messages name in a ``with`` block, also in overrides."""
     token = _configuration.set(name)
     try:
         yield
@@ -140,12 +140,12 @@ def said_of_configuration(name: str) -> Iterator[None]:
 
 
 def subject_text(scenario: str) -> str:
-    """Return the subject of a message on a scenario: the configuration being processed, else the scenario's name."""
+    """Return the subject of a message on a scenario: current configuration, else scenario name."""
     return _configuration.get() or scenario
 
 
 def override_text(overrides: Iterable[str]) -> str:
-    """Return overrides as written by the caller: words of the command line, or an argument in Python.
+    """Format overrides as their caller writes them: command-line words, or a Python argument.
 
     >>> override_text(["run.duration=2 s"])
     "overrides=['run.duration=2 s']"

@@ -1,1 +1,1 @@
-"""Analyses beyond a single run: a folder for each, with arguments, computation and report."""
+"""Analyses beyond a single run: a package for each, with arguments, computation and report."""

@@ -69,7 +69,7 @@ def _document(file: Path) -> dict[str, Any]:
 
 
 def what_is_there(folder: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
-    """Return a sentence on the figures and the main file of a result folder, with the same as plain data.
+    """Describe the figures and the main file of a result folder: a sentence, and plain data.
 
     Raises DataError for any other folder.
     """

@@ -1,4 +1,4 @@
-"""Command parsers built from function signatures: parameters become arguments, the docstring becomes the help.
+"""Command parsers from function signatures: parameters become arguments, the docstring becomes the help.
 
 The parser is an argparse parser that reports each mistake as a single error naming the mistyped word.
 """
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from ppafo.documents.toml_text import TomlKind
 
 PROGRESS = "progress"
-"""Parameter of a command function that receives the progress display; not settable on the command line."""
+"""Parameter of a command function for the progress display, not set on the command line."""
 PLUGINS = "plugins"
-"""Parameter of Python calls for user modules; on the command line it is the option ``--plugin``."""
+"""Parameter of Python calls for user modules; the command line has the option ``--plugin``."""
 OUT = "out"
-"""Parameter of command functions that write their own output; all other commands have ``--out DIR``."""
+"""Parameter of command functions that write their output themselves; all others have ``--out DIR``."""
 
 
 _Verb = Callable[..., Any]
@@ -43,7 +43,7 @@ _Verb = Callable[..., Any]
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """Command: its function as ``module:function``, and properties beyond the signature of the function.
+    """Command of the command line: function as ``module:function``, and properties beyond its signature.
 
     ``library`` is the ``TomlKind`` of the bundled files (``module:NAME``), for ``--list``. ``listing`` is the function
     (``module:function``) that returns the entries of that list, by default built from the files, and ``listed`` is the
@@ -59,7 +59,7 @@ class Command:
     default_folder: str = ""
     first_line: str = ""
     loaded_verb: _Verb | None = None
-    """Function of a command of another package, which has no path here."""
+    """Function of a command from another package, in place of a location."""
 
     def function(self) -> _Verb:
         """Import and return the function of the command."""
@@ -68,7 +68,7 @@ class Command:
 
     @property
     def summary(self) -> str:
-        """First line of the function's docstring, as an entry of the list of commands."""
+        """Summary of the command: first line of the function's docstring."""
         first_line = self.first_line or (inspect.getdoc(self.function()) or "").split("\n", 1)[0]
         return first_line[:1].lower() + first_line[1:].rstrip(".")
 
@@ -92,15 +92,15 @@ _PLAIN: Mapping[type, Word] = {
     float: Word("NUMBER", number),
     Path: Word("FILE", Path),
 }
-"""Parser of each type without a ``Word``."""
+"""Option types without an explicit ``Word``."""
 
 _PARAMETER = re.compile(r"(\w+): (.*)")
-"""First line of a parameter in the docstring of a command function."""
+"""Pattern of the first line on a parameter in the docstring of a command function."""
 
 
 @dataclass(frozen=True, slots=True)
 class _OptionType:
-    """Option type: conversion of the text of a parameter to its value, from the annotation."""
+    """Type of a command-line option, from an annotation: conversion of its text to a value."""
 
     word: Word
     is_flag: bool = False
@@ -109,7 +109,7 @@ class _OptionType:
 
 
 def reading_of(annotation: Any) -> _OptionType:
-    """Return the text conversion for a parameter with an annotation."""
+    """Return the option type of an annotation."""
     word, is_repeated = None, False
     while True:
         origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
@@ -130,14 +130,14 @@ def reading_of(annotation: Any) -> _OptionType:
 
 
 def parameters_of(verb: _Verb) -> Iterator[tuple[inspect.Parameter, _OptionType]]:
-    """Yield each parameter to be filled from the command line, with its text conversion."""
+    """Yield each parameter set on the command line, with its option type."""
     for name, parameter in annotated_parameters(verb).items():
         if name not in (PROGRESS, PLUGINS):
             yield parameter, reading_of(parameter.annotation)
 
 
 def option_of(parameter: inspect.Parameter, reading: _OptionType) -> str:
-    """Return the option of a parameter; empty for a positional parameter. Flags are always options."""
+    """Return the option name of a parameter; empty for a positional parameter. Flags are always options."""
     if reading.word.option or not (reading.is_flag or parameter.kind is inspect.Parameter.KEYWORD_ONLY):
         return reading.word.option
     return f"--{parameter.name.strip('_').replace('_', '-')}"
@@ -175,7 +175,7 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
 
 
 def _helps_in(docstring: str, names: Collection[str]) -> dict[str, str]:
-    """Return the lines on the named parameters in a docstring, each with its indented continuation."""
+    """Return the help texts of the named parameters in a docstring, with indented continuations."""
     helps: dict[str, str] = {}
     name, depth = "", 0
     for line in docstring.splitlines():
@@ -200,7 +200,7 @@ def _add_parameter(
     may_be_missing: bool,
     is_listing: bool,
 ) -> None:
-    """Add a parameter as positional argument or option; ``run`` refuses a missing one that ``may_be_missing``."""
+    """Add a parameter as positional argument or option; ``run`` refuses a missing positional argument."""
     word, is_required = reading.word, parameter.default is inspect.Parameter.empty
     default = None if is_required else parameter.default
     if isinstance(default, float):
@@ -245,7 +245,7 @@ def _add_parameter(
 
 
 def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
-    """Call the function of a command with the parsed arguments, deliver its result, and return the exit code."""
+    """Call the function of a command with parsed arguments, deliver its result, and return the exit code."""
     if command.lists and parsed.list:
         library: TomlKind | None = kind_at(command.library) if command.library else None
         noun = command.listed or (library.noun if library is not None else "")
@@ -285,11 +285,11 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
 
 
 _NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form")
-"""Parameters whose texts may contain ``module:OBJECT``, which allows the module to be imported."""
+"""Parameters whose texts may name an object ``module:OBJECT`` of a user module."""
 
 
 def _texts(values: Iterable[Any]) -> Iterator[str]:
-    """Yield the texts among values, and the texts nested inside values."""
+    """Yield all texts among values, nested texts included."""
     for value in values:
         if isinstance(value, str):
             yield value
@@ -298,21 +298,21 @@ def _texts(values: Iterable[Any]) -> Iterator[str]:
 
 
 _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
-"""Form of argparse's message for an ArgumentTypeError."""
+"""Pattern of an argparse message for an ArgumentTypeError."""
 
 _NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 
 
 class UsageError(PpafoError):
-    """Error for invalid command-line arguments."""
+    """Invalid command-line arguments."""
 
 
 @final
 class CommandParser(argparse.ArgumentParser):
-    """Parser that raises ``UsageError`` instead of printing its usage and ending the process."""
+    """Argument parser that raises ``UsageError`` instead of printing its usage and ending the process."""
 
     list_commands: Callable[[], str] | None = None
-    """Writer of the text after the description in the help; called only there, as it loads every command."""
+    """Function that lists the commands at the end of the help; called only for help, as it loads every command."""
 
     def format_help(self) -> str:
         """Return the help, followed by the list of commands if there is one."""
@@ -321,25 +321,25 @@ class CommandParser(argparse.ArgumentParser):
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
-        """Raise argparse's message as a one-line error that names the help to read."""
+        """Raise argparse's message as a one-line ``UsageError`` that names the help."""
         bad_value = _BAD_VALUE.fullmatch(message)
         if bad_value is not None:
             raise UsageError(f"{bad_value[1]} {bad_value[2]}")
         raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
-        """Print a help text; on some Python versions argparse ignores a failed write."""
+        """Print a help text; unlike argparse, a failed write is an error."""
         with output.printing():
             super()._print_message(message, file)
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
-        """End the process after ``--help`` or ``--version``, once the text has been flushed."""
+        """End the process after ``--help`` or ``--version`` with flushed output."""
         with output.printing():
             print(end="", flush=True)
         super().exit(status, message)
 
     def options(self) -> set[str]:
-        """Return all options of this parser and of its subcommands."""
+        """Return all options of the parser and its subcommands."""
         options = {name for action in self._actions for name in action.option_strings}
         for action in self._actions:
             if isinstance(action.choices, Mapping):
@@ -348,7 +348,7 @@ class CommandParser(argparse.ArgumentParser):
 
 
 def check_options(words: Sequence[str], parser: CommandParser) -> None:
-    """Refuse an unknown option before argparse complains about missing arguments."""
+    """Raise UsageError for an unknown option, before argparse reports missing arguments."""
     known = sorted(parser.options())
     for word in takewhile(lambda word: word != "--", words):
         name = word.partition("=")[0]

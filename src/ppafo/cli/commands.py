@@ -1,4 +1,4 @@
-"""List of all commands under the headings of the help. To add one, write a function in ``verbs/`` and list it here.
+"""List of all commands under the headings of the help.
 
 Commands of other packages are plain functions, found by entry points of the group ``ppafo.commands``.
 """
@@ -17,7 +17,7 @@ _STUDIES = "ppafo.studies.loading:STUDY_FILES", "ppafo.analyses.sweep.solve:stud
 
 
 def _of_scenario(verb: str, first_line: str = "") -> Command:
-    """Return a command that takes scenarios and walks by name."""
+    """Declare a command that takes scenarios and walks by name."""
     return Command(verb, listing="ppafo.cli.simulate:list_descriptions", listed="scenario", first_line=first_line)
 
 
@@ -134,11 +134,11 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "doctor": Command("ppafo.cli.doctor:doctor"),
     },
 }
-"""Headings of the help by purpose, each with its commands, including commands of other packages."""
+"""Headings of the help with their commands, installed or not."""
 
 
 def _installed(entry: Command | CommandGroup) -> Command | CommandGroup | None:
-    """Return a command, a group without its missing commands, or None if nothing remains."""
+    """Return a command if installed, a group with its installed commands, or None if nothing remains."""
     if isinstance(entry, Command):
         return entry if is_installed(entry.verb) else None
     return CommandGroup(
@@ -150,19 +150,19 @@ HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     heading: {name: entry for name, listed in group.items() if (entry := _installed(listed)) is not None}
     for heading, group in _ALL_HEADINGS.items()
 }
-"""Headings of the help with the installed commands."""
+"""Headings of the help with their installed commands."""
 
 COMMANDS: dict[str, Command | CommandGroup] = {
     name: entry for group in HEADINGS.values() for name, entry in group.items()
 }
-"""The commands of this package by name."""
+"""Installed commands of this package by name."""
 
 OTHERS: Kinds[FunctionType] = Kinds("ppafo.commands", "command", FunctionType, {})
-"""Commands of other packages, searched only for a name that is unknown here."""
+"""Commands of other packages, loaded only for a name unknown in this package."""
 
 
 def check_words(words: list[str]) -> None:
-    """Refuse words that match no command, suggesting the nearest name.
+    """Raise UsageError for words that match no command, with the nearest name.
 
     Raises KindError for a command of another package that is installed and cannot be used.
     """
@@ -195,7 +195,7 @@ def check_words(words: list[str]) -> None:
 
 
 def list_commands() -> str:
-    """Return the list of commands with summaries, by heading, including commands of other packages."""
+    """Format the list of commands with summaries, by heading, including commands of other packages."""
     # The summary of a command is in its function, so that the ones of other packages are loaded here.
     OTHERS.load_all()
     groups = {heading: {name: entry.summary for name, entry in group.items()} for heading, group in HEADINGS.items()}

@@ -28,7 +28,7 @@ FORMATS: dict[str, str] = {
     "bottle": "ppafo.parameters.bottles.declaration",
     "publication": "ppafo.parameters.publications.publication",
 }
-"""Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
+"""Modules with a ``json_schema()``, by file format."""
 
 _DAY = 86400.0
 
@@ -94,7 +94,7 @@ def doctor(
 
 
 def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
-    """Return compilers and cached models of a cache folder; ``why_not`` is the reason for not using it, or empty."""
+    """Return compilers and cached models of a cache folder; ``why_not`` is the reason not to use the folder, or ""."""
     from ppafo.engine.cache.tidying import LONGEST_UNUSED, MAXIMUM_BYTES, list_left_out, list_programs, list_texts
     from ppafo.engine.loading import compilers_to_try
 
@@ -117,7 +117,7 @@ def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
 
 
 def models_text(document: dict[str, Any], one_by_one: bool) -> str:
-    """Return ``models_document`` as text, with the number of programs, or a list of them if ``one_by_one``."""
+    """Format ``models_document`` as text, with the number of programs, or their list if ``one_by_one``."""
     lines = [f"compilers: {', '.join(document['compilers'])}", f"folder: {document['folder'] or 'none'}"]
     if document["not_used"]:
         lines.append(f"not used: {document['not_used']}")

@@ -15,12 +15,12 @@ _FOLDER = resources.files("ppafo") / "examples"
 
 
 def load_examples() -> dict[str, dict[str, Any]]:
-    """Return the bundled examples by name: summary, documentation page, commands in order."""
+    """Load the bundled examples by name: summary, documentation page, commands in order."""
     return tomllib.loads((_FOLDER / "catalogue.toml").read_text(encoding="utf-8"))
 
 
 def example_files(name: str) -> dict[PurePosixPath, bytes]:
-    """Return the files of an example by path in its folder."""
+    """Return the files of an example by relative path."""
     files, folders = {}, [(_FOLDER / name, PurePosixPath())]
     for folder, path in folders:
         for item in folder.iterdir():
@@ -33,14 +33,14 @@ def example_files(name: str) -> dict[PurePosixPath, bytes]:
 
 
 def list_examples() -> CommandOutput:
-    """Return the list of examples with summaries."""
+    """List the bundled examples with summaries."""
     rows = [{"name": name, **example} for name, example in load_examples().items()]
     examples = listing("example", rows, ("name", "summary"))
     return replace(examples, text=f"{examples.text}\n\nppafo new example NAME writes one into a new folder.")
 
 
 def write_example(name: str, folder: Path) -> CommandOutput:
-    """Write all files of an example into a new folder, or none, and return the next command."""
+    """Write all files of an example into a new folder, or none; the output names the next command."""
     from ppafo.storage.files import replace_folder
 
     examples = load_examples()

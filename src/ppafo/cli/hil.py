@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 _SAME_PERIOD = 1.0e-9
-"""Relative difference of two sample periods [-] that counts as rounding."""
+"""Relative rounding difference of two equal sample periods [-]."""
 
 
 def hil(
@@ -86,7 +86,7 @@ def hil(
 
 @in_units(lambda ran, *_: ran.result.scenario.device.shown)
 def _said(ran: "HardwareRun", port: str, folder: Path) -> CommandOutput:
-    """Return the output of a finished run after its files have been written."""
+    """Return the output of a finished run with written files."""
     from ppafo.documents.json_text import plain
     from ppafo.report.display_units import metrics_lines
 

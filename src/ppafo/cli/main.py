@@ -1,4 +1,4 @@
-"""Entry point of the command line: builds the parser of the requested command, and prints errors as one line."""
+"""Entry point of the command line: parser of the requested command, one-line errors, shell completion."""
 
 import argparse
 import gc
@@ -26,7 +26,7 @@ _NAMES = {
     "GAIT": "ppafo.gait:list_gaits",
     "BOTTLE": "ppafo.parameters.bottles.bottle:list_bottles",
 }
-"""Function that lists the bundled names, by the placeholder of a value in the help."""
+"""Functions that list bundled names for completion, by value placeholder of the help."""
 _SCRIPT = """\
 {head}_ppafo() {{
   local word="${{COMP_WORDS[COMP_CWORD]}}" words="{commands}"
@@ -42,7 +42,7 @@ complete -o default -F _ppafo ppafo
 
 
 def completion_script(shell: str) -> str:
-    """Return the completion script of a shell of ``SHELLS`` for commands, options and bundled names."""
+    """Return the shell script that completes commands, options and bundled names."""
     # What may follow the first words of a line; a group after its actions.
     following: dict[str, list[str]] = {}
     for name, entry in COMMANDS.items():
@@ -87,17 +87,17 @@ learn
   ppafo new example                         the examples of the how-to pages, ready to run
 
 All commands: ppafo --help"""
-"""Text of ``ppafo`` without arguments."""
+"""Output of ``ppafo`` without arguments."""
 
 EXIT_BAD_INPUT = 2
 _LONGEST_MESSAGE = 1000
 
 OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
-"""Garbage collection threshold at start; Python's default of 700 costs a tenth of the start-up time."""
+"""Threshold of garbage collection at start; Python's default of 700 costs a tenth of the start-up time."""
 
 
 def build_parser(words: Sequence[str]) -> CommandParser:
-    """Return the parser; only the module of the requested command is imported, so that help is quick."""
+    """Build the parser; only the module of the requested command is imported, for speed."""
     names = [word for word in words if not word.startswith("-")]
     parser = CommandParser(
         prog="ppafo",

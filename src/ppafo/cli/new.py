@@ -15,7 +15,7 @@ from ppafo.wording import nearest_name, one_line
 
 _SUFFIX = ".toml"
 _SCHEMAS = {"set": "parameters"}
-"""File types that have another name in ``ppafo doctor --schema``."""
+"""Names of file kinds in ``ppafo doctor --schema``, if different."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _NAME_LINE = re.compile(r"""^name *= *(["'])(.*?)\1""", re.MULTILINE)
 _PARENT_LINE = re.compile(r"^parent *=.*\n", re.MULTILINE)
@@ -24,7 +24,7 @@ _FIRST_TABLE = re.compile(r"^\s*\[", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True)
 class _NewFile:
-    """Kind of file: its noun, folder of bundled files, loader, and the command to try next.
+    """Kind of input file: noun, folder of bundled files, loader, and command to try next.
 
     In the command, ``FILE`` stands for the new file and ``NAME`` for its name.
     """
@@ -74,7 +74,7 @@ KINDS: dict[str, _NewFile] = {
         "ppafo sets parts --catalogue FILE",
     ),
 }
-"""Kinds of file that ``ppafo new`` writes. To add one: a template of that name in ``templates``, and an entry here."""
+"""Kinds of file written by ``ppafo new``, each with a template in ``templates``."""
 
 
 EXAMPLE = "example"
@@ -136,7 +136,7 @@ def new(
 
 
 def _bottle_text(part: str, name: str) -> str:
-    """Return the file of a bottle of the catalogue of parts, under a new name."""
+    """Return the file text of a catalogue bottle under a new name."""
     from ppafo.documents.toml_text import assignments, table_lines
     from ppafo.parameters.bottles.bottle import load_bottle
 
@@ -148,7 +148,7 @@ def _bottle_text(part: str, name: str) -> str:
 
 
 def list_kinds() -> list[dict[str, str]]:
-    """Return each value of KIND with its meaning, and the bundled files that ``--from`` copies."""
+    """List the kinds of file with their meaning, and the bundled files for ``--from``."""
     from importlib import resources
 
     rows = []
@@ -160,7 +160,7 @@ def list_kinds() -> list[dict[str, str]]:
 
 
 def _content(kind: str, source: str | None, name: str, path: Path) -> str:
-    """Return the text of the new file: the template or the source, under the new name."""
+    """Return the text of a new file: template or source, under the new name."""
     from importlib import resources
 
     from ppafo.documents.toml_text import TomlKind, value_text

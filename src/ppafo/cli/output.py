@@ -1,4 +1,4 @@
-"""Delivery of a result: printing as text or JSON, writing of a folder completely or not at all, and exit code."""
+"""Delivery of a result: printed text or JSON, result folder, and exit code."""
 
 import contextlib
 import logging
@@ -27,7 +27,7 @@ EXIT_INTERRUPTED = 130
 
 
 def check_output(out: Path | None, command: str) -> None:
-    """Refuse, before anything runs, an ``--out`` folder unless it is new, empty, or a result of this command."""
+    """Raise DataError for an ``--out`` folder unless it is new, empty, or a result of the command."""
     if out is not None:
         from ppafo.storage.owned_folder import check_owned_folder, marked_folder
 
@@ -36,7 +36,7 @@ def check_output(out: Path | None, command: str) -> None:
 
 
 def check_new_file(path: Path) -> None:
-    """Raise DataError for an ``--out`` file that exists: it has no mark of the command that wrote it."""
+    """Raise DataError for an ``--out`` file that exists, since files have no mark of their command."""
     # A link to nowhere exists too, and writing would create the file that it points to.
     if os.path.lexists(path):
         raise DataError(f"--out {path}: already exists; remove it or choose another name")
@@ -44,7 +44,7 @@ def check_new_file(path: Path) -> None:
 
 @contextlib.contextmanager
 def blame_out_option() -> Iterator[None]:
-    """Prefix errors about a folder with the option that named it."""
+    """Prefix errors about a folder with the option ``--out``."""
     try:
         yield
     except DataError as error:
@@ -53,7 +53,7 @@ def blame_out_option() -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True)
 class CommandOutput:
-    """Output of a command other than a question: text, JSON document and files.
+    """Output of a command: text, JSON document and files.
 
     ``name`` is the stem of the files in the ``--out`` folder, where ``draw`` makes a figure. ``finish`` draws and
     writes after the text is printed, and returns the last lines of text. ``aside`` is a line for standard error after
@@ -121,7 +121,7 @@ def _deliver_output(output: CommandOutput, as_json: bool, out: Path | None, comm
 
 
 def files_of_output(output: CommandOutput) -> dict[str, bytes]:
-    """Return text, JSON document and figure as the files of a result folder."""
+    """Return text, JSON document and figure of an output as files."""
     contents = {f"{output.name}.txt": output.text, f"{output.name}.json": json_text(output.document)}
     files = {file: f"{content}\n".encode() for file, content in contents.items()}
     if output.draw is None:
@@ -136,11 +136,11 @@ def files_of_output(output: CommandOutput) -> dict[str, bytes]:
 
 
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
-"""Characters that control a terminal or change the direction of writing: texts may come from foreign files."""
+"""Pattern of characters that control a terminal or change the writing direction, possible in foreign files."""
 
 
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
-    """Print the text, or the document as JSON; ends quietly if the pipe is closed, as by ``... | head``."""
+    """Print text, or a document as JSON; a closed pipe, as of ``... | head``, ends quietly."""
     with printing():
         # A terminal without a character shows its number, where Python would end with an error.
         printed = json_text(document) if as_json else _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text)
@@ -150,7 +150,7 @@ def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
 
 @contextlib.contextmanager
 def printing() -> Iterator[None]:
-    """Print within a ``with`` block: one line of error if standard output is unwritable, none for a closed pipe."""
+    """Handle failed writes to standard output in a ``with`` block: one-line error, silence for a closed pipe."""
     try:
         yield
     except BrokenPipeError:
@@ -161,14 +161,14 @@ def printing() -> Iterator[None]:
 
 
 def _drop_output() -> None:
-    """Discard unwritten output, since Python would write it again at exit and report a second error."""
+    """Discard unwritten output, so that Python does not write it again at exit."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)
 
 
 def write_files(out: Path, contents: Mapping[str, bytes], command: str) -> None:
-    """Replace the content of the ``--out`` folder by these files and the mark of the command: all of them or none."""
+    """Replace the content of the ``--out`` folder by files and the mark of the command, all or none."""
     from ppafo.storage.owned_folder import write_marked_folder
 
     with blame_out_option():
@@ -182,7 +182,7 @@ def export(
     next_step: Callable[[Sequence[str]], str],
     **entries: Any,
 ) -> CommandOutput:
-    """Write the files of an export, and return their names, the next command, and ``entries`` of the document."""
+    """Write the files of an export; the output has their names, the next command, and ``entries``."""
     # Before the files are made: a folder that is refused must not cost their making.
     check_output(out, command)
     contents = make()
@@ -194,7 +194,7 @@ def export(
 
 
 def export_file(out: Path, make: Callable[[], bytes], following: str) -> CommandOutput:
-    """Write the single file of an export, unless it exists, and return the next command."""
+    """Write the file of an export unless it exists; the output names the next command."""
     from ppafo.storage.files import check_files_can_be_added, write_file
 
     check_new_file(out)
@@ -205,7 +205,7 @@ def export_file(out: Path, make: Callable[[], bytes], following: str) -> Command
 
 
 def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> CommandOutput:
-    """Return a list with one row per entry and the given columns (default: all), and all entries as data."""
+    """Format a list with a row for each entry and the given columns (default: all), with all entries as data."""
     from ppafo.report.writing import align_columns
 
     # A count is shown with what it counts, the name of its column.
@@ -219,7 +219,7 @@ def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str]
 
 @contextmanager
 def progress_line() -> Iterator[ProgressLine]:
-    """Display progress on standard error within a ``with`` block; log messages start on a new line."""
+    """Display progress on standard error in a ``with`` block; log messages start on a new line."""
     line = ProgressLine(sys.stderr)
     logger = logging.getLogger("ppafo")
 
@@ -237,11 +237,10 @@ def progress_line() -> Iterator[ProgressLine]:
 
 
 def _tell_drawing() -> None:
-    """Print at a terminal that drawing is in progress, as the numbers are already printed."""
     if sys.stderr.isatty():
         tell("drawing figures and page")
 
 
 def tell(text: str) -> None:
-    """Print a message on the work in progress to standard error, separate from the result."""
+    """Print a message on work in progress to standard error."""
     print(f"ppafo: {text} ...", file=sys.stderr, flush=True)

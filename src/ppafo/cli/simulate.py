@@ -74,7 +74,7 @@ def simulate(
 
 @dataclass(frozen=True, slots=True)
 class _RunReport:
-    """Result of a run with its assessment: check and estimated error if made, verdict if it misses its reference."""
+    """Result of a run for its report: repeatability check, estimated error, tracking verdict, gains."""
 
     result: "Result"
     check: "Check | None"
@@ -84,7 +84,7 @@ class _RunReport:
 
     @property
     def verdict(self) -> list[str]:
-        """Sentences on following the reference, on how often valves switch, and on replaced values of the set."""
+        """Sentences on tracking, switching frequency, and replaced values of the set."""
         from ppafo.simulation.tracking.pair_step import unlimited_switching
 
         sentence = self.result.following if self.tracking is None else self.tracking.sentence
@@ -93,7 +93,7 @@ class _RunReport:
 
     @property
     def usage(self) -> list[str]:
-        """Command and tables of a file for the remedy with which the run follows; empty without one."""
+        """Command, and file tables, with the remedy that makes the run follow; empty without a remedy."""
         from ppafo.loading import reloaded, usage_text
 
         mended = () if self.tracking is None else self.tracking.mended
@@ -106,7 +106,7 @@ class _RunReport:
 
 
 def assessed(result: "Result", check: bool) -> _RunReport:
-    """Return a result with its assessment; ``check`` runs the scenario again for the repeatability of its metrics."""
+    """Assess a result for its report; ``check`` runs the scenario again to test its repeatability."""
     from ppafo.running import gains, tried
 
     scenario = result.scenario
@@ -119,7 +119,7 @@ def assessed(result: "Result", check: bool) -> _RunReport:
 
 
 def _text(report: _RunReport) -> str:
-    """Return status, tracking error, metrics, their repeatability, and gains of a run as text."""
+    """Format status, tracking, metrics, repeatability and gains of a run."""
     from ppafo.report.display_units import metrics_lines
 
     # The result's own text has a verdict whose remedies were not tried.
@@ -134,7 +134,7 @@ def _text(report: _RunReport) -> str:
 
 @in_units(lambda report, _folder: report.result.scenario.device.shown)
 def _write(report: _RunReport, folder: Path) -> str:
-    """Draw the figure and the page, write the result folder, and return the last lines of text."""
+    """Draw figure and page, write the result folder, and return the last lines of text."""
     # Before anything else imports Matplotlib, so that it comes without what it does for others.
     from ppafo.report.drawing import load_drawing
 
@@ -150,7 +150,7 @@ def _write(report: _RunReport, folder: Path) -> str:
 
 
 def finding_of(report: _RunReport) -> "Finding[None]":
-    """Return the content of a result page: metrics, figure, and the interactive run."""
+    """Return the content of the report page: metrics, figure, and interactive run."""
     from ppafo.report.display_units import metric_text, metric_words
     from ppafo.report.finding import Finding, Section, columns_of
     from ppafo.report.live_parts import live_part
@@ -187,7 +187,7 @@ def finding_of(report: _RunReport) -> "Finding[None]":
 
 
 def list_descriptions() -> list[dict[str, Any]]:
-    """Return name and description of each bundled scenario and walk."""
+    """List name and description of each bundled scenario and walk."""
     from ppafo.loading import list_all_scenarios, load_scenario
 
     return [{"name": name, "description": load_scenario(name).description} for name in list_all_scenarios()]

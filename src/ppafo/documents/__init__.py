@@ -1,1 +1,1 @@
-"""User-written files: TOML to plain data, and one-line messages on faults."""
+"""Files written by users: TOML parsed to plain data, and faults as one-line messages."""

@@ -1,4 +1,4 @@
-"""JSON text of plain data, as used in files and by ``--json``, and parsing with a limit on nesting."""
+"""JSON text of plain data, for files and ``--json``, and parsing with a limit on nesting."""
 
 import dataclasses
 import json
@@ -12,7 +12,7 @@ MAXIMUM_LEVELS = 50
 
 
 def json_text(document: Mapping[str, Any]) -> str:
-    """Return the document as indented JSON without a final line break; ValueError for a number that is not finite.
+    """Format a document as indented JSON without final line break. Raises ValueError for a non-finite number.
 
     Bytes of a file name that are not UTF-8 are escaped and restored on reading.
     """
@@ -21,7 +21,7 @@ def json_text(document: Mapping[str, Any]) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Return dicts, lists, texts and finite numbers; infinity becomes None, a controller the name of its type."""
+    """Convert a value to dicts, lists, texts and finite numbers; infinity to None, a controller to its type name."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         # Links are no part of what is run: what is not compared is not shown.
         shown = {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}
@@ -44,7 +44,7 @@ def plain(value: Any) -> Any:
 
 
 def json_document(content: bytes) -> Any:
-    """Return the plain data of JSON text in UTF-8; ValueError for invalid or too deeply nested text."""
+    """Parse JSON text in UTF-8. Raises ValueError for invalid or too deeply nested text."""
     try:
         document = json.loads(content.decode("utf-8"))
     except RecursionError as error:

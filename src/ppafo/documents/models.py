@@ -1,4 +1,4 @@
-"""Building blocks of file layouts: strict tables, optional values, unions of kinds, and their JSON Schema."""
+"""Building blocks of file layouts: strict tables, optional values, unions by kind, and JSON Schema."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class StrictTable(BaseModel):
-    """Table of a file that accepts only its declared keys and types and finite numbers; built at its first use."""
+    """Table of a file that accepts only declared keys and types, and finite numbers; built at first use."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
@@ -28,7 +28,7 @@ def _no_flag(value: Any) -> Any:
 
 
 SchemaVersion = Annotated[Literal[1], BeforeValidator(_no_flag), Field(description="version of this layout")]
-"""Version of a file layout; so far each layout has only version 1."""
+"""Version of a file layout; all layouts have version 1 so far."""
 Text = Annotated[str, Field(min_length=1)]
 Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 
@@ -39,19 +39,19 @@ _CONFIG = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
 
 
 def table(name: str, fields: dict[str, Any]) -> type[BaseModel]:
-    """Return the model of a table with exactly these keys."""
+    """Create the model of a table with exactly these keys."""
     model: type[BaseModel] = create_model(name, __config__=_CONFIG, **fields)
     return model
 
 
 def optional(annotation: Any, description: str) -> Any:
-    """Return the field of an optional value."""
+    """Return annotation and field of an optional value."""
     # A factory keeps 'null' out of the published schema.
     return annotation, Field(default_factory=lambda: None, description=description)
 
 
 def one_of(models: list[Any]) -> Any:
-    """Return the union of tables, distinguished by their ``kind``."""
+    """Return the union of table models, discriminated by their ``kind``."""
     if len(models) == 1:
         return models[0]
     return Annotated[Union[tuple(models)], Field(discriminator="kind")]  # noqa: UP007
@@ -70,7 +70,7 @@ def validate(
     refusal: type[PpafoError],
     whole: Callable[[], type[Model]] | None = None,
 ) -> Model:
-    """Return a document validated as a model; raises ``refusal`` with all problems if the layout differs.
+    """Validate a document as a model. Raises ``refusal`` with all problems if the layout differs.
 
     If ``model`` contains only the loaded kinds, ``whole`` returns the model with all kinds, used for messages.
     """
@@ -87,5 +87,5 @@ REFERENCE = "#/$defs/{model}"
 
 
 def make_schema(model: type[BaseModel], title: str, reference: str = REFERENCE) -> dict[str, Any]:
-    """Return the JSON Schema of a file with this layout; ``reference`` is the template of references within it."""
+    """Return the JSON Schema of a file layout; ``reference`` is the template of internal references."""
     return {"$schema": SCHEMA, **model.model_json_schema(ref_template=reference), "title": title}

@@ -13,35 +13,35 @@ from ppafo.wording import nearest_name, one_line, said_missing
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
 """Pattern of the name of a set or scenario."""
 LABEL = r"^[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?$"
-"""Pattern of a display name: a line of text without leading or trailing space."""
+"""Pattern of a display name: one line of text without leading or trailing space."""
 QUANTITY = r"^\s*[+-]?(\d|\.\d)"
-"""Pattern of the start of a number with its unit."""
+"""Pattern of the beginning of a number with unit."""
 _TEXT_RULES = {
     NAME: "must consist of lower-case letters, digits, '-' and '_'",
     LABEL: "must be a line of text without spaces around it",
     QUANTITY: "does not start with a number; write for example '1.3 m/s'",
 }
-"""Ends of the messages on a text without a pattern, by pattern."""
+"""Message endings for a text that does not match a pattern, by pattern."""
 _LONGEST_VALUE = 60
 _MAXIMUM_PROBLEMS = 5
 _MAXIMUM_TABLES = 3
-"""Number of tables that have an unknown key, up to which they are named."""
+"""Largest number of tables named in a message as containing an unknown key."""
 _MISSING = {"missing": "", "union_tag_not_found": ".kind"}
-"""Problem types of missing keys, with the suffix to append to the path."""
+"""Suffix of the path of a missing key, by problem type."""
 
 
 def is_gap(detail: ErrorDetails) -> bool:
-    """Return True if a problem is only a missing key."""
+    """Return whether a problem is only a missing key."""
     return detail["type"] in _MISSING
 
 
 def is_unknown_kind(detail: ErrorDetails) -> bool:
-    """Return True if a problem is an unknown kind; tables with a single kind report it as a wrong literal."""
+    """Return whether a problem is an unknown kind; tables with a single kind report it as a wrong literal."""
     return detail["type"] == "union_tag_invalid" or (detail["type"] == "literal_error" and detail["loc"][-1] == "kind")
 
 
 def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
-    """Return all problems as one line: unknown keys, which make others missing, then values, then missing keys.
+    """Return all problems in one line: unknown keys first, then wrong values, then missing keys.
 
     For a value that matches none of several types only the first reason is given. The number of problems is limited.
     """
@@ -67,14 +67,14 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
 
 
 def quote(value: object) -> str:
-    """Return a short quotation of a value on one line."""
+    """Quote a value for a message, shortened to one line."""
     quoted = one_line(repr(value))
     return quoted if len(quoted) <= _LONGEST_VALUE else f"{quoted[:_LONGEST_VALUE]}..."
 
 
 @dataclass(frozen=True, slots=True)
 class _Key:
-    """Key of a document: dotted path, type of the table that has it, and type of its value (None if unknown)."""
+    """Key of a document: dotted path, type of its table, and type of its value (None if unknown)."""
 
     path: str
     table: Any
@@ -82,7 +82,7 @@ class _Key:
 
 
 def _key_at(location: Iterable[int | str], model: type[BaseModel]) -> _Key:
-    """Return the key at a pydantic location, which contains the kind of a union as if it were a key."""
+    """Return the key at a pydantic location, in which the kind of a union appears as a key."""
     names: list[str] = []
     table: Any = model
     value_type: Any = model
@@ -114,7 +114,7 @@ def _is_model(value_type: Any) -> TypeGuard[type[BaseModel]]:
 
 
 def _tables_in(value_type: Any) -> list[type[BaseModel]]:
-    """Return the tables of a union; empty for any other type."""
+    """Return the table models of a union; empty for any other type."""
     if get_origin(value_type) is Annotated:
         return _tables_in(get_args(value_type)[0])
     is_union = get_origin(value_type) in (Union, UnionType)
@@ -159,13 +159,13 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
 
 
 def _allowed_words(word: object, allowed: str) -> str:
-    """Return the end of a message on an unknown word: nearest and allowed ones, which pydantic separates by commas."""
+    """Return the message ending for an unknown word: nearest and allowed words; pydantic separates these by commas."""
     words = [item.strip(" '") for item in allowed.split(",")]
     return f"{nearest_name(str(word), words)}; allowed: {', '.join(words)}"
 
 
 def _tables_with(name: str, model: type[BaseModel]) -> list[str]:
-    """Return the tables of a document that have this key, the outer ones first; not those in lists."""
+    """Return the names of the tables that have a key, outer tables first, without tables in lists."""
     paths: list[str] = []
     seen = set()
     level: list[tuple[str, type[BaseModel]]] = [("", model)]

@@ -1,15 +1,15 @@
-"""Reading of regular files only: devices never end, and opening a named pipe would block."""
+"""Reading of regular files only, because devices never end and an opened named pipe blocks."""
 
 import codecs
 import stat
 from pathlib import Path
 
 MAXIMUM_BYTES_TYPED = 1_000_000
-"""Maximum size in bytes of a file written by hand, such as a scenario or a parameter set."""
+"""Largest size [bytes] of a file written by hand, such as a scenario or a parameter set."""
 
 
 def read_regular_file(path: Path, maximum: int | None = None) -> bytes:
-    """Return the content of a regular file of at most ``maximum`` bytes; an OSError has its reason as text."""
+    """Read a regular file of at most ``maximum`` bytes. Raises OSError with a reason as text."""
     status = path.stat()
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(None, "it is a directory, not a file")
@@ -31,7 +31,7 @@ _TWO_CHARACTERS = 4
 
 
 def decoded(content: bytes) -> str:
-    """Return the text of a file in UTF-8 or UTF-16, with or without byte-order mark.
+    """Decode UTF-8 or UTF-16 text, with or without byte-order mark.
 
     Raises UnicodeDecodeError for other encodings. Spreadsheets and loggers on Windows write UTF-16.
     """

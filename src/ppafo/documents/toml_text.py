@@ -1,4 +1,4 @@
-"""Reading of TOML files by name or path; each fault gives a one-line message."""
+"""Reading of TOML files by name or path, with one-line messages, and writing of TOML values."""
 
 import copy
 import json
@@ -19,26 +19,26 @@ from ppafo.wording import nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
 _MAXIMUM_NAMED = 3
-"""Maximum number of files of a folder listed in a message."""
+"""Largest number of files listed in a message."""
 _LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _DEEP_KEY = re.compile(
     rf"(?:^[ \t]*+\[{{0,2}}+|[{{,])[ \t]*+(?>{_PART}\.[ \t]*+){{{MAXIMUM_LEVELS}}}", re.ASCII | re.MULTILINE
 )
-"""Pattern of a key with too many dots; parsing time would grow at least with the square of their number."""
+"""Pattern of a key with too many dots, for which parsing time grows at least quadratically."""
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _TOO_DEEP = f"has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are enough"
 
 
 def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
-    """Return a bundled name unchanged, and a path relative to ``folder`` relative to the working directory."""
+    """Make a path relative to ``folder`` relative to the working directory; a bundled name is unchanged."""
     is_path = name not in known and (Path(name).suffix == ".toml" or "/" in name)
     return str(folder / name) if is_path else name
 
 
 @dataclass(frozen=True, slots=True)
 class TomlKind:
-    """Kind of file: noun for messages, name for ``--schema``, folder of the bundled files, and error raised.
+    """Kind of TOML file: noun for messages, name for ``--schema``, folder of bundled files, and error type.
 
     ``made`` is added in messages after "give a .toml file": the command that creates such a file, if there is one.
     """
@@ -55,7 +55,7 @@ class TomlKind:
         return tuple(sorted(name.stem for name in names if name.suffix == _SUFFIX))
 
     def read(self, name_or_path: str | Path) -> bytes:
-        """Return the content of a bundled file by its name, or of any other file by its path."""
+        """Read a bundled file by name, or any other file by path."""
         name, path = str(name_or_path), Path(name_or_path)
         if name in self.names():
             return (self.shipped / (name + _SUFFIX)).read_bytes()
@@ -74,11 +74,11 @@ class TomlKind:
             raise self.error(f"{label(name)}: cannot be read: {reason(error)}{self._remedy(name)}") from error
 
     def _remedy(self, file: str) -> str:
-        """Return advice for a file of another kind, such as a recording; empty for a .toml file."""
+        """Return the remedy for a file of another kind, such as a recording; empty for a .toml file."""
         return "" if Path(file).suffix in ("", _SUFFIX) else f"; give a .toml file{self.made}"
 
     def parse(self, content: bytes, file: str) -> dict[str, Any]:
-        """Return the document in the bytes of a file; ``file`` is the label used in messages."""
+        """Parse the bytes of a file; ``file`` is its label in messages."""
         try:
             text = decoded(content)
         except UnicodeDecodeError as error:
@@ -102,19 +102,19 @@ class TomlKind:
         return document
 
     def check_depth(self, document: Mapping[str, Any], file: str) -> None:
-        """Refuse a document with tables nested too deeply; ``file`` is its label in messages."""
+        """Raise an error for tables nested too deeply; ``file`` is the label in messages."""
         if is_nested_too_deeply(document):
             raise self.error(f"{file}: {_TOO_DEEP}")
 
 
 @lru_cache(maxsize=16)
 def _document(text: str) -> dict[str, Any]:
-    """Return the document of a text, not to be modified: it is cached, since a run reads the same set several times."""
+    """Parse TOML text, with a cache because a run reads the same set several times; callers copy the result."""
     return tomllib.loads(text, parse_float=_float)
 
 
 def _float(text: str) -> float:
-    """Return the number of a text; refuses a nonzero number so small that it would become 0, as in quantities."""
+    """Parse a number. Raises TOMLDecodeError for a nonzero number so small that it would become 0."""
     value = float(text)
     if value == 0.0 and text.lower().partition("e")[0].strip("+-0_."):
         raise tomllib.TOMLDecodeError(
@@ -124,7 +124,7 @@ def _float(text: str) -> float:
 
 
 def value_text(value: object) -> str:
-    """Return a text, a number, a flag or a list of texts as a TOML value."""
+    """Format a text, a number, a flag or a list of texts as a TOML value."""
     if isinstance(value, float):
         return repr(float(value))
     # What JSON escapes in a text is escaped in the same way in TOML, but for DEL.
@@ -132,13 +132,13 @@ def value_text(value: object) -> str:
 
 
 def assignments(values: Mapping[str, Any]) -> Iterator[str]:
-    """Yield one TOML line for each value."""
+    """Yield a TOML line for each value."""
     for key, value in values.items():
         yield f"{_key(key)} = {value_text(value)}"
 
 
 def table_lines(name: str, table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the TOML lines of a table and of the tables inside it, each after an empty line."""
+    """Yield the TOML lines of a table and its inner tables, each after an empty line."""
     inner = {key: value for key, value in table.items() if isinstance(value, Mapping)}
     yield from ("", f"[{name}]", *assignments({key: value for key, value in table.items() if key not in inner}))
     for key, value in inner.items():
@@ -150,6 +150,6 @@ def _key(key: str) -> str:
 
 
 def label(file: str) -> str:
-    """Return the label of a file for messages: its name on one line, shortened in the middle if very long."""
+    """Return the label of a file in messages: its name on one line, shortened in the middle if very long."""
     name = one_line(file)
     return name if len(name) <= _LONGEST_LABEL else f"{name[:_KEPT_AT_EACH_END]}...{name[-_KEPT_AT_EACH_END:]}"

@@ -1,4 +1,4 @@
-"""Agreement of the curves of one stride: delay, side and scale of each, estimated against the others.
+"""Plausibility checks between the curves of one stride: delay, side (left or right foot) and scale.
 
 Healthy walking relates the curves to each other. Just after toe-off the ankle has its peak plantarflexion, followed by
 the rearmost position of the shank; ankle moment and vertical force end the push-off at the same time. While the foot is
@@ -6,8 +6,8 @@ flat, the ankle rotates with the shank. The largest push-off moment is the force
 impaired gait may differ in each of these relations, so an unusual curve causes a remark, not an error. An ankle that
 fits better half a stride later, however, belongs to the other foot.
 
-Numbers in brackets are the ranges of 13 recorded strides: 11 of one walker overground and both legs of another on a
-treadmill.
+Numbers in brackets are the ranges of 13 recorded strides: 11 of one walker overground and both legs of another walker
+on a treadmill.
 """
 
 import numpy as np
@@ -25,21 +25,21 @@ LARGEST_DELAY = 0.03
 """Largest plausible delay [s] of a curve relative to its usual time (at most 0.016 in the recorded strides)."""
 
 _USUALLY = {"shank_angle": 0.052, "ankle_angle": 0.041, "ankle_moment": -0.002}
-"""Usual times from toe-off to the rearmost shank and to peak plantarflexion, and from force to moment [strides]."""
+"""Usual delays [strides]: rearmost shank and peak plantarflexion after toe-off, end of moment after end of force."""
 _ABOUT_TOE_OFF = (-0.16, 0.22)
-"""Interval around toe-off [strides] in which both extremes are searched."""
+"""Interval around toe-off [strides] in which peak plantarflexion and rearmost shank are searched."""
 _PUSH_OFF_FROM = 0.35
-"""Start of the push-off [strides]: the largest load afterwards is the push-off peak."""
+"""Phase [strides] from which the push-off peak of a load is searched."""
 _FORCE_ENDS = -0.06
-"""Usual time from toe-off to half the push-off peak of the force [strides] (-0.060); used without a measured force."""
+"""Usual time of half the push-off peak of the force after toe-off [strides]; used without a measured force."""
 
 # Far from 0 and nearer to the half stride at which the other foot lies.
 _OTHER_FOOT = 0.3
-"""Delay between ankle and shank [strides] that shows the other foot, which is half a stride away."""
+"""Least delay between ankle and shank [strides] that shows two different feet, which are half a stride apart."""
 _ALIKE, _UNLIKE = 0.65, 0.4
-"""Correlation with a usual ankle: least value at the best shift (0.76), and largest value without a shift."""
+"""Limits of the correlation with a usual ankle angle [-]: least at the best shift (0.76), largest without a shift."""
 _ALIKE_SHANK = 0.8
-"""Least correlation of the shank with a usual shank without a shift (0.97); with a reversed sign it is smaller."""
+"""Least correlation with a usual shank angle without a shift [-] (0.97); a reversed sign gives less."""
 
 USUAL_LEVER = (0.1, 0.21)
 """Plausible lever of the vertical force about the ankle at the largest push-off moment [m] (0.140 to 0.154)."""
@@ -50,9 +50,9 @@ USUAL_SHANK = (48.0, 105.0)
 USUAL_ANKLE = (18.0, 45.0)
 """Plausible range of the ankle angle in a stride [deg] (25 to 33)."""
 USUAL_FOLLOWING = (0.35, 1.4)
-"""Plausible rotation of the ankle relative to the rotation of the shank while the foot stands [-] (0.38 to 1.07)."""
+"""Plausible ratio of ankle rotation to shank rotation while the foot stands [-] (0.38 to 1.07)."""
 _RESTS = 0.2
-"""Relative rotation of the ankle [-] below which it is too small for a check of its scale."""
+"""Ratio of ankle rotation to shank rotation [-] below which the scale of the ankle cannot be checked."""
 
 _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
 
@@ -73,7 +73,7 @@ def check_side(walk: MeanStride, usual: Gait) -> None:
 
 
 def _lag(walk: MeanStride, usual: Gait, name: str) -> tuple[float, float, float]:
-    """Return the delay of a curve relative to the usual one [strides], and correlations with and without this delay."""
+    """Return the delay of a curve against a usual gait [strides], and the correlations with and without this delay."""
     # Stance on stance and swing on swing: a toe-off that comes early or late is no delay.
     at = np.interp(_FINE, (0.0, walk.stance_share, 1.0), (0.0, usual.stance_share, 1.0))
     lags, expected = (
@@ -94,7 +94,7 @@ def _smooth(values: Floats, name: str) -> Floats:
 def delay_remarks(walk: MeanStride) -> list[str]:
     """Return remarks on curves of a mean stride that are delayed relative to the force or, without force, to the shank.
 
-    Curves from the same file as the reference share its clock and get no remark.
+    Curves from the same file as the reference share its clock, so they get no remark.
     """
     share = walk.stance_share
     # Of the shank the largest lean backwards, which is its minimum.
@@ -116,10 +116,10 @@ def delay_remarks(walk: MeanStride) -> list[str]:
     remarks = []
     for names in groups:
         delay, which = float(np.mean([late[name] for name in names])), " and ".join(names)
-        way = "behind" if delay > 0.0 else "ahead of"
+        timing = "late" if delay > 0.0 else "early"
         remarks.append(
-            f"{which}: about {1000.0 * abs(delay):.0f} ms {way} {other}, by healthy walking; are they on one clock, "
-            f"with the same filters? Adding {-delay:+.3f} s to their times would bring them together"
+            f"{which}: about {1000.0 * abs(delay):.0f} ms {timing} relative to {other}, judged by healthy walking; "
+            f"check clocks and filters, or add {-delay:+.3f} s to the times of {which}"
         )
     return remarks
 
@@ -146,8 +146,8 @@ def size_remarks(walk: MeanStride) -> list[str]:
         turns = float(np.ptp(np.degrees(walk.curves[name])))
         if not usual[0] <= turns <= usual[1]:
             remarks.append(
-                f"{name} covers {turns:.0f} deg in a stride, usual are {usual[0]:g} to {usual[1]:g} deg: "
-                "check its scale"
+                f"{name} has a range of {turns:.0f} deg per stride (usual: {usual[0]:g} to {usual[1]:g} deg); "
+                "check the scale"
             )
     # The turn of the ankle for each turn of the shank while the foot stands; 1 for a foot that rests.
     shank, ankle = (walk.curves[name][MIDSTANCE] for name in ("shank_angle", "ankle_angle"))
@@ -155,12 +155,12 @@ def size_remarks(walk: MeanStride) -> list[str]:
     follows, (low, high) = float(np.sum(lean * ankle) / np.sum(lean**2)), USUAL_FOLLOWING
     if follows > high or _RESTS < follows < low:
         remarks.append(
-            f"ankle_angle turns {follows:.2g} times as far as shank_angle while the foot stands, usual are {low:g} to "
-            f"{high:g}: check the scale of both"
+            f"while the foot is flat, ankle_angle changes {follows:.2g} times as much as shank_angle (usual: {low:g} "
+            f"to {high:g}); check the scale of both"
         )
     if "ankle_moment" not in walk.curves:
         return remarks
-    moment, why = walk.curves["ankle_moment"], "check its scale: N m/kg is per body mass, not per stature or weight"
+    moment, why = walk.curves["ankle_moment"], "check the scale: N m/kg is per body mass, not per stature or weight"
     peak, force = float(np.max(moment)), walk.curves.get("vertical_force")
     # The lever of the vertical force about the ankle, unless the scale of the force is in doubt itself.
     arm = None
@@ -168,14 +168,13 @@ def size_remarks(walk: MeanStride) -> list[str]:
         arm = peak / (STANDARD_GRAVITY * float(force[np.argmax(moment)]))
     if arm is not None and not USUAL_LEVER[0] <= arm <= USUAL_LEVER[1]:
         remarks.append(
-            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg,"
-            f" which is the vertical force at {100.0 * arm:.0f} cm from the "
-            f"ankle, usual are {100.0 * USUAL_LEVER[0]:.0f} to {100.0 * USUAL_LEVER[1]:.0f} cm: {why}"
+            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg, which gives the vertical force a lever arm "
+            f"of {100.0 * arm:.0f} cm about the ankle (usual: {100.0 * USUAL_LEVER[0]:.0f} to "
+            f"{100.0 * USUAL_LEVER[1]:.0f} cm); {why}"
         )
     elif arm is None and peak > 0.0 and not USUAL_MOMENT[0] <= peak <= USUAL_MOMENT[1]:
         remarks.append(
-            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg,"
-            f" usual are {USUAL_MOMENT[0]:g} to {USUAL_MOMENT[1]:g} N m/kg: "
-            f"{why}"
+            f"ankle_moment reaches {without_exponent(peak, '.3g')} N m/kg (usual: {USUAL_MOMENT[0]:g} to "
+            f"{USUAL_MOMENT[1]:g} N m/kg); {why}"
         )
     return remarks

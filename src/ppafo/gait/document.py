@@ -37,12 +37,12 @@ _LIMITS = {
     "stride.stance_share": ("", 0.2, 0.95),
     "stride.stance_share_deviation": ("", 0.0, 0.5),
 }
-"""Unit, lowest and highest value of every quantity; wide limits that exclude only typing errors."""
+"""Unit, lowest and highest value of the numbers in a gait file; wide limits that exclude only typing errors."""
 
 
 @functools.cache
 def gait_file() -> type[BaseModel]:
-    """Return the model of a gait file."""
+    """Return the Pydantic model of a gait file."""
     text = Annotated[str, Field(pattern=QUANTITY)]
     number = Annotated[float, Field(allow_inf_nan=False)]
     series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]
@@ -160,14 +160,14 @@ def json_schema() -> dict[str, Any]:
 
 
 NORMATIVE = "falisse2019-subject1"
-"""Default gait."""
+"""Name of the default gait."""
 
 _FILE = TomlKind(
     "gait",
     "gait",
     resources.files("ppafo") / "gait" / "normative",
     DataError,
-    made=", which 'ppafo gait import' makes of a recording",
+    made=", which 'ppafo gait import' makes from a recording",
 )
 
 
@@ -204,7 +204,7 @@ def parse_gait(content: bytes, file: str) -> Gait:
 
 
 WRITTEN_UNITS: dict[str, str] = {"rad": "deg"}
-"""Units of angles in a gait file; every other curve is written in its SI unit."""
+"""Units of curves in a gait file by SI unit: degrees for angles; every other curve is in its SI unit."""
 
 _DIGITS = 12
 """Significant digits of a written coefficient; conversion from radians to degrees adds noise beyond these."""

@@ -38,23 +38,23 @@ _PLAIN = (
     "stance_share_deviation",
     "strides",
 )
-"""Fields of a gait that are plain data already."""
+"""Fields of a ``Gait`` that are written to JSON unchanged."""
 _STRIDE_KEYS = ("start", "toe_off", "end", "stance_share")
 
 _NOISE = 1e-9
-"""Deviation or misfit [SI] below which it is rounding error."""
+"""Deviation or misfit [SI] below which it counts as rounding error."""
 _CAPTION = "The curves over the stride: mean, standard deviation between strides as a band, toe-off dashed."
 
 
 @dataclass(frozen=True, slots=True)
 class GaitFound:
-    """A gait and, if it was imported, the result of the import."""
+    """Gait of a report, with the result of the import if the gait was imported."""
 
     gait: Gait
     imported: ImportedGait | None = None
 
     def json_document(self) -> dict[str, Any]:
-        """Return numbers and curves, and the strides of an import, as plain data in SI units."""
+        """Return numbers, curves and, after an import, strides as plain data in SI units."""
         gait, imported = self.gait, self.imported
         document: dict[str, Any] = {
             **{name: getattr(gait, name) for name in _PLAIN},
@@ -197,7 +197,7 @@ def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool)
         marks.append(Mark("line", percent, series, label="series", colour=BLACK, style=dashed))
 
     def name_events(axes: "Axes") -> None:
-        """Label the events where the shank's curve leaves space: low at heel strike, high at toe-off."""
+        """Label heel strike and toe-off at heights that the curve of the shank leaves free."""
         axes.set_xlim(0.0, 100.0)
         for at, height, text in ((0.0, 0.05, "heel strike"), (toe_off, 0.85, "toe-off")) if is_first else ():
             place, offset = ("data", "axes fraction"), "offset points"

@@ -44,7 +44,7 @@ CURVES: dict[str, str] = {
 REQUIRED = ("shank_angle", "ankle_angle")
 
 KNEE = ("knee_forward", "knee_up")
-"""Curves that are accelerations, which scale with the square of the cadence."""
+"""Curves of the knee acceleration, which scale with the square of the cadence."""
 
 
 def clinical_angle(angle: Floats) -> Floats:
@@ -82,7 +82,7 @@ class GaitCurve:
         return len(self.cosines)
 
     def value(self, phase: float) -> float:
-        """Return the value at a phase [strides]."""
+        """Return the value of the curve at a phase [strides]."""
         return float(self.values_at(phase))
 
     def derivative(self, stride_time: float) -> "GaitCurve":
@@ -99,7 +99,7 @@ class GaitCurve:
         )
 
     def values_at(self, phases: "ArrayLike") -> Floats:
-        """Return the values at an array of phases [strides]."""
+        """Return the values of the curve at an array of phases [strides]."""
         first_sine, first_cosine = sine_and_cosine(np.asarray(phases, dtype=np.float64))
         sine, cosine = first_sine, first_cosine
         # The mean in the shape of the phases, a number or an array.
@@ -158,7 +158,7 @@ class Gait:
 
     @property
     def curves(self) -> dict[str, GaitCurve]:
-        """Available curves by name, in the order of ``CURVES``."""
+        """Curves that the gait contains, by name, in the order of ``CURVES``."""
         return {name: curve for name in CURVES if (curve := getattr(self, name)) is not None}
 
     def curve(self, name: str) -> GaitCurve:
@@ -210,7 +210,8 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[G
     """
     if values.size < 2 * harmonics + 2:
         raise DataError(
-            f"{harmonics} harmonics need more than {values.size} samples; give fewer harmonics or more samples"
+            f"{harmonics} harmonics need at least {2 * harmonics + 2} samples, not {values.size}; give fewer harmonics "
+            "or more samples"
         )
     # Both ends are the same phase: a series through both weighs it twice, as the recording has it.
     turns = 2.0 * np.pi * np.linspace(0.0, 1.0, values.size)
@@ -247,7 +248,7 @@ def speed_range(gait: Gait) -> tuple[float, float]:
 def at_speed(gait: Gait, speed: float) -> Gait:
     """Return the gait at a walking speed [m/s]; the stride time is proportional to speed to the power -1/2.
 
-    This is a constant walk ratio, step length divided by cadence (Sekiya and Nagasaki 1998, Gait Posture 7:225).
+    The walk ratio, step length divided by cadence, stays constant (Sekiya and Nagasaki 1998, Gait Posture 7:225).
     Amplitudes, moments per mass, force in body weights and stance fraction stay as recorded, so only a small change of
     speed is allowed. The motion of the knee relative to its mean speed is kept too, so its acceleration is proportional
     to 1/T^2. Raises DataError for a speed out of range.
@@ -286,11 +287,11 @@ def _recorded_speed(gait: Gait) -> float:
 _RATE = 200.0
 """Default sampling rate of the recording of a gait [Hz]."""
 _MAXIMUM_STRIDES = 100_000
-"""Largest number of strides of such a recording."""
+"""Largest number of strides in the recording of a gait."""
 
 
 def walk_recording(gait: Gait, strides: int) -> Recording:
-    """Return a recording of several equal strides, marked as synthetic; SI units, package signs.
+    """Return a recording of equal strides of a gait, marked as synthetic; SI units, signs of the package.
 
     Raises DataError for an implausible number of strides.
     """

@@ -12,7 +12,7 @@ SignSource = Literal["map", "columns", "gait_file"]
 
 @dataclass(frozen=True, slots=True)
 class MeanStride:
-    """Stride to be checked: mean curves (101 samples, SI) by name, stance fraction [-] and stride time [s]."""
+    """Mean stride: files and curves (101 samples, SI) by curve name, stance fraction [-] and stride time [s]."""
 
     file: Mapping[str, str]
     curves: Mapping[str, Floats]
@@ -23,11 +23,11 @@ class MeanStride:
     """True if both coordinates of the knee are from one marker, so that their scales cannot differ."""
 
 
-def other_sign(signs_from: SignSource, key: str, turned: str = "the other sign") -> str:
+def other_sign(signs_from: SignSource, key: str, turned: str = "the opposite sign") -> str:
     """Return the remedy for a curve with a wrong sign: the key in a gait map, or a correction of the file."""
     return {
         "map": f"change {key} in the gait map",
-        "columns": f"correct it in the file, or change {key} in a gait map",
+        "columns": f"correct the sign in the file, or change {key} in a gait map",
         "gait_file": f"write mean, cosine and sine with {turned}",
     }[signs_from]
 

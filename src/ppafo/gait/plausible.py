@@ -22,7 +22,7 @@ STRIDE_TIME = (0.5, 3.0)
 
 
 def check_gait(gait: Gait, file: str) -> None:
-    """Raise DataError for a gait file with an implausible stride; the checks are the ones of ``check_plausible``."""
+    """Raise DataError for a gait file with an implausible stride, by the checks of ``check_plausible``."""
     percent = np.linspace(0.0, 1.0, 101)
     curves = {name: curve.values_at(percent) for name, curve in gait.curves.items()}
     check_plausible(MeanStride(dict.fromkeys(curves, file), curves, gait.stance_share, gait.stride_time, "gait_file"))
@@ -48,8 +48,8 @@ def check_stride_time(walk: MeanStride) -> None:
     low, high = STRIDE_TIME
     if not low <= walk.stride_time <= high:
         raise DataError(
-            f"{walk.file['shank_angle']}: the stride time is {walk.stride_time:.3g} s, plausible is {low:g} to "
-            f"{high:g} s; is the time in seconds?"
+            f"{walk.file['shank_angle']}: the stride time is {walk.stride_time:.3g} s (plausible: {low:g} to "
+            f"{high:g} s); check the unit of time"
         )
 
 
@@ -59,16 +59,16 @@ def check_stance(walk: MeanStride) -> None:
     if low <= walk.stance_share <= high:
         return
     if walk.signs_from == "gait_file":
-        hint = "give stride.stance_share from heel strike to toe-off"
+        hint = "set stride.stance_share to the fraction from heel strike to toe-off"
     elif "vertical_force" in walk.curves:
-        hint = "is the force of this foot, its sign and unit right?"
+        hint = "check foot, sign and unit of vertical_force"
     else:
         remedy = other_sign(walk.signs_from, "shank_angle.positive")
-        hint = f"it comes from shank_angle: where its sign is reversed, {remedy}"
+        hint = f"if the sign of shank_angle, which determines the stance, is reversed: {remedy}"
     file = walk.file.get("vertical_force", walk.file["shank_angle"])
     raise DataError(
-        f"{file}: the foot is on the ground for {100.0 * walk.stance_share:.0f} % of the stride, "
-        f"plausible is {100.0 * low:.0f} to {100.0 * high:.0f} %; {hint}"
+        f"{file}: the foot is on the ground for {100.0 * walk.stance_share:.0f} % of the stride "
+        f"(plausible: {100.0 * low:.0f} to {100.0 * high:.0f} %); {hint}"
     )
 
 
@@ -79,13 +79,13 @@ USUAL_FORCE_MEAN = (0.42, 0.58)
 """Plausible mean of the vertical force [body weights]: both legs together carry 1, each half in symmetric walking."""
 
 _ON_GROUND = 0.05
-"""Force [body weights], in either direction, below which a plate reads without a foot on it."""
+"""Magnitude of the force [body weights] below which a force plate counts as unloaded."""
 _AFTER_TOE_OFF = 0.03
-"""Least time after toe-off [strides], because toe-off found from the shank is not more accurate."""
+"""Time after toe-off [strides] from which moments are checked; toe-off found from the shank has about this error."""
 _LEFT_IN_SWING = 0.25
-"""Largest moment in swing relative to the peak [-]; the swinging foot needs a few hundredths."""
+"""Largest moment in swing relative to the peak moment [-]; a swinging foot needs a few hundredths."""
 _FOOT_ALONE = 0.05
-"""Moment that a swinging foot may need in any case [N m/kg], however weak the push-off."""
+"""Moment that is accepted in swing however weak the push-off [N m/kg]."""
 
 
 def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
@@ -98,12 +98,12 @@ def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
     low, high = FORCE_PEAK
     if -lowest > CLEARLY_BETTER * highest:
         raise DataError(
-            f"{file}: vertical_force is {lowest:.3g} body weights at its largest and points downwards, so its "
-            f"sign is reversed; {other_sign(signs_from, 'vertical_force.positive')}"
+            f"{file}: vertical_force peaks at {lowest:.3g} body weights, below 0, so its sign is reversed; "
+            f"{other_sign(signs_from, 'vertical_force.positive')}"
         )
     if not low <= highest <= high:
         raise DataError(
-            f"{file}: vertical_force reaches {highest:.3g} body weights, plausible is {low:g} to {high:g}; check "
+            f"{file}: vertical_force reaches {highest:.3g} body weights (plausible: {low:g} to {high:g}); check "
             "the body mass and the unit (N, '-')"
         )
 
@@ -116,15 +116,14 @@ def check_moment(walk: MeanStride) -> None:
     where = f"{walk.file['ankle_moment']}: ankle_moment"
     if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > CLEARLY_BETTER * float(np.max(moment)):
         raise DataError(
-            f"{where} is {np.min(moment):.3g} N m/kg at its peak, towards dorsiflexion, so its sign is reversed; "
+            f"{where} peaks at {np.min(moment):.3g} N m/kg, in dorsiflexion, so its sign is reversed; "
             f"{other_sign(walk.signs_from, 'ankle_moment.positive')}"
         )
     peak, (low, high) = float(np.max(moment)), MOMENT_PEAK
     if not low <= peak <= high:
         raise DataError(
-            f"{where} reaches {without_exponent(peak, '.3g')} N m/kg,"
-            f" plausible is {low:g} to {high:g} N m/kg; check the body mass and "
-            "the unit (N m, N m/kg, N mm/kg)"
+            f"{where} reaches {without_exponent(peak, '.3g')} N m/kg (plausible: {low:g} to {high:g} N m/kg); check "
+            "the body mass and the unit (N m, N m/kg, N mm/kg)"
         )
 
 
@@ -138,13 +137,13 @@ def moment_remarks(moment: Floats) -> list[str]:
     if up <= _UNCLEAR_MOMENT * down:
         return []
     return [
-        f"the ankle moment hardly shows its sign: {down:.2g} N m/kg into plantarflexion and {up:.2g} N m/kg into "
-        "dorsiflexion at most; check that push-off is above 0"
+        f"the sign of ankle_moment is uncertain: it peaks at {down:.2g} N m/kg in plantarflexion and {up:.2g} N m/kg "
+        "in dorsiflexion; check that the moment is above 0 in push-off"
     ]
 
 
 def check_moment_time(walk: MeanStride) -> None:
-    """Raise DataError for an ankle moment that acts while the foot is off the ground; a stride without one passes."""
+    """Raise DataError for an ankle moment that acts while the foot is off the ground; skipped without a moment."""
     if "ankle_moment" not in walk.curves:
         return
     moment = walk.curves["ankle_moment"]
@@ -161,9 +160,10 @@ def check_moment_time(walk: MeanStride) -> None:
 
 
 _OTHER_TIME: dict[SignSource, str] = {
-    "map": "it is of the other foot or on another clock: choose the other side, or the column of this foot",
-    "columns": "it is of the other foot or on another clock: choose the other side, or the column of this foot",
-    "gait_file": "write the moment of this foot, counted from its heel strike",
+    "map": "the moment is of the other foot or has another clock: choose the other side, or the column of this foot",
+    "columns": "the moment is of the other foot or has another clock: choose the other side, or the column of this "
+    "foot",
+    "gait_file": "give the moment of the same foot, starting at its heel strike",
 }
 
 
@@ -176,9 +176,8 @@ def check_force(walk: MeanStride) -> None:
     peak, mean = float(np.max(force)), float(np.mean(force))
     if not FORCE_PEAK[0] <= peak <= FORCE_PEAK[1] or not FORCE_MEAN[0] <= mean <= FORCE_MEAN[1]:
         raise DataError(
-            f"{where} is {mean:.3g} body weights on average and {peak:.3g} at its peak, plausible is "
-            f"{FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g} and {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}; check the body "
-            "mass and the unit (N, '-')"
+            f"{where} has a mean of {mean:.3g} body weights (plausible: {FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g}) and a "
+            f"peak of {peak:.3g} ({FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}); check the body mass and the unit (N, '-')"
         )
 
 
@@ -189,7 +188,7 @@ def force_remarks(force: Floats) -> list[str]:
     if low <= mean <= high:
         return []
     return [
-        f"the vertical force is {mean:.3g} body weights on average, and one leg of a steady walk carries about 0.5 "
-        f"(usually {low:g} to {high:g}): check the body mass, {2.0 * mean:.2g} times as much would make it 0.5, and "
-        "the scale of the force"
+        f"vertical_force has a mean of {mean:.3g} body weights, but each leg of a steady walk carries about 0.5 "
+        f"(usual: {low:g} to {high:g}); check the scale of the force and the body mass ({2.0 * mean:.2g} times the "
+        "mass would give 0.5)"
     ]

@@ -11,7 +11,7 @@ SHANK_RANGE = (25.0, 120.0)
 ANKLE_RANGE = (5.0, 80.0)
 ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
-"""Samples [percent of the stride] in which the foot stands, so that the ankle rotates with the shank."""
+"""Mid-stance samples [percent of the stride], in which the foot stands and the ankle rotates with the shank."""
 _TURNS = 2.0
 """Least rotation of a standing foot [deg, RMS] that shows a wrong sign; recorded feet rotate by 0.5 to 1.5 deg."""
 _TURNED_BACK = 0.1
@@ -39,14 +39,14 @@ def check_shank(walk: MeanStride) -> None:
     growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
     if growth > _TURNED_BACK * travel:
         raise DataError(
-            f"{where} grows by {growth:.2g} deg in stance, so the shank would rotate backwards over the foot; "
+            f"{where} increases by {growth:.2g} deg in mid-stance, so the shank would rotate backwards over the foot; "
             f"{other_sign(walk.signs_from, 'shank_angle.positive')}{_other_foot(walk)}"
         )
     if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
         raise DataError(
-            f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average; plausible is "
-            "above -10 deg and -50 to 10 deg (0 is vertical, positive with the ankle in front of the knee); "
-            f"check its zero and its columns{_other_foot(walk)}"
+            f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average (plausible: "
+            "above -10 deg and -50 to 10 deg; 0 is vertical, positive with the ankle in front of the knee); "
+            f"check zero and columns{_other_foot(walk)}"
         )
 
 
@@ -57,12 +57,10 @@ def check_angle_range(where: str, travel: float, limits: tuple[float, float], is
         return
     hint = "check unit and columns"
     if low <= np.degrees(travel) <= high:
-        hint = "the numbers look like radians: give 'rad' as their unit"
+        hint = "the numbers look like radians: give the unit 'rad'"
     elif low <= np.radians(travel) <= high:
-        hint = "the numbers look like degrees: give 'deg' as their unit"
-    raise DataError(
-        f"{where} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; {hint}"
-    )
+        hint = "the numbers look like degrees: give the unit 'deg'"
+    raise DataError(f"{where} has a range of {travel:.3g} deg (plausible in a stride: {low:g} to {high:g} deg); {hint}")
 
 
 def check_ankle_range(walk: MeanStride) -> None:
@@ -78,16 +76,15 @@ def check_ankle(walk: MeanStride) -> None:
     turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS:
         raise DataError(
-            f"{where} turns into plantarflexion while the shank rotates forward: the standing foot would turn "
-            f"by {turned:.2g} deg (RMS), with the opposite sign by {reversed_turned:.2g} deg; its sign is reversed; "
-            f"{other_sign(walk.signs_from, 'ankle_angle.positive', 'the other sign about 90 deg')}"
+            f"{where} moves into plantarflexion while the shank rotates forward: the flat foot would rotate by "
+            f"{turned:.2g} deg (RMS), with the opposite sign by {reversed_turned:.2g} deg, so the sign is reversed; "
+            f"{other_sign(walk.signs_from, 'ankle_angle.positive', 'the opposite sign about 90 deg')}"
         )
     foot = standing_tilt(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
         raise DataError(
-            f"{where} would tilt the foot by {foot:.0f} deg in stance, plausible is up to {REFUSED_TILT:g} deg "
-            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90 deg); "
-            f"{_NEUTRAL[walk.signs_from]}"
+            f"{where} implies a foot tilted by {foot:.0f} deg in mid-stance (plausible: up to {REFUSED_TILT:g} deg) "
+            f"and ranges from {theta.min():.0f} to {theta.max():.0f} deg (neutral: 90 deg); {_NEUTRAL[walk.signs_from]}"
         )
 
 
@@ -119,8 +116,8 @@ def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
     if CLEARLY_BETTER * turned <= reversed_turned:
         return []
     return [
-        f"mid-stance does not show the sign of ankle_angle: the standing foot turns by {turned:.2g} deg (RMS), and by "
-        f"{reversed_turned:.2g} deg with the other sign; check that the angle grows into plantarflexion"
+        f"the sign of ankle_angle is uncertain: in mid-stance the flat foot rotates by {turned:.2g} deg (RMS), and by "
+        f"{reversed_turned:.2g} deg with the opposite sign; check that the angle increases in plantarflexion"
     ]
 
 
@@ -130,9 +127,8 @@ def zero_remarks(tilt: float, correction: str) -> list[str]:
         return []
     way = "toes down" if tilt > 0.0 else "toes up"
     return [
-        f"the zero of ankle_angle seems to be off by {abs(tilt):.1f} deg: the standing foot would be tilted {way} "
-        f"by as much (mean from 15 to 40 % of the stride; up to {REMARKED_TILT:g} is usual); "
-        f"on level ground {correction}"
+        f"the zero of ankle_angle seems to be off: the flat foot appears tilted by {abs(tilt):.1f} deg, {way} (mean "
+        f"from 15 to 40 % of the stride, usual: up to {REMARKED_TILT:g} deg); on level ground, {correction}"
     ]
 
 
@@ -141,19 +137,18 @@ def gait_file_remarks(gait: Gait) -> list[str]:
     percent = np.linspace(0.0, 1.0, 101)
     tilt = standing_tilt(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
     mean = float(np.degrees(gait.ankle_angle.mean)) - tilt
-    return zero_remarks(tilt, f"the mean of [ankle_angle] in gait '{gait.name}' would be {mean:.1f} deg")
+    return zero_remarks(tilt, f"set the mean of [ankle_angle] in gait '{gait.name}' to {mean:.1f} deg")
 
 
 _NEUTRAL: dict[SignSource, str] = {
-    "map": "give ankle_angle.neutral in the gait map: the reading of the file when the foot is "
-    "perpendicular to the shank",
-    "columns": "write it as 90 deg when the foot is perpendicular to the shank, or give a gait map with "
-    "ankle_angle.neutral",
-    "gait_file": "write its mean so that it is 90 deg when the foot is perpendicular to the shank",
+    "map": "set ankle_angle.neutral in the gait map to the value in the file with the foot perpendicular to the shank",
+    "columns": "correct the file so that the angle is 90 deg with the foot perpendicular to the shank, or give a gait "
+    "map with ankle_angle.neutral",
+    "gait_file": "correct the mean so that the angle is 90 deg with the foot perpendicular to the shank",
 }
 
 
 def _other_foot(walk: MeanStride) -> str:
     if walk.signs_from == "gait_file" or "vertical_force" not in walk.curves:
         return ""
-    return ", or the force is of the other foot: choose the other side, or the column of this foot"
+    return "; if the force is of the other foot, choose the other side, or the force column of this foot"

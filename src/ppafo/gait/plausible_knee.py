@@ -18,7 +18,7 @@ SHANK_LENGTHS = (0.25, 0.6)
 """Range of shank lengths [m] for the best fit, as a gait does not contain the length."""
 
 _FITS = 0.6
-"""Largest relative misfit of the rotation [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
+"""Largest misfit to a rotation about the ankle [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
 _LEFT_BY_MISTAKE, _LEFT_BY_ONE = 0.7, 0.62
 """Fractions of the misfit that remain after correction of a mistake: below the first for a remark, below the second
 for an error. Correct knees in units of g leave 0.48 to 0.57, and a correct knee in its own unit has shown 0.68."""
@@ -47,19 +47,23 @@ def _too_small(factor: float, words: str) -> tuple[_Mistake, ...]:
     """Return the mistakes of values too small by a factor; for knee_up alone, the mistake cannot be recognised."""
     return (
         _Mistake(f"are {words}", f"multiply both by {factor:g}", (factor, 0.0), (0.0, factor)),
-        _Mistake(f"differ, knee_forward is {words}", f"multiply it by {factor:g}", (factor, 0.0), (0.0, 1.0)),
+        _Mistake(
+            f"differ (knee_forward is {words})", f"multiply knee_forward by {factor:g}", (factor, 0.0), (0.0, 1.0)
+        ),
     )
 
 
 def _too_large(factor: float) -> tuple[_Mistake, ...]:
     """Return the mistakes of values too large by a factor, first for one curve alone.
 
-    The order matters because a knee_up divided by the factor fits almost as well as none.
+    The order matters because knee_up divided by the factor fits almost as well as the given curves.
     """
     words, fraction = f"{factor:g} times too large", 1.0 / factor
     return (
-        _Mistake(f"differ, knee_forward is {words}", f"divide it by {factor:g}", (fraction, 0.0), (0.0, 1.0)),
-        _Mistake(f"differ, knee_up is {words}", f"divide it by {factor:g}", (1.0, 0.0), (0.0, fraction)),
+        _Mistake(
+            f"differ (knee_forward is {words})", f"divide knee_forward by {factor:g}", (fraction, 0.0), (0.0, 1.0)
+        ),
+        _Mistake(f"differ (knee_up is {words})", f"divide knee_up by {factor:g}", (1.0, 0.0), (0.0, fraction)),
         _Mistake(f"are {words}", f"divide both by {factor:g}", (fraction, 0.0), (0.0, fraction)),
     )
 
@@ -67,7 +71,7 @@ def _too_large(factor: float) -> tuple[_Mistake, ...]:
 _MISTAKES = (
     _Mistake("are exchanged", "exchange them", (0.0, 1.0), (1.0, 0.0)),
     _Mistake(
-        "are exchanged, and knee_up has the other sign", "exchange them and reverse knee_up", (0.0, -1.0), (1.0, 0.0)
+        "are exchanged, and knee_up has the opposite sign", "exchange them and reverse knee_up", (0.0, -1.0), (1.0, 0.0)
     ),
     *_too_small(_G, "in units of g"),
     *_too_small(1000.0, "1000 times too small"),
@@ -80,14 +84,14 @@ _MISTAKES = (
 _WHERE: dict[SignSource, str] = {
     "map": "in the gait map or the file",
     "columns": "in the file",
-    "gait_file": "in every number of their tables",
+    "gait_file": "in the gait file",
 }
 
 
 def turning_remarks(walk: MeanStride) -> list[str]:
     """Return a remark if a mistake would partly explain the misfit of the knee to a rotation about the ankle."""
     found = _mistaken_turning(walk)
-    return [] if found is None else [f"{found[0]}, which may be the walk itself"]
+    return [] if found is None else [f"{found[0]}; the walk itself may be the cause"]
 
 
 def _mistaken_turning(walk: MeanStride) -> tuple[str, str, float] | None:
@@ -106,8 +110,8 @@ def _mistaken_turning(walk: MeanStride) -> tuple[str, str, float] | None:
         left = _misfit(np.array([mistake.forward, mistake.up]) @ turned, expected)
         if left < _FITS and left < _LEFT_BY_MISTAKE * missed:
             statement = (
-                f"knee_forward and knee_up {mistake.words}: while the foot is flat the knee turns about the resting "
-                f"ankle, which they miss by {100.0 * missed:.0f} %, and by {100.0 * left:.0f} % with that corrected"
+                f"knee_forward and knee_up {mistake.words}: they differ by {100.0 * missed:.0f} % ({100.0 * left:.0f} "
+                "% if corrected) from a rotation of the knee about the resting ankle while the foot is flat"
             )
             return statement, mistake.remedy, left / missed
     return None
@@ -130,7 +134,7 @@ def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
 
 
 def _misfit(measured: Floats, expected: Floats) -> float:
-    """Return the misfit for the best shank length relative to the expected acceleration [-]; infinite at rest."""
+    """Return the relative misfit to the expected acceleration at the best shank length [-]; infinite at rest."""
     square = float(np.sum(expected**2))
     if square == 0.0:
         return float("inf")
@@ -144,13 +148,13 @@ KNEE_TRAVEL = (0.5, 80.0)
 KNEE_MEAN = 1.5
 """Largest mean of the knee acceleration over a stride [m/s^2]; it is 0 for a periodic motion."""
 _HELD_BACK = 0.2
-"""Fraction of its range by which a knee must decelerate in the phase of usual acceleration to reject its sign.
+"""Fraction of its range by which a knee must decelerate in the phase of usual acceleration to reject its sign [-].
 
 A measured knee accelerates by 0.8 to 0.9 of its range.
 """
 
 _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.4, 0.7))}
-"""Intervals from toe-off, as fractions of the swing, of acceleration forward or up, and of deceleration or fall."""
+"""Intervals about toe-off [fractions of the swing] of acceleration (forward, up) and of deceleration."""
 
 
 def check_knee(walk: MeanStride) -> None:
@@ -158,7 +162,7 @@ def check_knee(walk: MeanStride) -> None:
     there = [name for name in KNEE if name in walk.curves]
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
-        raise DataError(f"{walk.file[there[0]]}: {there[0]} needs {missing}; give both, or neither")
+        raise DataError(f"{walk.file[there[0]]}: {there[0]} needs {missing}; give both or neither")
     found = _mistaken_turning(walk)
     if found is not None and found[2] < _LEFT_BY_ONE:
         statement, remedy, _ = found
@@ -168,14 +172,14 @@ def check_knee(walk: MeanStride) -> None:
 
 
 def check_knee_means(walk: MeanStride) -> None:
-    """Raise DataError for knee accelerations that do not average to 0 over a stride; a stride without any passes."""
+    """Raise DataError for knee accelerations whose mean over a stride is not 0; skipped without accelerations."""
     # Without the last sample, which is the first phase again.
     means = {name: float(np.mean(walk.curves[name][:-1])) for name in KNEE if name in walk.curves}
     raise_noted(
         [
             DataError(
-                f"{walk.file[name]}: {name} is {mean:.3g} m/s^2 on average, and a periodic stride has 0 (up to "
-                f"{KNEE_MEAN:g} is accepted); an accelerometer measures gravity too: subtract it"
+                f"{walk.file[name]}: {name} has a mean of {mean:.3g} m/s^2, but must average to 0 over a stride "
+                f"(allowed: up to {KNEE_MEAN:g} m/s^2); subtract gravity from accelerometer data"
             )
             for name, mean in means.items()
             if abs(mean) > KNEE_MEAN
@@ -188,7 +192,7 @@ def _check_knee_curve(walk: MeanStride, name: str) -> None:
     travel, (low, high) = float(np.ptp(values)), KNEE_TRAVEL
     if not low <= travel <= high:
         raise DataError(
-            f"{where} covers a range of {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
+            f"{where} has a range of {travel:.3g} m/s^2 per stride (plausible: {low:g} to {high:g} m/s^2); "
             "check the unit (m/s^2, or m for a position)"
         )
     # Gait phase of the swing, below 0 before toe-off.
@@ -196,7 +200,7 @@ def _check_knee_curve(walk: MeanStride, name: str) -> None:
     driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
     if held - driven > _HELD_BACK * travel:
         raise DataError(
-            f"{where} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in mid-swing; in walking both "
-            "signs are opposite: its sign is reversed, or it is of the other knee; "
+            f"{where} is {driven:.3g} m/s^2 around toe-off and {held:.3g} m/s^2 in mid-swing, opposite to walking: "
+            "the sign is reversed, or the data are of the other knee; "
             f"{other_sign(walk.signs_from, f'the sign of knee.{name[5:]}')}"
         )

@@ -1,4 +1,4 @@
-"""The device as Gymnasium environments: ``ppafo/TorqueTask-v0``, ``ppafo/StepAngle-v0`` and ``ppafo/Walk-v0``.
+"""Gymnasium environments of the device: ``ppafo/TorqueTask-v0``, ``ppafo/StepAngle-v0`` and ``ppafo/Walk-v0``.
 
     import gymnasium
     import ppafo.gym

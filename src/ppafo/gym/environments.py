@@ -1,4 +1,4 @@
-"""Gymnasium environments of the device: a single one, and a vector of many."""
+"""Gymnasium environments of the device: single environment, and vector of environments."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,11 +17,11 @@ from ppafo.gym.world import World, settings_of
 
 Observations = np.ndarray[Any, np.dtype[np.float32]]
 PICTURE = "rgb_array"
-"""Gymnasium's name of the render mode."""
+"""Render mode of Gymnasium for pictures."""
 
 
 class PneumaticEnv(gymnasium.Env[Observations, Any]):
-    """Device commanded by an agent, with one step per sample period of its scenario or walk.
+    """Single environment: device commanded by an agent, with a step per sample period of its scenario or walk.
 
     ``task`` is 'torque', 'angle' or 'walk'. ``scenario`` is the name or file of a scenario or walk, changed by
     ``overrides``; by default the task's own, with delayed, noisy and quantised sensors. ``actions`` are 'continuous', a
@@ -50,11 +50,11 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._frames: list[EpisodeFrame] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the content of a pickle: the constant ``world`` and the state of the environment."""
+        """Return the state for pickle: task and settings, and the episode."""
         return {**vars(self), "_lanes": self._lanes.state()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Continue from a state: of a copy, or of a pickle."""
+        """Restore the state of a copy or a pickle."""
         self.__dict__.update(state)
         if isinstance(self._lanes, Mapping):
             lane_state, self._lanes = self._lanes, self.world.lanes(1)
@@ -66,7 +66,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         seed: int | None = None,
         options: dict[str, Any] | None = None,  # noqa: ARG002 - Gymnasium's own signature
     ) -> tuple[Observations, dict[str, Any]]:
-        """Start an episode; return its initial observation and empty info. There are no ``options``."""
+        """Start an episode. Returns its first observation and an empty info; there are no ``options``."""
         super().reset(seed=seed)
         start, drawn = self.world.begin(self._lanes, np.zeros(1, dtype=np.intp), [self.np_random])
         self._drawn = drawn[:, 0]
@@ -102,7 +102,6 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         return picture(self._frames, self.world.task.unit, self._period, self.world.episodes.base.device)
 
     def _remember(self, error: float) -> None:
-        """Store the current frame for the picture."""
         self._frames.append(EpisodeFrame(len(self._frames) * self._period, self.numbers()["state.angle"], error))
 
     def episode(self) -> Any:
@@ -120,7 +119,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
 
 
 class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
-    """Vector of devices stepped together by one program; each behaves as a single environment with its seed.
+    """Vector environment: devices stepped together by one program, each equal to a single environment with its seed.
 
     Takes the arguments of ``PneumaticEnv``; ``autoreset_mode`` is one of Gymnasium's, or its name.
     """
@@ -146,11 +145,11 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         self._last: Observations = np.zeros(self.observation_space.shape, dtype=np.float32)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the content of a pickle: the constant ``world`` and the state of the environments."""
+        """Return the state for pickle: task and settings, and the episodes."""
         return {**vars(self), "_lanes": self._lanes.state()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Continue from a state, in environments of its own."""
+        """Restore the state of a pickle, in new environments."""
         self.__dict__.update(state)
         if isinstance(self._lanes, Mapping):
             lane_state, self._lanes = self._lanes, self.world.lanes(self.num_envs)
@@ -159,7 +158,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Start episodes of all environments, or only of those marked in ``options["reset_mask"]`` (environments,).
+        """Start episodes of all environments, or of those marked in ``options["reset_mask"]`` (environments,).
 
         A number as ``seed`` is the seed of the first environment; the others get the following numbers.
         """
@@ -221,7 +220,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         return result.observations.copy(), result.rewards, result.terminated, result.truncated, infos
 
     def numbers(self, place: int) -> dict[str, float]:
-        """Return the true state of one environment in SI units, by path such as ``state.angle`` [rad]."""
+        """Return the true state of an environment in SI units, by path such as ``state.angle`` [rad]."""
         return self._lanes.numbers(place)
 
     def _begin(self, places: Places) -> BatchStep:
@@ -230,7 +229,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
 
 
 def _masked(values: Mapping[str, Floats], is_present: Flags) -> dict[str, Any]:
-    """Return numbers (environments,) with the mask of environments that have them, in the form of Gymnasium infos."""
+    """Return values (environments,) with the mask of environments that have them, as Gymnasium infos."""
     if not is_present.any():
         return {}
     columns = {name: np.where(is_present, column, 0.0) for name, column in values.items()}

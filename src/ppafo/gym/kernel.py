@@ -1,4 +1,4 @@
-"""Kernel that advances all environments of a program, in three compiled calls per block.
+"""Kernel that advances all environments of a program, in three compiled calls per block of environments.
 
 Commands go in; physics, sensors, observations and rewards come out. The steps are made by the same lane loop as in
 every other run; the functions before and after it work on the same arrays, which persist between calls.
@@ -23,22 +23,22 @@ from ppafo.gym.tasks import Goal, Memory, Outcome, Requested, Task, finite, rewa
 
 
 class Action(NamedTuple):
-    """Numbers of an action [-]; a task whose actions have one number ignores the second."""
+    """Numbers of an action [-]; tasks with a single number ignore ``other``."""
 
     first: float
     other: float
 
 
 class _ObservationFlag(NamedTuple):
-    """Flag of an environment: 1 if its sensors, reward and end are evaluated in this call, else 0."""
+    """Flag of an environment: 1 for evaluation of sensors, reward and end in this call, else 0."""
 
     is_observed: float
 
 
 OWN = {"goal": Goal, "memory": Memory}
-"""Rows of an environment in addition to the rows of its run."""
+"""Rows of an environment besides the rows of its run."""
 OWN_PATHS = [path for name, row in OWN.items() for path in leaf_paths(row, name)]
-"""Paths of the numbers in these additional rows, in order."""
+"""Paths of the numbers in ``OWN``, in order."""
 
 
 def command(parts: Program, lanes: Any, task: Task) -> None:
@@ -63,7 +63,7 @@ def judge(
     steps_per_sample: int,
     signal_delay: int,
 ) -> None:
-    """Sense, observe and reward the flagged environments, each at the step of its own episode."""
+    """Evaluate sensors, observation and reward of the flagged environments, each at the step of its episode."""
     slots = lanes.signal_history.shape[1]
     for lane in lanes:
         if lane.asked.is_observed == 0.0:
@@ -101,7 +101,7 @@ def observe(
     gas_weight: float,
     steps_in_all: int,
 ) -> None:
-    """Sense, observe and reward one environment, and set whether its episode ends."""
+    """Evaluate sensors, observation and reward of an environment, and set whether its episode ends."""
     sense(parts, lane, now)
     time = now.step * lane.timing.step
     torque_wanted, rate, _ = parts.reference.value(lane.reference, time)
@@ -125,7 +125,7 @@ def observe(
 
 
 def tables_judged(program: Program, task: Task) -> dict[str, Mapping[str, Any]]:
-    """Groups of numbers in each array that ``judge`` takes, by array name."""
+    """Rows in each array argument of ``judge``, by array name."""
     return {
         "states": program.state_rows(),
         "parameters": program.parameter_rows(),
@@ -137,7 +137,7 @@ def tables_judged(program: Program, task: Task) -> dict[str, Mapping[str, Any]]:
 
 
 class PythonKernel:
-    """Pure-Python kernel with the three functions of a compiled one: ``command``, ``advance`` and ``judge``."""
+    """Pure-Python kernel with the interface of a compiled kernel: ``command``, ``advance`` and ``judge``."""
 
     def __init__(self, program: Program, task: Task) -> None:
         self._program, self._task = program, task
@@ -149,7 +149,7 @@ class PythonKernel:
         run_lanes(self._program, command, tables, (signals,), (self._task,))
 
     def judge(self, *arrays_and_numbers: Any) -> None:
-        """Sense, observe and reward the flagged environments."""
+        """Evaluate sensors, observation and reward of the flagged environments."""
         groups = tables_judged(self._program, self._task).values()
         tables, rest = list(zip(groups, arrays_and_numbers, strict=False)), arrays_and_numbers[len(groups) :]
         run_lanes(self._program, judge, tables, rest[:1], (self._task, *rest[1:]))
@@ -157,7 +157,7 @@ class PythonKernel:
 
 @lru_cache(maxsize=16)
 def kernel_source(program: Program, task: Task) -> str:
-    """Return the source of the module with ``command``, ``advance`` and ``judge``, each for a block of environments."""
+    """Return the source of a kernel module: ``command``, ``advance`` and ``judge`` for a block of environments."""
     collector = SourceCollector(INLINE)
     further = {**OWN, "action": Action, "asked": _ObservationFlag, "view": task.view, "outcome": Outcome}
     step = StepText(program, collector, further=further)

@@ -1,4 +1,4 @@
-"""Environments of one program side by side, each with an episode that started at its own step."""
+"""Environments of one program, advanced in lanes, each with an episode that starts at its own step."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -24,14 +24,14 @@ Places = NDArray[np.intp]
 
 _OUTCOMES = len(Outcome._fields)
 _FIRST_FLAG = Outcome._fields.index("failed")
-"""Index of the first outcome that is a truth value, as are all later ones."""
+"""Index of the first outcome that is a flag; all later outcomes are flags."""
 
 
 class FromOutside:
-    """Placeholder for the controller of a scenario whose commands come from an agent."""
+    """Placeholder controller of a scenario whose commands come from an agent."""
 
     def reset(self) -> None:
-        """Do nothing."""
+        """Do nothing, since there is no controller state."""
 
     def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
         """Raise an error, because an agent acts through its environment."""
@@ -41,7 +41,7 @@ class FromOutside:
 
 
 def episode_program(batch: Batch) -> tuple[Program, Clock]:
-    """Return program and clock of a run with external commands; ScenarioError for samples within a step."""
+    """Return program and clock of a run with external commands. Raises ScenarioError for samples within a step."""
     if batch.program.samples_inside:
         raise ScenarioError("run.output_interval: must be a whole number of run.step in an environment")
     return replace(batch.program, controller=None, starts_apart=True), batch.clock
@@ -49,20 +49,20 @@ def episode_program(batch: Batch) -> tuple[Program, Clock]:
 
 @dataclass(frozen=True, slots=True)
 class EpisodeStarts:
-    """Starts of episodes (rows, episodes): parameters and states of the program, and goals."""
+    """Initial values of episodes (rows, episodes): parameters and states of the program, and goals."""
 
     parameters: Floats
     states: Floats
     goals: Floats
 
     def repeated(self, count: int) -> "EpisodeStarts":
-        """Return the starts of ``count`` equal episodes, given the start of a single one."""
+        """Return the initial values of ``count`` equal episodes, from a single episode."""
         return EpisodeStarts(*(np.repeat(rows, count, axis=1) for rows in (self.parameters, self.states, self.goals)))
 
 
 @dataclass(frozen=True, slots=True)
 class RewardWeights:
-    """Weights of squared error and gas in the reward, and bounds (2, observed) of the observations."""
+    """Reward weights of squared error and gas, and bounds (2, observed) of the observations."""
 
     error_weight: float
     gas_weight: float
@@ -81,7 +81,7 @@ class BatchStep:
     truncated: Flags
 
     def then(self, later: "BatchStep") -> "BatchStep":
-        """Return the combined result of two successive steps; an episode that ended with the first is unchanged."""
+        """Combine the results of two successive steps; an episode that ended in the first step is unchanged."""
         ended = self.terminated | self.truncated
         return BatchStep(
             observations=np.where(ended[:, None], self.observations, later.observations),
@@ -95,7 +95,7 @@ class BatchStep:
 
 @final
 class Environments:
-    """Environments of one program side by side, each with an episode of its own."""
+    """Environments of one program, advanced in lanes, each with its own episode."""
 
     def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: RewardWeights) -> None:
         self.count = count
@@ -140,12 +140,12 @@ class Environments:
         return other
 
     def state(self) -> dict[str, Floats | int]:
-        """Return everything that changes from step to step: copies of the arrays, and the number of the step."""
+        """Return the variable state: copies of the arrays, and the step number."""
         arrays = ((name, value) for name, value in vars(self).items() if isinstance(value, np.ndarray))
         return {**{name: value.copy() for name, value in arrays}, "_now": self._now}
 
     def resume(self, state: Mapping[str, Floats | int]) -> None:
-        """Continue from a state, copied into the existing arrays, whose addresses the compiled program uses."""
+        """Restore a state into the existing arrays, whose addresses the compiled program uses."""
         for name, value in state.items():
             if isinstance(value, np.ndarray):
                 getattr(self, name)[...] = value
@@ -153,7 +153,7 @@ class Environments:
                 self._now = value
 
     def begin(self, places: Places, columns: EpisodeStarts) -> BatchStep:
-        """Start episodes in the environments at ``places``; the results of the others are invalid."""
+        """Start episodes in the environments at ``places``; the results of other environments are invalid."""
         lanes = self._states.shape[2]
         # Lanes without an environment repeat the last one, so that each has a run that goes on.
         spare = np.arange(self.count, self._states.shape[0] * lanes)
@@ -173,12 +173,12 @@ class Environments:
         return self._call(0)
 
     def step(self) -> BatchStep:
-        """Apply ``actions`` for a sample period, and return the result."""
+        """Apply ``actions`` for a sample period."""
         self._chosen[:] = 1.0
         return self._call(self._clock.steps_per_sample)
 
     def numbers(self, place: int) -> dict[str, float]:
-        """Return the state of one environment in the engine, in SI units, by path such as ``state.angle``."""
+        """Return the engine state of an environment in SI units, by path such as ``state.angle``."""
         block, lane = divmod(place, self._states.shape[2])
         return {path: float(self._states[block, row, lane]) for path, row in self.rows.items()}
 
@@ -212,5 +212,5 @@ class Environments:
         return BatchStep(shown.astype(np.float32), rewards, errors, supplied, failed, through)
 
     def _by_environment(self, blocks: Floats) -> Floats:
-        """Return copies of arrays (blocks, numbers, lanes) as (environments, numbers)."""
+        """Copy arrays (blocks, numbers, lanes) to shape (environments, numbers)."""
         return blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[: self.count].copy()

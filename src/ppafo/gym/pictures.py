@@ -18,13 +18,13 @@ _SIZE = (6.4, 3.6)
 _RESOLUTION = 100
 """Dots per inch: 640 by 360 pixels, even numbers as video formats require."""
 _SHAFT = 0.15
-"""Ratio of the radii of shaft and housing [-]."""
+"""Radius of the shaft relative to the radius of the housing [-]."""
 _NEUTRAL = 90.0
 """Neutral ankle angle [deg]."""
 
 
 class EpisodeFrame(NamedTuple):
-    """Frame of a picture: time [s], angle of the joint [rad], and error in the unit of the task."""
+    """Frame of an episode: time [s], joint angle [rad], and error in the unit of the task."""
 
     time: float
     angle: float
@@ -32,7 +32,7 @@ class EpisodeFrame(NamedTuple):
 
 
 def picture(moments: Sequence[EpisodeFrame], unit: str, period: float, device: Device) -> NDArray[np.uint8]:
-    """Return a picture (height, width, 3) of the frames of an episode, in order; at least one.
+    """Draw the frames of an episode, at least one, as a picture (height, width, 3).
 
     ``unit`` is the unit of the errors, "rad" or "N m"; ``period`` [s] is the shortest time axis.
     Only the vane is drawn on both sides of its shaft; other actuators turn a lever.
@@ -69,7 +69,7 @@ def picture(moments: Sequence[EpisodeFrame], unit: str, period: float, device: D
 
 
 def _finish(axes: "Axes", end: float, label: str, level: float) -> None:
-    """Label the axes of a curve over time up to ``end`` [s], and draw a horizontal line at ``level``."""
+    """Label the axes of a curve over time up to ``end`` [s], with a horizontal line at ``level``."""
     axes.axhline(level, color=GREY, linewidth=0.8, linestyle="--")
     axes.set_ylabel(label)
     axes.set_xlim(0.0, end)

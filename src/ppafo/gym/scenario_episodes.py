@@ -1,4 +1,4 @@
-"""Episodes of a scenario: as in its file, or with uncertain numbers drawn at random."""
+"""Episodes of a scenario, equal to its file or with uncertain numbers drawn at random."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,10 +27,10 @@ from ppafo.studies.varying import in_its_unit, varied_path
 from ppafo.units import parse_quantity
 
 Ranges = Mapping[str, tuple[str | float, str | float]]
-"""Lowest and highest value by dotted path, as texts with units."""
+"""Lowest and highest value of drawn numbers by dotted path, as texts with units."""
 
 MOST_DRAWS = 100
-"""Largest number of draws of one episode until a draw is valid; if none is, the ranges are too wide."""
+"""Largest number of draws for a valid episode; more mean that the ranges are too wide."""
 _NO_PROFILE = TorqueProfile(peak_torque=0.0, peak_time=0.5, rise_time=1.0, fall_time=1.0)
 """Torque profile for episodes without strides."""
 _SEED = "sensors.seed"
@@ -38,7 +38,7 @@ _SEED = "sensors.seed"
 
 @dataclass(frozen=True, slots=True)
 class ScenarioEpisodes:
-    """Episodes of a scenario, with uniform draws from ``ranges`` (SI, by path) and of a target from ``targets`` [rad].
+    """Episodes of a scenario, with uniform draws of numbers from ``ranges`` [SI] and a target from ``targets`` [rad].
 
     Without ``ranges`` every episode is the scenario itself, including its noise, with the middle of ``targets`` as
     target. Paths in ``gauge`` hold gauge pressures relative to the atmosphere of each episode.
@@ -53,7 +53,7 @@ class ScenarioEpisodes:
     gauge: frozenset[str] = frozenset()
 
     def draw(self, generators: Sequence[np.random.Generator]) -> tuple[EpisodeStarts, Floats]:
-        """Return an episode for each generator, and the drawn numbers (numbers, episodes) in SI.
+        """Draw an episode for each generator; also return the drawn numbers (numbers, episodes) [SI].
 
         A draw is repeated if it breaks a rule of scenarios or needs another program, for example for a chamber too fast
         for the step. Raises ScenarioError if no draw is valid.
@@ -82,12 +82,12 @@ class ScenarioEpisodes:
         )
 
     def shown(self, drawn: Floats) -> Scenario:
-        """Return the scenario with the drawn numbers (numbers,) of one episode in SI."""
+        """Return the scenario of an episode with its drawn numbers (numbers,) [SI]."""
         numbers = dict(zip(self.ranges, drawn.tolist(), strict=True))
         return with_numbers(self.base, absolute(self.base, numbers, self.gauge))
 
     def _plan(self, columns: EpisodeStarts, values: Floats, places: Places) -> tuple[Places, str]:
-        """Fill the columns of some episodes; return the indices of the invalid ones, and a reason."""
+        """Fill the columns of the episodes at ``places``; return the indices of invalid episodes, and a reason."""
         drawn = dict(zip(self.ranges, values[:, places], strict=True))
         plan = plan_ensemble(check_columns(self.base, drawn, self.gauge))
         is_valid = np.zeros(places.size, dtype=np.bool_)
@@ -102,7 +102,7 @@ class ScenarioEpisodes:
 
 
 def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tuple[str, str]) -> ScenarioEpisodes:
-    """Return the episodes of a scenario; draws are from the intervals of its parameter set, ``vary`` and the seed.
+    """Return the episodes of a scenario, drawn from intervals of its parameter set, from ``vary``, and with a seed.
 
     Raises ScenarioError for an unknown path or an invalid range.
     """
@@ -140,7 +140,7 @@ def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tu
 
 
 def intervals_of(base: Scenario) -> tuple[dict[str, tuple[float, float]], set[str]]:
-    """Return the interval ends of uncertain numbers in the parameter set, around the scenario's values, in SI by path.
+    """Return intervals of uncertain numbers around the scenario's values, by path [SI].
 
     The second value are the paths of numbers given as gauge pressures.
     """

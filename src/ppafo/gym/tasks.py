@@ -1,4 +1,4 @@
-"""Tasks of an agent: observation, error, and meaning of an action.
+"""Tasks of an agent: observation, error, and conversion of actions to commands.
 
 All are pure functions of floats, which the kernel compiles together with the physics.
 """
@@ -14,24 +14,24 @@ from ppafo.model.valves.kind import VENT
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 
 BAR = 1.0e5
-"""Pascals per bar; observed pressures are in bar."""
+"""Pascals per bar, the unit of observed pressures."""
 GRAM = 1.0e-3
-"""Kilograms per gram; the gas in the reward is in g."""
+"""Kilograms per gram, the unit of gas in the reward."""
 LOADED, UNLOADED = 60.0, 30.0
-"""Heel forces [N] above which the heel counts as loaded, and below which as unloaded, as in walking controllers."""
+"""Heel forces [N]: a heel counts as loaded above the first, and as unloaded below the second."""
 LONGEST_SINCE = 10.0
-"""Upper bound of the observed time since a heel strike [s]."""
+"""Upper bound of the observed time since heel strike [s]."""
 
 
 class Goal(NamedTuple):
-    """Goal of an episode: a target angle [rad], or the torque profile of a stride; each task uses its own field."""
+    """Goal of an episode: target angle [rad], or torque profile of a stride; a task uses one field."""
 
     angle: float
     profile: TorqueProfile
 
 
 class Memory(NamedTuple):
-    """Values kept between samples: supplied gas [kg], and in a walk last heel strike [s] and 1 for a loaded heel."""
+    """Memory between samples: supplied gas [kg]; in a walk time of heel strike [s], and 1 for a loaded heel."""
 
     supplied_mass: float
     strike: float
@@ -39,7 +39,7 @@ class Memory(NamedTuple):
 
 
 class Requested(NamedTuple):
-    """Reference of a scenario at a sample [N m], and its rate [N m/s]."""
+    """Requested torque of a scenario at a sample [N m], and its rate [N m/s]."""
 
     torque: float
     rate: float
@@ -55,7 +55,7 @@ class Sensed(NamedTuple):
 
 
 class _TorqueView(NamedTuple):
-    """Observation: sensors, requested torque [N m], its rate [N m/s], last command [-]."""
+    """Observation of the torque task: sensors, requested torque [N m], its rate [N m/s], last command [-]."""
 
     sensed: Sensed
     requested: float
@@ -64,7 +64,7 @@ class _TorqueView(NamedTuple):
 
 
 class _AngleView(NamedTuple):
-    """Observation: sensors, requested angle [rad], last command [-]."""
+    """Observation of the angle task: sensors, requested angle [rad], last command [-]."""
 
     sensed: Sensed
     requested: float
@@ -72,9 +72,9 @@ class _AngleView(NamedTuple):
 
 
 class _WalkView(NamedTuple):
-    """Observation: sensors, forces of heel and toe [N], time since the heel was loaded [s], last command [-].
+    """Observation of the walking task: sensors, heel and toe force [N], time since heel strike [s], last command [-].
 
-    The time is since the last heel strike in the heel sensor; a command is -1 to 1, or 2 for venting.
+    Heel strikes are detected by the heel sensor. The command is -1 to 1, or 2 for venting.
     """
 
     sensed: Sensed
@@ -85,7 +85,7 @@ class _WalkView(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Result of a step: reward [-], error, gas from the supply [kg], and 1 for a failed or finished episode, else 0.
+    """Outcome of a step: reward [-], error, supplied gas [kg], and flags (1 or 0) for a failed or finished episode.
 
     The gas is since the start of the episode.
     """
@@ -98,7 +98,7 @@ class Outcome(NamedTuple):
 
 
 def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
-    """Sensor readings of a measurement, common to all tasks."""
+    """Return the sensor readings common to all tasks."""
     return Sensed(
         angle=seen.angle, pressure_1=seen.pressure_1 / BAR, pressure_2=seen.pressure_2 / BAR, torque=seen.torque
     )
@@ -107,21 +107,21 @@ def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
 def view_torque(
     seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
 ) -> _TorqueView:
-    """Observation in the torque task."""
+    """Return the observation of the torque task."""
     return _TorqueView(sensed=sensed_of(seen), requested=wanted.torque, requested_rate=wanted.rate, command=command)
 
 
 def view_angle(
     seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
 ) -> _AngleView:
-    """Observation in the angle task."""
+    """Return the observation of the angle task."""
     return _AngleView(sensed=sensed_of(seen), requested=goal.angle, command=command)
 
 
 def view_walk(
     seen: GaitMeasurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
 ) -> _WalkView:
-    """Observation at a time [s] of a walk."""
+    """Return the observation of the walking task at a time [s]."""
     return _WalkView(
         sensed=sensed_of(seen),
         heel_force=seen.heel_force,
@@ -132,12 +132,12 @@ def view_walk(
 
 
 def remember(memory: Memory, supplied_mass: float, seen: Measurement, time: float) -> Memory:
-    """Return the kept values after a sample, with the gas [kg] supplied so far."""
+    """Update the memory with the gas supplied so far [kg]."""
     return Memory(supplied_mass, memory.strike, memory.loaded)
 
 
 def remember_strike(memory: Memory, supplied_mass: float, seen: GaitMeasurement, time: float) -> Memory:
-    """Return the kept values of a walk after a sample; a heel strike is detected from the heel force [N]."""
+    """Update the memory of a walk; a heel strike is detected from the heel force [N]."""
     # Two thresholds, so that noise about one of them is not counted as a row of strikes.
     strikes = (memory.loaded < 0.5) & (seen.heel_force > LOADED)
     stays = 0.0 if seen.heel_force < UNLOADED else memory.loaded
@@ -145,17 +145,17 @@ def remember_strike(memory: Memory, supplied_mass: float, seen: GaitMeasurement,
 
 
 def torque_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
-    """Torque error [N m]: requested minus true torque."""
+    """Torque error of the torque task [N m]: requested minus true torque."""
     return wanted.torque - torque
 
 
 def angle_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
-    """Angle error [rad]: requested minus true angle."""
+    """Angle error of the angle task [rad]: requested minus true angle."""
     return goal.angle - angle
 
 
 def stride_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
-    """Torque error [N m]: torque of the profile at the true stride phase [strides], minus true torque."""
+    """Torque error of the walking task [N m]: profile torque at the true stride phase, minus true torque."""
     return profile_torque(goal.profile, phase) - torque
 
 
@@ -165,29 +165,29 @@ def reward_of(error: float, gas: float, error_weight: float, gas_weight: float, 
 
 
 def finite(value: float) -> float:
-    """The value, or 0 if it is not finite, as in a failed run."""
+    """Return a value, or 0 if it is not finite, as in a failed run."""
     return value if value - value == 0.0 else 0.0  # inf - inf and nan - nan are nan
 
 
 def within(value: float, lowest: float, highest: float) -> float:
-    """The value, clipped to two bounds, as by a converter; the lower bound for nan."""
+    """Clip a value to two bounds, as a converter does; nan becomes the lower bound."""
     above = value if value >= lowest else lowest
     return above if above <= highest else highest
 
 
 def valve_command(action: float, other: float) -> float:
-    """Command from -1 to 1 of an action; ``other`` is ignored."""
+    """Convert an action to a valve command from -1 to 1; ``other`` is ignored."""
     return within(action, -1.0, 1.0)
 
 
 def valve_or_vent(action: float, other: float) -> float:
-    """Command from -1 to 1, or ``VENT`` if ``other`` is positive."""
+    """Convert an action to a valve command from -1 to 1, or ``VENT`` if ``other`` is positive."""
     return VENT if other > 0.0 else within(action, -1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Task of an agent.
+    """Task of an agent in the catalogue: observation, error, memory, reward weights and actions.
 
     ``view`` is the class of the observation. ``observed(seen, goal, memory, wanted, command, time)`` returns an
     observation, ``error(goal, wanted, angle, phase, torque)`` the error in ``unit``, ``kept(memory, supplied_mass,
@@ -207,7 +207,7 @@ class Task:
     actions: int = 1
 
     def observed_rows(self, has_one_chamber: bool) -> dict[str, int]:
-        """Row of each observed number in ``view``, by name such as ``angle``; with one chamber none of a second."""
+        """Rows of the observed numbers in ``view`` by name, such as ``angle``, without those of an absent chamber 2."""
         names = [path.rpartition(".")[2] for path in leaf_paths(self.view, "view")]
         absent = OF_SECOND_CHAMBER if has_one_chamber else frozenset()
         return {name: row for row, name in enumerate(names) if name not in absent}
@@ -221,4 +221,4 @@ TASKS = {
         Task("walk", _WalkView, view_walk, stride_error, remember_strike, "N m", 1.0, 1.0, valve_or_vent, 2),
     )
 }
-"""Tasks by name."""
+"""Catalogue of tasks by name."""

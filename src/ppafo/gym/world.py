@@ -1,4 +1,4 @@
-"""Common basis of single and vector environments: settings, spaces and episodes."""
+"""Common part of single and vector environments: settings, spaces and episodes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -33,7 +33,7 @@ from ppafo.wording import nearest_name
 
 @dataclass(frozen=True, slots=True)
 class _WalkEpisodes:
-    """Episodes of a walk with external commands; ``randomise`` draws a wearer and a gait for each episode."""
+    """Episodes of a walk with external commands; ``randomise`` draws wearer and gait of each episode."""
 
     base: Scenario
     commanded: Scenario
@@ -43,7 +43,7 @@ class _WalkEpisodes:
     plain: EpisodeStarts
 
     def draw(self, generators: Sequence[np.random.Generator]) -> tuple[EpisodeStarts, Floats]:
-        """Return an episode for each generator, and an empty array, because a wearer is not a list of numbers."""
+        """Draw an episode for each generator; the second value is empty, because a wearer is not a list of numbers."""
         columns = self.plain.repeated(len(generators))
         for number, generator in enumerate(generators if self.randomise else ()):
             # Person 0 of a population is always the one of the configuration; the second one is drawn.
@@ -54,12 +54,12 @@ class _WalkEpisodes:
         return columns, np.zeros((0, len(generators)))
 
     def shown(self, drawn: Floats) -> Scenario:  # noqa: ARG002 - a wearer is no list of numbers
-        """Return the walk before any draw."""
+        """Return the walk of the configuration, before any draw."""
         return self.base
 
 
 def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> _WalkEpisodes:
-    """Return the episodes of a walk of a given length [s]; the profile of its controller is the requested torque.
+    """Return the episodes of a walk of a given length [s]; the controller's profile is the requested torque.
 
     Raises ScenarioError for a walk with a task sequence or a bottle, or with a controller without a profile.
     """
@@ -89,7 +89,7 @@ FLAWED_SENSORS = (
     "sensors.angle_resolution=0.1 deg",
     "sensors.pressure_resolution=0.05 psi_d",
 )
-"""Delay, noise and resolution of the sensors of the scenario torque-task-slow-valve."""
+"""Default sensor errors of a scenario: delay, noise and resolution, as in torque-task-slow-valve."""
 FLAWED_WALK_SENSORS = (
     *FLAWED_SENSORS[1:],
     "sensors.force_noise=5 N",
@@ -100,7 +100,7 @@ FLAWED_WALK_SENSORS = (
         for setting in ("kind=distorted", "time=0 s", "delay=3 ms")
     ),
 )
-"""Flawed sensors of a walk; their delay is a fault from the start that only delays."""
+"""Default sensor errors of a walk; the delay is a fault that starts at time 0."""
 DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "torque": ("torque-task-proportional", FLAWED_SENSORS),
     "angle": (
@@ -109,25 +109,25 @@ DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     ),
     "walk": ("proportional", FLAWED_WALK_SENSORS),
 }
-"""Default scenario or walk of each task, and its overrides."""
+"""Default scenario or walk of each task, with overrides."""
 VARIED: Mapping[str, Ranges] = {"torque": {"reference.level": ("1 N m", "4.5 N m")}}
-"""Values drawn in these tasks in addition to the intervals of the parameter set."""
+"""Default ranges drawn by task, in addition to the intervals of the parameter set."""
 TARGETS = ("40 deg", "110 deg")
 WALKING_TIME = 6.0
-"""Length of an episode on a leg that walks [s]."""
+"""Length of a walking episode [s]."""
 CONTINUOUS, ON_OFF = "continuous", "on_off"
 PHYSICAL, SCALED = "physical", "scaled"
 COMMANDS = 3
-"""Number of commands for a pair of on/off valves: -1, 0 and 1."""
+"""Number of commands of a pair of on/off valves: -1, 0 and 1."""
 LARGEST_RATE, LARGEST_FORCE = 1.0e3, 5.0e3
-"""Bounds of the observed rate of the requested torque [N m/s] and of the observed forces [N]."""
+"""Bounds of the observed rate of requested torque [N m/s], and of observed forces [N]."""
 HEADROOM = 2.0
-"""Largest observed pressure divided by the highest of supply and atmosphere: a moving joint compresses its gas."""
+"""Ratio of the largest observed pressure to the highest of supply and atmosphere [-]; motion compresses gas."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _EnvironmentSettings:
-    """Settings of an environment besides its task, explained in ``PneumaticEnv``."""
+    """Settings of an environment besides its task, documented in ``PneumaticEnv``."""
 
     scenario: str | Path | None = None
     overrides: Sequence[str] = ()
@@ -158,7 +158,7 @@ class _EnvironmentSettings:
 
 
 def settings_of(arguments: Mapping[str, Any]) -> _EnvironmentSettings:
-    """Return settings by name; ScenarioError for an unknown name."""
+    """Return settings from keyword arguments. Raises ScenarioError for an unknown name."""
     names = [field.name for field in fields(_EnvironmentSettings)]
     for name in arguments:
         if name not in names:
@@ -170,7 +170,7 @@ def settings_of(arguments: Mapping[str, Any]) -> _EnvironmentSettings:
 def episodes_of(
     task: str, file: str | Path, overrides: Sequence[str], varied: Ranges, settings: _EnvironmentSettings
 ) -> ScenarioEpisodes | _WalkEpisodes:
-    """Return the episodes of a task in a scenario or walk; ScenarioError for a scenario that does not suit the task."""
+    """Return the episodes of a task in a scenario or walk. Raises ScenarioError if they do not fit together."""
     duration = settings.duration
     if task == "walk":
         if varied:
@@ -191,7 +191,7 @@ def episodes_of(
 
 
 class World:
-    """Common basis of single and vector environments: episodes, spaces, and creation of environments."""
+    """Common part of single and vector environments: episodes, spaces, and creation of environments."""
 
     def __init__(self, task: str, settings: _EnvironmentSettings) -> None:
         self.settings = settings
@@ -220,19 +220,19 @@ class World:
             self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.task.actions,), np.float32)
 
     def __reduce__(self) -> "tuple[type[World], tuple[str, _EnvironmentSettings]]":
-        """Pickle task and settings only; programs and their compiled code are rebuilt."""
+        """Reduce to task and settings for pickle; programs are compiled again."""
         return World, (self.task.name, self.settings)
 
     def __copy__(self) -> "World":
-        """Return this object itself, which is immutable."""
+        """Return the object itself, which is immutable."""
         return self
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "World":
-        """Return this object itself; an environment copies its spaces with their generators separately."""
+        """Return the object itself; an environment copies its spaces with their generators separately."""
         return self
 
     def lanes(self, count: int) -> Environments:
-        """Return ``count`` environments that run side by side."""
+        """Create ``count`` environments of the program."""
         return Environments(self.episodes.program, self.episodes.clock, self.task, count, self.judging)
 
     def begin(
@@ -243,9 +243,9 @@ class World:
         return self._scaled(lanes.begin(places, columns)), drawn
 
     def act(self, lanes: Environments, actions: Any) -> BatchStep:
-        """Apply actions for ``frame_skip`` samples, or up to the end of an episode, and return the result.
+        """Apply actions for ``frame_skip`` samples, or up to the end of an episode; rewards are summed.
 
-        Rewards are added up. Raises SimulationError for an action that is not finite.
+        Raises SimulationError for an action that is not finite.
         """
         numbers_of_actions = lanes.actions
         if self.is_continuous:
@@ -263,14 +263,14 @@ class World:
         return self._scaled(result)
 
     def _scaled(self, result: BatchStep) -> BatchStep:
-        """Return a result with its observations scaled to -1 to 1, if requested."""
+        """Scale the observations of a result to -1 to 1, if requested."""
         if self.is_scaled:
             result.observations[:] = np.clip((result.observations - self._middle) / self._half, -1.0, 1.0)
         return result
 
 
 def observed_bounds(task: Task, names: Sequence[str], device: Device) -> Floats:
-    """Lowest and highest value (2, observed) of each observed number, in the units of the task's view."""
+    """Return lowest and highest value of each observation (2, observed), in the units of the task's view."""
     pressure = HEADROOM * max(
         device.supply.pressure, device.supply.dorsiflexion_pressure, device.supply.atmospheric_pressure
     )

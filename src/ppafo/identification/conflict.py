@@ -1,4 +1,4 @@
-"""Consistency of parts of the recordings: Hausman's test of sensors, recordings, groups and stated limits."""
+"""Consistency tests of the recordings (Hausman): sensors, recordings, groups of rows and stated limits."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -16,26 +16,26 @@ from ppafo.identification.whitened import root_of_inverse
 from ppafo.signals.recording import Floats
 
 SMOOTH = "noise"
-"""Value of ``Conflict.number`` if residuals are too smooth to be noise, ``standard_errors`` times their innovation."""
+"""Marker in ``Conflict.number`` for residuals too smooth to be noise; ``standard_errors`` is then 1 / innovation."""
 
 STATED = "stated limit"
-"""Value of ``Conflict.group`` if the recordings contradict the stated limit of a tolerance."""
+"""Marker in ``Conflict.group`` for recordings that contradict the stated limit of a tolerance."""
 
 _SMOOTHEST = 0.15
-"""Relative innovation [-] below which residuals are not noise: a sensor with a first-order lag of 90 samples.
+"""Relative innovation [-] below which residuals do not count as noise; a first-order lag of 90 samples gives 0.15.
 
 Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recordings of 500 samples.
 """
 
 _SIGNIFICANCE = 0.01
-"""Probability [-] below which a difference is significant."""
+"""Significance level [-] of a difference between estimates."""
 _PARTING = 0.05
-"""Least relative excess of a group's variance over the common variance [-] in a direction that is tested."""
+"""Smallest relative excess of a group's variance over the common variance [-] for a direction to be tested."""
 
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """Part of the data whose own estimates differ significantly from the common ones (Hausman's test).
+    """Part of the data whose separate estimates differ significantly from the common estimates (Hausman's test).
 
     ``group`` is a sensor ("pressure_1"), a recording ("back"), a channel of a recording ("pressure_1 of back"), another
     group ("rising branch"), or ``STATED``. ``number`` is the quantity that differs most, by ``standard_errors``
@@ -49,7 +49,7 @@ class Conflict:
 
 
 def _groups(runs: FitRuns) -> Iterator[tuple[str, list[slice]]]:
-    """Yield sensors, recordings, channels of recordings and further groups with their rows, without duplicates."""
+    """Yield name and rows of every sensor, recording, channel of a recording and named group, without duplicates."""
     labels = [
         (block.channel, block.recording, f"{block.channel} of {block.recording}", *block.groups)
         for block in runs.blocks
@@ -71,7 +71,7 @@ def too_smooth(sensors: Mapping[str, Noise]) -> Conflict | None:
 
 
 def conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedom: float) -> Conflict | None:
-    """Return the group of rows whose own estimates differ most from the common ones; None if none is significant.
+    """Return the group of rows whose separate estimates differ most from the common estimates; None if insignificant.
 
     Hausman's test: the estimate of a group alone differs by d = -H_g^-1 (J_g' r_g + P (z - m)), with covariance H_g^-1
     - C. With C = L L' and the eigenvalues a of L' H_g L, both are diagonal: d'(H_g^-1 - C)^-1 d is the sum of q^2 / (a
@@ -125,7 +125,7 @@ def conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedom
 
 
 def _of_family(names: NDArray[np.str_], moved: Floats, root: Floats) -> Conflict | None:
-    """Return the tolerance that exceeds its limit most in a family whose limits are exceeded significantly, else None.
+    """Return the most exceeded stated limit of a family of tolerances, None if the family as a whole is consistent.
 
     ``moved`` are the estimated tolerances and ``root`` is a square root of their covariance, both divided by the prior
     standard deviations [-]. Directions that the unknowns of the fit absorb are not tested.

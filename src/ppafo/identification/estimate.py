@@ -9,7 +9,7 @@ from ppafo.errors import IdentificationError
 from ppafo.units import percentage
 
 Verdict = Literal["identified", "holds for this model only", "not identifiable", "at its bound", "unit probably wrong"]
-"""Verdict of the recordings on a value.
+"""Verdict on an estimated value, given the fit of the model to the recordings.
 
 A value is "identified" only if the model explains the recordings. A value that "holds for this model only" is written
 into a set with the origin ``fitted``, and is not to be taken as a property of the device.
@@ -21,10 +21,10 @@ WRONG_UNIT: Verdict = "unit probably wrong"
 _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only")
 
 UNKNOWN = 1.0
-"""Half-width of an interval, relative to the value [-], from which the value is not identifiable: zero or twice the
-value lies in the interval."""
+"""Relative half-width of the confidence interval [-] from which a value is not identifiable; the interval then
+contains zero or twice the value."""
 _WIDE = 0.1
-"""Half-width of an interval, relative to the value [-], above which the verdict states it."""
+"""Relative half-width of the confidence interval [-] above which the verdict states the half-width."""
 
 
 def interval_factor(confidence: float) -> float:
@@ -35,8 +35,8 @@ def interval_factor(confidence: float) -> float:
 def relative_half_width(value: float, low: float, high: float, size: float | None = None) -> float:
     """Return the wider half of an interval as a fraction of the value [-].
 
-    ``size`` is a typical magnitude that takes the place of the value of a quantity that may be zero. A side cut off at
-    a bound is too narrow, so that the wider one counts.
+    ``size`` is a typical magnitude that replaces the value of a quantity that may be zero. A side cut off at
+    a bound is too narrow, so the wider side counts.
 
     >>> relative_half_width(0.4, 0.24, 0.5)
     0.4

@@ -18,7 +18,7 @@ from scipy.stats import t as student
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.conflict import Conflict, conflict_of, too_smooth
-from ppafo.identification.intervals import better_point, interval_ends, linear_limits, unidentified
+from ppafo.identification.intervals import interval_ends, unidentified
 from ppafo.identification.noise import HIGHEST_ORDER, Noise
 from ppafo.identification.residuals import FitRuns, FitVariable, Indices, ResidualBlock, Residuals
 from ppafo.identification.whitened import Linear, cost_of, linear_at
@@ -79,25 +79,25 @@ _PASSES = 4
 _SETTLED = 0.03
 """Change of the logarithm of the noise between passes [-] below which the search ends."""
 _EVALUATIONS, _FEW_EVALUATIONS = 40, 10
-"""Largest number of evaluations in each of the first two passes, and in each later pass."""
+"""Largest number of residual evaluations in each of the first two passes, and in each later pass."""
 _ROUGH, _FINE = 1.0e-3, 1.0e-4
 """Relative decrease of the squares [-] that ends the robust pass and the later passes; later steps are finer."""
 _LAST_STEPS = 12
 """Largest number of Gauss-Newton steps on whitened samples."""
 _SHARES = (1.0, 0.3, 0.1)
-"""Fractions of a step [-], of which the first that gains is taken."""
+"""Trial fractions of a Gauss-Newton step [-]; the first that lowers the cost is taken."""
 _GAIN = 0.05
 """Decrease of the sum of squares [-] below which a step after whitening counts as converged."""
 _CONVERGED = 0.5
 """Decrease of the squares in the last step [-] below which the search has converged within the standard errors."""
 _AT_BOUND = 1.0e-6
-"""Distance from a bound [-], absolute below 1 and relative above, up to which a variable is at it."""
+"""Largest distance of a variable from its bound [-] that counts as at the bound, relative above 1."""
 _SHOWN = 0.01
-"""Least contribution to the variance [-] for which a tolerance is listed."""
+"""Least share of the variance [-] for a tolerance to be listed."""
 _CONTINUED = 3
 """Largest number of times that the search continues from a better point of a profile."""
 _OTHER_STARTS = 32
-"""Number of further start points tried."""
+"""Number of additional start points tried if the first fit is inconsistent or has not converged."""
 
 
 @on_one_thread
@@ -110,7 +110,7 @@ def fit(
     memory: int = HIGHEST_ORDER,
     is_motion: bool = False,
 ) -> Fit:
-    """Return the variables that explain the recordings best, with covariance, intervals and consistency tests.
+    """Fit variables to recordings; the result has covariance, intervals and consistency tests.
 
     Weighted squares are minimised within bounds, at first with a robust loss (soft L1); the weights follow from the
     residuals of each channel. Then residuals are whitened by the noise model of each channel, and Gauss-Newton steps
@@ -150,7 +150,7 @@ def fit(
 
 
 def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
-    """Return the fit with intervals and consistency tests that the search from a scaled point finds."""
+    """Return the fit, with intervals and consistency tests, found by a search from a scaled start point."""
     point, outliers = _search(runs, start)
     for continued in range(_CONTINUED + 1):
         end = _settle(runs, point, outliers)
@@ -159,12 +159,11 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         covariance = linear.root @ linear.root.T
         # Samples less what the numbers took: a tolerance that the readings do not move takes none.
         freedom = max(len(errors) - float(np.sum(jacobian * (jacobian @ covariance))), 1.0)
-        limits = linear_limits(runs, point, linear, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
-        better = better_point(runs, limits, linear) if continued < _CONTINUED else None
+        times, is_last = float(student.ppf(0.5 + 0.5 * confidence, freedom)), continued == _CONTINUED
+        low, high, better = interval_ends(runs, point, linear, times, is_last=is_last)
         if better is None:
             break
         point = better
-    low, high = interval_ends(runs, limits, linear)
     # At a bound that the squares would leave a number is no longer free, and no group can move it there.
     gradient = errors @ jacobian + np.square(runs.prior) * (point - runs.start)
     near = _AT_BOUND * np.maximum(1.0, np.abs(point))
@@ -205,9 +204,9 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
 
 
 def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
-    """Return the approximate least-squares point, alternating between estimation of weights and minimisation.
+    """Search for the least-squares point, alternating between estimation of the noise and minimisation.
 
-    The isolated outliers of a motion, as rows of the residuals, are returned with it.
+    Returns the scaled point, and for motion the rows of isolated outliers.
     """
     point, outliers = np.clip(start, runs.low, runs.high), np.zeros(0, dtype=np.intp)
     residuals = runs.residuals_at(point)
@@ -273,7 +272,7 @@ def _outliers(runs: FitRuns, residuals: Floats) -> Indices:
 
 
 class _SearchEnd(NamedTuple):
-    """End of the Gauss-Newton steps: scaled point, residuals [SI], linearisation there, and the last step tried.
+    """End of the Gauss-Newton steps: scaled point, residuals [SI], linearisation at this point, and last step tried.
 
     ``gain`` is the decrease of the cost by this step [-]: at most 0 if the step was not taken, -inf if no run succeeds.
     """
@@ -286,7 +285,7 @@ class _SearchEnd(NamedTuple):
 
 
 def _settle(runs: FitRuns, point: Floats, outliers: Indices) -> _SearchEnd:
-    """Return the point at which Gauss-Newton steps on whitened samples end, starting from a scaled ``point``.
+    """Return the end of Gauss-Newton steps on whitened samples, starting from a scaled ``point``.
 
     Outliers are left out and, in a fit of motion, also samples of high leverage.
     """
@@ -345,7 +344,7 @@ def _likelihood(runs: FitRuns, fitted: Fit) -> float:
 
 
 def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:
-    """Yield at most two scaled start points that explain the recordings better than the fit does."""
+    """Yield at most two scaled start points with a lower robust cost than the fit."""
     sought = ~(runs.prior > 0.0)
     point = fitted.values / runs.scale
     low, high = np.maximum(runs.low, -1.0e3)[sought], np.minimum(runs.high, 1.0e3)[sought]

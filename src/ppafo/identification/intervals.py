@@ -6,8 +6,7 @@ squares over all other variables is larger by t^2, with Student's factor t (prof
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -17,10 +16,10 @@ from ppafo.identification.whitened import Linear, cost_of, squares_of, whitened_
 from ppafo.signals.recording import Floats
 
 _TRIES, _CORRECTIONS, _LINEARISATIONS = 8, 3, 4
-"""Largest numbers of trial points per limit, of steps with the Jacobian of the estimate, of steps with a new one."""
+"""Largest numbers of trial points per limit, of steps with the fixed Jacobian, and of steps with a new Jacobian."""
 
 _SHARES = 0.5 ** np.arange(4.0)[:, None]
-"""Fractions of a step with a new Jacobian [-], of which the best is taken."""
+"""Trial fractions of a step with a new Jacobian [-]; the best is taken."""
 
 _STILL = 0.3
 """Decrease of the squares [-] below which the other variables have converged."""
@@ -41,7 +40,7 @@ _LOWER = 0.1
 """Decrease of the squares [-] from which another point is a better estimate."""
 
 _BENT = 1.1
-"""Least ratio of profile and linear limits [-] for which the profile is followed."""
+"""Least ratio of profile to linear distance [-] above which the limit follows the profile likelihood."""
 
 _SHOWN_WEIGHT = 0.1
 """Least weight of a variable in a combination [-] for which it is listed."""
@@ -49,96 +48,72 @@ _UNKNOWN = 0.5
 """Standard error of a combination of relative variables [-] above which it is not identifiable."""
 
 
-class LinearLimits(NamedTuple):
-    """Scaled confidence limits ``low`` and ``high`` of the linear law, at ``times`` standard errors, about an estimate.
+def interval_ends(
+    runs: FitRuns, point: Floats, linear: Linear, times: float, *, is_last: bool
+) -> tuple[Floats, Floats, Floats | None]:
+    """Return scaled lower and upper confidence limits: ``times`` standard errors, or wider for nonlinear laws.
 
-    ``least`` is the sum of squares at the estimate ``point``. ``reached`` are, for each side of an unknown without a
-    prior, the minimum of the squares at the limit and the point of the minimum, by variable and direction (-1, 1).
+    Only intervals of unknowns without a prior are widened. A limit that the samples do not determine is the bound. A
+    law with events, such as a break-away, has steps in its squares, between which a search may end anywhere, so that
+    limits would depend on its start: unless the search ``is_last``, bent profiles are scanned, and if one has a point
+    with fewer squares, this point is the third value, and the limits are those of the linear law.
     """
-
-    point: Floats
-    least: float
-    times: float
-    low: Floats
-    high: Floats
-    reached: Mapping[tuple[int, int], tuple[float, Floats]]
-
-    def parted(self, squares: float) -> float:
-        """Return the distance from the estimate in standard errors [-] that a sum of squares means."""
-        return math.sqrt(max(squares - self.least, 0.0))
-
-    def is_wider(self, squares: float) -> bool:
-        """Return whether the recordings still explain a linear limit with this sum of squares."""
-        return self.parted(squares) * _BENT < self.times
-
-
-def linear_limits(runs: FitRuns, point: Floats, linear: Linear, times: float) -> LinearLimits:
-    """Return the limits of the linear law about a scaled ``point``, with the profile likelihood at them."""
     covariance = linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))
     low, high = np.maximum(point - wide, runs.low), np.minimum(point + wide, runs.high)
     least = cost_of(runs, runs.residuals_at(point), point, linear)
-    limits = LinearLimits(point, least, times, low, high, reached := {})
-    sides = [(number, direction) for number in np.flatnonzero(runs.prior == 0.0).tolist() for direction in (-1, 1)]
+    sides = [(number, ends) for number in np.flatnonzero(runs.prior == 0.0).tolist() for ends in (low, high)]
     fixed = [number for number, _ in sides]
-    offsets = np.array([(low if direction < 0 else high)[number] - point[number] for number, direction in sides])
+    offsets = np.array([ends[number] - point[number] for number, ends in sides])
     straight = point[:, None] + covariance[:, fixed] / covariance[fixed, fixed] * offsets
-    squares, points = _least_beside(runs, straight, fixed, linear)
-    for column in np.flatnonzero(offsets).tolist():
-        reached[sides[column]] = float(squares[column]), points[:, column]
-        if limits.parted(float(squares[column])) > _BENT * times:
-            reached[sides[column]] = _least_along(runs, points[:, [column]], fixed[column], linear)
-    return limits
-
-
-def better_point(runs: FitRuns, limits: LinearLimits, linear: Linear) -> Floats | None:
-    """Return a scaled point with fewer squares than the estimate, from a scan of the bent profiles; None if none has.
-
-    A law with events, such as a break-away, has steps in its squares, between which a search may end anywhere. Limits
-    about such an end would depend on the start of the search.
-    """
-    lowest, best = limits.least - _LOWER, None
-    bent = [number for (number, _), (squares, _) in limits.reached.items() if limits.is_wider(squares)]
-    for number in dict.fromkeys(bent):
-        for end in (limits.low[number], limits.high[number]):
-            reached = limits.point
-            for share in _SCANNED:
-                moved = reached.copy()
-                moved[number] = limits.point[number] + share * (end - limits.point[number])
-                squares, reached = _least_along(runs, moved[:, None], number, linear)
-                if squares < lowest:
-                    lowest, best = squares, reached
-    return best
-
-
-def interval_ends(runs: FitRuns, limits: LinearLimits, linear: Linear) -> tuple[Floats, Floats]:
-    """Return scaled lower and upper confidence limits: the limits of the linear law, or wider for nonlinear laws.
-
-    Only intervals of unknowns without a prior are widened. A limit that the samples do not determine is the bound.
-    """
-    low, high = limits.low.copy(), limits.high.copy()
-    for (number, direction), at_limit in limits.reached.items():
-        ends, bounds = (high, runs.high) if direction > 0 else (low, runs.low)
-        ends[number] = _end(runs, limits, linear, number, float(bounds[number]), at_limit)
-    return low, high
+    all_squares, points = _least_beside(runs, straight, fixed, linear)
+    wider = list[tuple[int, Floats, float, Floats]]()
+    for side in np.flatnonzero(offsets).tolist():
+        (number, ends), squares, reached = sides[side], float(all_squares[side]), points[:, side]
+        if squares - least > (_BENT * times) ** 2:
+            squares, reached = _least_along(runs, points[:, [side]], number, linear)
+        if squares - least < (times / _BENT) ** 2:
+            wider.append((number, ends, squares, reached))
+        else:
+            ends[number] = reached[number]
+    lowest, better = least - _LOWER, None
+    scanned = dict.fromkeys(number for number, *_ in wider)
+    for number, ends in ((number, ends) for number in scanned if not is_last for ends in (low, high)):
+        reached = point
+        for share in _SCANNED:
+            moved = reached.copy()
+            moved[number] = point[number] + share * (ends[number] - point[number])
+            squares, reached = _least_along(runs, moved[:, None], number, linear)
+            if squares < lowest:
+                lowest, better = squares, reached
+    for number, ends, squares, reached in wider if better is None else ():
+        bound = float((runs.low if ends is low else runs.high)[number])
+        ends[number] = _end(runs, point, least, linear, number, bound, (squares, reached), times)
+    return low, high, better
 
 
 def _end(
-    runs: FitRuns, limits: LinearLimits, linear: Linear, number: int, bound: float, at_limit: tuple[float, Floats]
+    runs: FitRuns,
+    point: Floats,
+    least: float,
+    linear: Linear,
+    number: int,
+    bound: float,
+    at_limit: tuple[float, Floats],
+    times: float,
 ) -> float:
-    """Return one confidence limit of a variable, between the limit of the linear law and the bound.
+    """Return one confidence limit of a variable by profile likelihood, searched from the linear limit to the bound.
 
-    ``at_limit`` is the sum of squares at the linear limit, and the point at which it is reached. Each trial limit
-    starts from the best of the nearest points inside and outside, so that no event lies between it and all its starts.
+    ``least`` is the sum of squares at the estimate; ``at_limit`` is the sum of squares near the linear limit, and the
+    point at which it is reached. Each trial limit starts from the best of the nearest points inside and outside, so
+    that no event lies between it and all its starts.
     """
-    point, times = limits.point, limits.times
     squares, reached = at_limit
-    if not limits.is_wider(squares):
-        return float(reached[number])
     inner, near = point, 0.0
     outer, far = point, math.inf
     for _ in range(_TRIES):
-        parted = limits.parted(squares)
+        # By how many standard errors priors and samples tell this point from the estimate.
+        parted = math.sqrt(max(squares - least, 0.0))
         if abs(parted - times) < _REACHED * times:
             return float(reached[number])
         if parted < times:
@@ -164,7 +139,7 @@ def _end(
 
 
 def _least_beside(runs: FitRuns, points: Floats, fixed: list[int], linear: Linear) -> tuple[Floats, Floats]:
-    """Return the minimum of the squares with one variable fixed, for each scaled point, and the points of the minima.
+    """Return the least sum of squares [-] at each scaled point with one variable fixed, and the points that reach it.
 
     ``fixed`` is the index of the fixed variable of each point. The other variables take Gauss-Newton steps with the
     Jacobian of the estimate. The minimum is infinite if no run succeeds.
@@ -191,7 +166,7 @@ def _least_beside(runs: FitRuns, points: Floats, fixed: list[int], linear: Linea
 
 
 def _least_along(runs: FitRuns, starts: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
-    """Return the minimum of the squares with one variable fixed, and the point of the minimum.
+    """Return the least sum of squares [-] with one variable fixed, and the scaled point that reaches it.
 
     The search begins at the best of the scaled points ``starts`` (numbers, points). The other variables take
     Gauss-Newton steps within their bounds, each with a new Jacobian, because far from the estimate its Jacobian leads

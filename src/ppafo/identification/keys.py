@@ -23,7 +23,7 @@ def quantity_in(
     high: float = math.inf,
     atmosphere: float = STANDARD_ATMOSPHERE,
 ) -> float | None:
-    """Return the number at a key of a table [unit], None if the key is absent; ``where`` starts messages.
+    """Return the value of a key in ``unit``, None if the key is absent; ``where`` is the prefix of messages.
 
     Raises IdentificationError if the text does not fit the unit or the number is not from ``low`` to ``high``.
     """
@@ -37,7 +37,7 @@ def quantity_in(
 
 
 def positive_in(table: StrictTable, key: str, unit: str, where: str) -> float | None:
-    """Return the number at a key like ``quantity_in``. Raises IdentificationError also if it is not positive."""
+    """Return the positive value of a key in ``unit``, None if absent. Raises IdentificationError unless above zero."""
     value = quantity_in(table, key, unit, where)
     if value is not None and value <= 0.0:
         raise IdentificationError(f"{where}: {key} = {getattr(table, key)!r} must be above zero")

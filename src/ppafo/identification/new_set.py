@@ -1,4 +1,4 @@
-"""New parameter set: identified values replace earlier ones, each with interval and origin."""
+"""New parameter set: identified values with interval and origin replace earlier values."""
 
 import math
 from collections.abc import Iterable
@@ -27,10 +27,10 @@ _FORMS = ((_AREA_NAMES, _SONIC_NAMES), (_SONIC_NAMES, _AREA_NAMES))
 
 @dataclass(frozen=True, slots=True)
 class NewSet:
-    """Parameter set with new values, and ``problem``, the error of a device built from it (empty if valid).
+    """Parameter set with identified values.
 
-    ``written`` are the paths of identified values. ``fitted`` are the paths of values that hold for this model only;
-    these have the origin ``fitted`` in the set and do not count as identified.
+    ``problem``: error in building a device from the set, empty if valid. ``written``: paths of identified values.
+    ``fitted``: paths of values that hold for this model only, with the origin ``fitted`` in the set.
     """
 
     parameter_set: ParameterSet
@@ -40,7 +40,7 @@ class NewSet:
 
 
 def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], valve: str | None = None) -> NewSet:
-    """Return the set with every usable estimate that it has an entry for; later estimates override earlier ones."""
+    """Return the set with every usable estimate written to its entry; later estimates override earlier ones."""
     is_identified: dict[str, bool] = {}
     for estimate in estimates:
         find_effects([estimate.path])
@@ -120,7 +120,7 @@ def stated_half_width(entry: Entry, unit: str) -> float:
 
 
 def in_set_unit(number: float, path: str, si_unit: str, parameter_set: ParameterSet) -> tuple[float, str]:
-    """Return a number in the unit of its entry in the set, with this unit; unchanged [SI] if the set has no entry."""
+    """Return a value and its unit, converted to the unit of its entry in the set; unchanged [SI] without an entry."""
     entry, quantity = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
     if entry is None or quantity is None or entry.unit == si_unit:
         return number, si_unit

@@ -94,7 +94,7 @@ def _without_level(values: Floats, gain: float) -> Floats:
 
 
 def whiten(values: Floats, noise: Noise) -> Floats:
-    """Return columns (samples, columns) [SI] of one recording as innovations [-] of the channel's noise model."""
+    """Whiten columns (samples, columns) [SI] of a recording: innovations [-] of the noise model of the channel."""
     forward = values / noise.deviation
     if noise.gain > 0.0:
         return _without_level(forward, noise.gain) / noise.innovation

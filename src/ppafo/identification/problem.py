@@ -23,7 +23,7 @@ _FILE = TomlKind(
 
 
 class DeviceProblem(StrictTable):
-    """Initial parameter set, its valve, and changes to it."""
+    """Table [device] of a problem file: initial parameter set, chosen valve and overrides."""
 
     set: Text = Field(description="name of a parameter set, or a path relative to this file")
     valve: Text | None = Field(None, description="name of a valve of the set; default: the chosen one")

@@ -43,9 +43,9 @@ _UNKNOWN = "unknown"
 _COLDEST, _HOTTEST = 150.0, 600.0
 """Lowest and highest gas temperature [K] of a bench."""
 _THERMOMETER = 1.0
-"""Limit [K] of the error of a temperature stated in the problem."""
+"""Error limit [K] of a gas temperature stated in the problem file."""
 _MOST_OF_STOPS = 10.0
-"""Largest ratio of angle travelled in a decay to angle between the stops [-]; more means a wrong unit."""
+"""Largest plausible ratio of swing in a free decay to angle between the stops [-]; more means a wrong unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class ProcedureContext:
     tolerances: Tolerances = DEFAULTS
 
     def number(self, path: str) -> float:
-        """Return the value at a path [SI]. Raises IdentificationError if the set has none."""
+        """Return the value of a parameter [SI]. Raises IdentificationError if the set has none."""
         value = number_in_si(with_followers(self.parameter_set), path)
         if value is None:
             raise IdentificationError(f"{self.label}: {path} is missing; add it to {self.parameter_set.file}")
@@ -87,17 +87,17 @@ class ProcedureContext:
         return GasAt(species.molar_mass, species.heat_capacity_ratio, temperature, deviation)
 
     def deviation(self, path: str, value: float, unit: str) -> float:
-        """Return the standard deviation of a number, given its value [unit], from the bench, the set, or defaults."""
+        """Return the standard deviation [unit] of a parameter of given ``value``: from bench, set, or defaults."""
         entry = with_followers(self.parameter_set).numbers.get(path)
         return self.tolerances.deviation_of(path, value, 0.0 if entry is None else stated_half_width(entry, unit))
 
     def valve_path(self, name: str | None) -> str:
-        """Return the path of a valve in the set, such as ``valves.main``; None is the chosen valve."""
+        """Return the path of a valve in the set, such as ``valves.main``; None means the chosen valve."""
         return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
 
 
 class StaticTorqueProblem(StrictTable):
-    """Static torque over rising and falling pressure: torque constant and static friction."""
+    """Table of procedure static-torque: torque constant and static friction from rising and falling pressure."""
 
     kind: Literal["static-torque"]
     recordings: _Recordings
@@ -105,12 +105,12 @@ class StaticTorqueProblem(StrictTable):
     confidence: Confidence = 0.95
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings."""
+        """Identify torque constant and static friction from recordings."""
         return static_torque(sources, self.confidence, context.tolerances)
 
 
 class FreeDecayProblem(StrictTable):
-    """Free decay after an impulse: viscous damping and Coulomb friction."""
+    """Table of procedure free-decay: viscous damping and Coulomb friction from the decay after an impulse."""
 
     kind: Literal["free-decay"]
     recordings: _Recordings
@@ -132,7 +132,7 @@ class FreeDecayProblem(StrictTable):
         return inertia, 0.0 if inertia is None else context.deviation(path, inertia, "kg m^2")
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings. Raises IdentificationError for an implausible angle."""
+        """Identify damping and friction from recordings. Raises IdentificationError for an implausible angle."""
         low, high = (number_in_si(context.parameter_set, f"actuator.angle_{end}") for end in ("min", "max"))
         for source in sources:
             angles = source.recording["angle"] if "angle" in source.recording else source.recording.time[:1]
@@ -161,7 +161,7 @@ class FreeDecayProblem(StrictTable):
 
 
 class OpenValveFlowProblem(StrictTable):
-    """Flow through the fully open valve: Cd, or C and b of ISO 6358."""
+    """Table of procedure open-valve-flow: Cd, or C and b of ISO 6358, of the fully open valve."""
 
     kind: Literal["open-valve-flow"]
     recordings: _Recordings
@@ -173,7 +173,7 @@ class OpenValveFlowProblem(StrictTable):
     law: Annotated[Law, Field(description="flow law, also the form in which the set gives it")] = "orifice"
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings."""
+        """Identify the flow parameters of the open valve from recordings."""
         path = context.valve_path(self.valve)
         return open_valve_flow(
             sources,
@@ -188,7 +188,7 @@ class OpenValveFlowProblem(StrictTable):
 
 
 class VaneLeakProblem(StrictTable):
-    """Leak of closed chambers losing pressure, or in steady flow: area, conductance or laminar coefficient."""
+    """Table of procedure vane-leak: area, conductance or laminar coefficient from decaying pressure or steady flow."""
 
     kind: Literal["vane-leak"]
     recordings: _Recordings
@@ -207,7 +207,7 @@ class VaneLeakProblem(StrictTable):
     volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
 
     def volumes_of(self, context: ProcedureContext) -> tuple[float | None, float | None, float]:
-        """Return both volumes [m^3], given or computed from the angle, and relative standard deviation of a volume [-].
+        """Return both chamber volumes [m^3], stated or from the angle, and their relative standard deviation [-].
 
         Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
         displacement per radian [m^3/rad].
@@ -234,7 +234,7 @@ class VaneLeakProblem(StrictTable):
         return first, second, deviation
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings."""
+        """Identify the leak between the chambers from recordings."""
         first, second, deviation = self.volumes_of(context)
         start, end = times_of(self, context.label)
         return vane_leak(
@@ -254,7 +254,7 @@ class VaneLeakProblem(StrictTable):
 
 
 class ValveMapProblem(StrictTable):
-    """Flow over command: dead band, gain, saturation, hysteresis."""
+    """Table of procedure valve-map: dead band, gain, saturation and hysteresis from flow over command."""
 
     kind: Literal["valve-map"]
     recordings: _Recordings
@@ -265,13 +265,13 @@ class ValveMapProblem(StrictTable):
     valve: _Valve = None
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
-        """Return the result of the procedure for recordings."""
+        """Identify the flow of the valve over command from recordings."""
         gas = context.gas(self)
         return valve_map(sources, gas, context.valve_path(self.valve), self.confidence, context.tolerances)
 
 
 def times_of(problem: FreeDecayProblem | VaneLeakProblem, label: str) -> tuple[float | None, float | None]:
-    """Return first and last time [s] to use, None for the start or end of the recording; ``label`` starts messages."""
+    """Return first and last time [s] used, None for an end of the recording; ``label`` is the prefix of messages."""
     return quantity_in(problem, "start", "s", label), quantity_in(problem, "end", "s", label)
 
 
@@ -281,7 +281,7 @@ ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem
 def run_procedure(
     sources: tuple[RecordingSource, ...], problem: ProcedureProblem, context: ProcedureContext
 ) -> BenchResult:
-    """Return the result of a procedure for its recordings.
+    """Run a bench procedure on its recordings.
 
     Raises IdentificationError, with the name of the recording or the label of the procedure first.
     """
@@ -304,7 +304,7 @@ def run_procedure(
 
 
 def window_of(problem: ProcedureProblem, context: ProcedureContext) -> tuple[float, float]:
-    """Return the first and last time [s] of the recordings that a procedure uses; infinite if not limited."""
+    """Return first and last time [s] that a procedure uses of its recordings; infinite if not limited."""
     # Steady readings have no window: each counts by itself.
     if not isinstance(problem, FreeDecayProblem | VaneLeakProblem):
         return -math.inf, math.inf

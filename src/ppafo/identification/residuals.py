@@ -18,14 +18,13 @@ Residuals = Callable[[Floats], Floats]
 """Function from points [SI] (numbers, points) to residuals measured - model [SI] (rows, points); NaN if a run fails."""
 
 _UNITS_OF_NOISE = 3.0
-"""Change of all residuals together in one finite difference, in units of noise [-].
+"""Combined change of all residuals in a finite difference, in units of noise [-].
 
-With differences of a thousandth of the variable 7 of 16 intervals held, with thirty units of noise 11, with three 28.
-"""
+Differences of a thousandth of the variable, or of thirty units of noise, gave fewer intervals with the true value."""
 _SHORTEST_STEP, _LONGEST_STEP = 1.0e-7, 1.0e-3
 """Shortest and longest finite difference, as fractions of the scale of a variable [-]."""
 _LEAST_NOISE = 1.0e-12
-"""Least noise of a channel, relative to its largest residual at the start [-]: a law may fit exactly."""
+"""Least noise of a channel, relative to its largest residual at the start [-], for a law that fits exactly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +137,7 @@ class FitRuns:
         self.steps = np.clip(_UNITS_OF_NOISE / np.maximum(sizes, 1.0e-300), _SHORTEST_STEP, _LONGEST_STEP)
 
     def rows_of(self, channel: str) -> list[slice]:
-        """Return the rows of a channel in each recording."""
+        """Return the rows of a channel, one slice for each recording."""
         return [block.rows for block in self.blocks if block.channel == channel]
 
     def shared(self) -> Floats:
@@ -152,13 +151,13 @@ class FitRuns:
 
     @cached_property
     def _least_noise(self) -> dict[str, float]:
-        """Least noise [SI] by channel, relative to the residuals at the start: channels have units of their own."""
+        """Noise floor by channel [SI], proportional to the channel's largest residual at the start."""
         start = self.residuals_at(self.start)
         largest = {name: max(float(np.abs(start[rows]).max()) for rows in self.rows_of(name)) for name in self.channels}
         return {name: _LEAST_NOISE * (size or 1.0) for name, size in largest.items()}
 
     def deviations(self, series: Floats) -> tuple[Floats, dict[str, float]]:
-        """Return the noise [SI] of each row, and by channel, pooled over recordings and no less than the floor.
+        """Return the noise [SI] by row and by channel, pooled over recordings and not below the floor.
 
         ``series`` has the residuals as first column; further columns are the uncertainty of the fitted model.
         """

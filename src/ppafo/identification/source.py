@@ -1,4 +1,4 @@
-"""Recordings used as evidence: traced to their files, and used only once."""
+"""Recordings as sources of estimates: file hash, check for double use, origin, remarks on readings."""
 
 import hashlib
 from collections.abc import Iterable
@@ -15,14 +15,14 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 
 _NO_SENSORS = ("command", "direction", "repetition")
-"""Channels that no sensor measures, which have no limit."""
+"""Channels without a sensor, hence without a sensor limit."""
 _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 """Origins of recordings, in decreasing priority for the origin of a result."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingSource:
-    """Recording with its reference, ``static.csv sha256:0123...``, or without a file the label of the recording."""
+    """Recording with its source: ``static.csv sha256:0123...``, or the recording's label if it has no file."""
 
     recording: Recording
     reference: str = ""
@@ -38,7 +38,7 @@ class RecordingSource:
         return self.reference or self.recording.label
 
     def shown(self, name: str, value: float) -> str:
-        """Return a value [SI] of a channel with its unit, in the unit of the file."""
+        """Return a channel value [SI] as text, in the unit of the file."""
         channel = self.recording.channels[name]
         number, unit = in_shown_unit(value, channel.unit, channel.stated)
         return f"{number:.6g} {unit}".removesuffix(" -")
@@ -54,9 +54,9 @@ def source_of(path: Path, recording: Recording, trial: str = "") -> RecordingSou
 
 @dataclass(frozen=True, slots=True)
 class UsedRecording:
-    """Use of a recording.
+    """Recording as used by a procedure or a fit.
 
-    ``by`` names the use in messages, ``trace`` the file; ``channels`` are the channels used (empty for all), from
+    ``by`` names the user in messages, ``trace`` the file; ``channels`` are the channels used (empty for all), from
     ``first`` to ``last`` [s].
     """
 
@@ -68,13 +68,13 @@ class UsedRecording:
     last: float
 
     def overlaps(self, other: "UsedRecording") -> bool:
-        """Return whether two uses of the same recording share samples of a channel; no channels means all channels."""
+        """Return whether two uses of the same recording share samples of a channel."""
         is_alike = not (self.channels and other.channels) or bool(self.channels & other.channels)
         return is_alike and self.first < other.last and other.first < self.last
 
 
 def double_use(uses: Iterable[UsedRecording], others: Iterable[UsedRecording] | None = None) -> str:
-    """Return a message on samples used twice, within ``uses`` or also in ``others``; empty if there are none.
+    """Return a message on samples used twice, among ``uses`` or between ``uses`` and ``others``; empty if none are.
 
     Recordings are compared by the hash of their numbers, independent of file names.
     """
@@ -102,7 +102,7 @@ def _digest(recording: Recording) -> str:
 
 
 def pool(sources: tuple[RecordingSource, ...], name: str) -> Floats:
-    """Return a channel [SI] of all recordings, concatenated."""
+    """Return the values of a channel [SI], concatenated over recordings."""
     return np.concatenate([source.recording[name] for source in sources])
 
 

@@ -15,12 +15,7 @@ from ppafo.documents.models import StrictTable, Text
 from ppafo.errors import IdentificationError, UnitError, refused_as
 from ppafo.identification.estimate import interval_factor
 from ppafo.parameters.parameter_set import CONFIDENCE
-from ppafo.simulation.recorded.usual_errors import (
-    ANGLE_ERRORS,
-    PRESSURE_ERRORS,
-    SUPPLY_ERROR,
-    deviation_of_limit,
-)
+from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS, SUPPLY_ERROR, deviation_of_limit
 from ppafo.units import parse_quantity
 
 Sensed = Literal["zero", "gain"]
@@ -57,7 +52,7 @@ _LARGEST_FRACTION = 0.5
 
 
 class BenchSection(StrictTable):
-    """Tolerances of the bench as limits (+-); 0 for an exact value."""
+    """Table [bench] of a problem file: tolerances as limits (+-); 0 for an exact value."""
 
     load: Annotated[
         Text | None, Field(description="tolerance of the external torque, for each recording; default 2 %")
@@ -196,7 +191,7 @@ def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
 
 
 def quantity_of(where: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the number in a text of a problem file, in ``unit``; ``where`` is the file and key in messages.
+    """Parse a quantity of a problem file into a number in ``unit``; ``where`` is the file and key in messages.
 
     Raises IdentificationError if the text does not fit the unit.
     """

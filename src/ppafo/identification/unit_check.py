@@ -1,7 +1,7 @@
 """Unit mistakes that explain estimates far from the values of the parameter set."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ppafo.identification.estimate import WRONG_UNIT, Estimate
@@ -32,34 +32,28 @@ def with_wrong_units(
     nearest, explained = math.log(_NEAR), estimates
     for si_unit in dict.fromkeys(channel.unit.removesuffix("_d") for channel in channels.values()) if far else ():
         names = [name for name, channel in channels.items() if channel.unit.removesuffix("_d") == si_unit]
-        acted_on = {item.path for item in estimates if item.is_usable and _acts_on(si_unit, item.unit, channels)}
-        for mistake in misread_units(si_unit, (channels[name].stated for name in names)) if far <= acted_on else ():
-            size = abs(math.log(mistake.factor))
+        # Beside a measured torque or force a pressure scales no torque; in a motion it drives everything with mass.
+        has_load = bool({"torque", "force"} & channels.keys())
+        acted_on = set[str]()
+        for path, unit in ((item.path, item.unit) for item in estimates if item.is_usable):
+            has_mass = "N" in unit or "kg" in unit
+            # A torque constant, in N m/Pa, is stated in m^3.
+            per_pressure = "Pa" in unit or unit == "m^3" or "mass_flow" in channels or (has_mass and not has_load)
+            depends = {"Pa": per_pressure, "N m": has_mass or "torque" in channels, "rad": unit == "N m"}
+            acted_on |= {path} if depends.get(si_unit) else set()
+        mistakes = misread_units(si_unit, [channels[name].stated for name in names]) if far <= acted_on else []
+        for mistake, factor in mistakes:
+            size = abs(math.log(factor))
             distance = max(abs(ratios[path] - size) for path in acted_on & ratios.keys())
             if distance < nearest:
                 text = (
-                    f"{' and '.join(names)} {'seem' if len(names) > 1 else 'seems'} to be {mistake.in_words}, a "
-                    f"factor of {mistake.larger_factor}; correct the unit in the header or the column map, or give the "
+                    f"{' and '.join(names)} {'seem' if len(names) > 1 else 'seems'} to be {mistake}, a factor of "
+                    f"{max(factor, 1.0 / factor):.4g}; correct the unit in the header or the column map, or give the "
                     "value that you expect in device.overrides"
                 )
-                nearest, explained = (
-                    distance,
-                    tuple(
-                        replace(item, verdict=WRONG_UNIT, explanation=text) if item.path in acted_on else item
-                        for item in estimates
-                    ),
+                nearest = distance
+                explained = tuple(
+                    replace(item, verdict=WRONG_UNIT, explanation=text) if item.path in acted_on else item
+                    for item in estimates
                 )
     return explained
-
-
-def _acts_on(si_unit: str, unit: str, channels: Iterable[str]) -> bool:
-    """Return whether an estimate in ``unit`` depends on the unit of the channels of a quantity.
-
-    Beside a measured torque or force a pressure does not scale a torque; in a motion it drives everything with mass.
-    """
-    has_mass = "N" in unit or "kg" in unit
-    if si_unit == "Pa":
-        # A torque constant, in N m/Pa, is stated in m^3.
-        is_per_pressure = "Pa" in unit or unit == "m^3" or "mass_flow" in channels
-        return is_per_pressure or (has_mass and not {"torque", "force"} & {*channels})
-    return (has_mass or "torque" in channels) if si_unit == "N m" else unit == "N m"

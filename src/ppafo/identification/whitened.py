@@ -11,12 +11,12 @@ from ppafo.identification.residuals import FitRuns, Flags, Indices
 from ppafo.signals.recording import Floats
 
 _OF_ANY_SIZE = 1.0e8
-"""Standard deviation, relative to the noise [-], of an error of unknown magnitude."""
+"""Standard deviation of an error of unknown magnitude, relative to the noise [-]."""
 _ROUNDS = 20
 """Largest number of iterations between noise and variables; most fits converge in a few."""
 
 _RANK = 1.0e-13
-"""Least eigenvalue of the scaled curvature [-] of an observable direction."""
+"""Least eigenvalue of the scaled curvature [-] for a direction to be observable."""
 
 
 class Linear(NamedTuple):

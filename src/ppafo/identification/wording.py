@@ -1,4 +1,4 @@
-"""Presentation of fit results: units, digits, sources of uncertainty, and conflicting readings, in words."""
+"""Text on fit results: values in display units and digits, sources of uncertainty, conflicting readings."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Metrics of a recording: named values with units, the same for measured and simulated data.
+"""Metrics of a recording: named values with units, equal for measured and simulated data.
 
 To add a metric: a function and its MetricKind in a module of this folder, listed in its METRICS.
 """
@@ -37,13 +37,13 @@ METRICS: Kinds[MetricKind] = Kinds(
 
 
 def metric_kind(name: str) -> MetricKind | None:
-    """Return a metric of runs by name, including metrics for verdicts only; None for an unknown name."""
+    """Return a metric by name, including metrics used only for verdicts; None for an unknown name."""
     # A name that is none of the package's has METRICS look for a metric of another package.
     return SETTLED_METRICS.get(name) or METRICS.get(name)
 
 
 def evaluate(recording: Recording) -> dict[str, Metric]:
-    """Return every metric that the channels of the recording allow; none for a single sample."""
+    """Compute every metric for which a recording has the channels; none for a single sample."""
     metrics: dict[str, Metric] = {}
     names = frozenset(recording.names)
     for kind in METRICS.values():
@@ -56,13 +56,13 @@ def evaluate(recording: Recording) -> dict[str, Metric]:
 
 
 def missing_channels(program: "Program") -> frozenset[str]:
-    """Return the channels that runs of a program lack: channels of an energy balance, or of a second chamber."""
+    """Return the channels absent from runs of a program: of an energy balance, or of a second chamber."""
     of_gas: frozenset[str] = frozenset() if program.is_thermal else gas.WITH_ENERGY_BALANCE
     return of_gas | OF_SECOND_CHAMBER if program.has_one_chamber else of_gas
 
 
 def has_channels(program: "Program", kind: MetricKind) -> bool:
-    """Tell whether runs of a program have the channels and other requirements of a metric."""
+    """Return whether runs of a program have the channels and other requirements of a metric."""
     return (
         missing_channels(program).isdisjoint(kind.channels)
         and kind.of_reference in ("", program.followed)

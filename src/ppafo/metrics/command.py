@@ -1,4 +1,4 @@
-"""Oscillation of a loop: reversals of the command, and peak torque; torque error of a walk.
+"""Metrics of the command: reversals, peak torque, and torque error of a walk.
 
 A loop that is too fast for the dead time of its valve opens the valve fully one way and then the other. A reversal is a
 command from beyond +0.5 to beyond -0.5 or back; in a walk both must be in the same task, without venting in between.
@@ -23,7 +23,7 @@ HALF_OPEN = 0.5
 
 
 class Reversals(NamedTuple):
-    """Last direction of the command in this task (1, -1, or 0 for neither), task, and number of reversals so far."""
+    """State of the reversal meter: last direction (1, -1, or 0), current task, number of reversals."""
 
     way: float
     task: float
@@ -31,17 +31,17 @@ class Reversals(NamedTuple):
 
 
 def direction_of(command: float) -> float:
-    """Direction [-] in which a command opens the valve: 1 or -1; 0 if the valve is at most half open, or vents."""
+    """Direction in which a command opens the valve: 1 or -1; 0 if the valve is at most half open, or vents."""
     return (1.0 if HALF_OPEN < command <= VENTS_ABOVE else 0.0) - (1.0 if command < -HALF_OPEN else 0.0)
 
 
 def start_reversals(_course: ReferenceSummary, sample: Sample) -> Reversals:
-    """State without reversals at the first sample."""
+    """Start the reversal meter at the first sample."""
     return Reversals(direction_of(sample.command), sample.stride.phase, 0.0)
 
 
 def update_reversals(state: Reversals, _course: ReferenceSummary, sample: Sample) -> Reversals:
-    """Count a reversal if the command changes direction within the task."""
+    """Update the reversal meter: count a change of direction within the task."""
     command, task = sample.command, sample.stride.phase
     begins = task != state.task or command > VENTS_ABOVE
     before, now = 0.0 if begins else state.way, direction_of(command)
@@ -52,7 +52,7 @@ REVERSALS = MeterKind("reversals", Reversals, start_reversals, update_reversals)
 
 
 def command_reversals(recording: Recording, samples: slice | None = None) -> float:
-    """Number of reversals of the command in a recording, or in some samples of it."""
+    """Number of command reversals in a recording, or in a slice of its samples."""
     window = samples or slice(None)
     command = recording["command"][window]
     task = recording["controller_phase"][window] if "controller_phase" in recording else np.zeros(command.size)
@@ -82,19 +82,19 @@ class _RequestedTorqueSums(NamedTuple):
 
 
 def is_torque_requested(command: float, task: float) -> bool:
-    """Tell whether a walking controller requests a torque: not in mid-stance, and not while it vents."""
+    """Return whether a walking controller requests a torque: not in mid-stance, and not while it vents."""
     return command <= VENTS_ABOVE and task != MID_STANCE
 
 
 def start_requested_torque(_course: ReferenceSummary, _sample: Sample) -> _RequestedTorqueSums:
-    """Zero sums at the start of a walk."""
+    """Start the sums of requested torque, at zero."""
     return _RequestedTorqueSums(0.0, 0.0, 0.0)
 
 
 def update_requested_torque(
     state: _RequestedTorqueSums, _course: ReferenceSummary, sample: Sample
 ) -> _RequestedTorqueSums:
-    """Add a sample to the sums if a torque is requested."""
+    """Update the sums of requested torque with a sample, if a torque is requested."""
     error, counts = sample.reference - sample.torque, is_torque_requested(sample.command, sample.stride.phase)
     return _RequestedTorqueSums(
         state.squares + (error * error if counts else 0.0),
@@ -107,14 +107,14 @@ ASKED = MeterKind("asked", _RequestedTorqueSums, start_requested_torque, update_
 
 
 def requested_samples(recording: Recording) -> Masks:
-    """Mark the samples with a requested torque (samples,): all samples of a task; in a walk by phase and command."""
+    """Mark samples with a requested torque (samples,): all of a task; in a walk by phase and command."""
     if "controller_phase" not in recording:
         return np.ones(len(recording), dtype=np.bool_)
     return np.asarray((recording["command"] <= VENTS_ABOVE) & (recording["controller_phase"] != MID_STANCE))
 
 
 def torque_error(recording: Recording) -> float | None:
-    """RMS torque error [N m] over the samples of a walk with a requested torque; None if there are none."""
+    """RMS torque error over samples of a walk with a requested torque [N m]; None without such samples."""
     requested = requested_samples(recording)
     if not requested.any():
         return None
@@ -122,7 +122,7 @@ def torque_error(recording: Recording) -> float | None:
 
 
 def requested_torque(recording: Recording) -> float | None:
-    """RMS of the torque requested by a walking controller [N m]; None if none is requested."""
+    """RMS torque requested by a walking controller [N m]; None if no torque is requested."""
     requested = requested_samples(recording)
     return float(np.sqrt(np.mean(recording["reference"][requested] ** 2))) if requested.any() else None
 

@@ -1,4 +1,4 @@
-"""Metrics of gas and work: consumption and output of a task."""
+"""Metrics of gas consumption, work and energy."""
 
 import math
 from functools import partial
@@ -14,20 +14,20 @@ from ppafo.signals.meter import NO_ENERGY, NO_GAS, EnergySample, GasSample, Mete
 
 
 def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunction | None = None) -> float:
-    """Increase of a cumulative channel from the first to the last sample, or a function of several increases."""
+    """Increase of a cumulative channel over a recording, or a function of several increases [SI]."""
     # A total counts from the start of the run, and a recording may be a part of one.
     gains = [float(recording[channel][-1] - recording[channel][0]) for channel in channels]
     return gains[0] if function is None else float(function(*gains))
 
 
 def gas_imbalance(supplied: Numeric, vented: Numeric, mass_1: Numeric, mass_2: Numeric) -> Numeric:
-    """Supplied minus vented minus stored gas [kg]: mass error of a simulation, near 0."""
+    """Mass error of a simulation [kg]: supplied minus vented minus stored gas, near 0."""
     # What leaks goes from one chamber to the other: it leaves neither sum.
     return supplied - vented - (mass_1 + mass_2)
 
 
 def gas_taken(supplied: Numeric) -> Numeric:
-    """Gas mass exchanged with a supply [kg], without sign: taken from it, or drawn in by a vacuum."""
+    """Gas mass exchanged with a supply [kg], unsigned: taken from a regulator, or drawn in by a vacuum."""
     return abs(supplied)
 
 
@@ -49,7 +49,7 @@ def lowest_temperature(recording: Recording) -> float:
 def mechanical_work(recording: Recording) -> float:
     """Work of the actuator on the joint [J]: integral of the torque over the angle.
 
-    The integral over the angle needs no velocity, and an impact at a stop causes no error.
+    An integral over the angle needs no velocity and has no error at an impact.
     """
     return float(np.trapezoid(recording["torque"], recording["angle"]))
 
@@ -68,19 +68,19 @@ def gas_per_work(recording: Recording) -> float | None:
 
 
 class _GasGains(NamedTuple):
-    """Gas at the first sample [kg], and increases of masses and totals from the first to the last sample [kg]."""
+    """State of the gas meter: gas at the first sample [kg], and increases since then [kg]."""
 
     first: GasSample
     gained: GasSample
 
 
 def start_gas(course: ReferenceSummary, sample: Sample) -> _GasGains:
-    """Zero increases at the first sample."""
+    """Start the gas meter at the first sample."""
     return _GasGains(sample.gas, NO_GAS)
 
 
 def update_gas(state: _GasGains, course: ReferenceSummary, sample: Sample) -> _GasGains:
-    """Increases after one more sample."""
+    """Update the gas meter with a sample."""
     # A run may go on after its last sample, to the end of a step: what passes there is in no recording.
     gained = GasSample(
         supplied_mass=sample.gas.supplied_mass - state.first.supplied_mass,
@@ -96,19 +96,19 @@ GAS = MeterKind("gas", _GasGains, start_gas, update_gas)
 
 
 class _EnergyGains(NamedTuple):
-    """Energies of the gas at the first sample [J], and their increases from the first to the last sample [J]."""
+    """State of the energy meter: energies at the first sample [J], and increases since then [J]."""
 
     first: EnergySample
     gained: EnergySample
 
 
 def start_energy(course: ReferenceSummary, sample: Sample) -> _EnergyGains:
-    """Zero increases at the first sample."""
+    """Start the energy meter at the first sample."""
     return _EnergyGains(sample.energy, NO_ENERGY)
 
 
 def update_energy(state: _EnergyGains, course: ReferenceSummary, sample: Sample) -> _EnergyGains:
-    """Increases after one more sample."""
+    """Update the energy meter with a sample."""
     gained = EnergySample(
         gas_energy=sample.energy.gas_energy - state.first.gas_energy,
         supplied_enthalpy=sample.energy.supplied_enthalpy - state.first.supplied_enthalpy,
@@ -123,7 +123,7 @@ ENERGY = MeterKind("energy", _EnergyGains, start_energy, update_energy)
 
 
 class Peaks(NamedTuple):
-    """Extremes so far: absolute torque [N m]; pressure [Pa absolute] and lowest temperature [K] in any chamber."""
+    """State of the peak meter: absolute torque [N m], pressure [Pa absolute], lowest temperature [K]."""
 
     torque: float
     pressure: float
@@ -131,7 +131,7 @@ class Peaks(NamedTuple):
 
 
 def start_peaks(_course: ReferenceSummary, sample: Sample) -> Peaks:
-    """Extremes of the first sample."""
+    """Start the peak meter at the first sample."""
     return Peaks(
         torque=abs(sample.torque),
         pressure=max(sample.pressure_1, sample.pressure_2),
@@ -140,7 +140,7 @@ def start_peaks(_course: ReferenceSummary, sample: Sample) -> Peaks:
 
 
 def update_peaks(state: Peaks, _course: ReferenceSummary, sample: Sample) -> Peaks:
-    """Extremes after one more sample."""
+    """Update the peak meter with a sample."""
     return Peaks(
         torque=max(state.torque, abs(sample.torque)),
         pressure=max(state.pressure, sample.pressure_1, sample.pressure_2),
@@ -152,7 +152,7 @@ PEAKS = MeterKind("peaks", Peaks, start_peaks, update_peaks)
 
 
 class Work(NamedTuple):
-    """Torque [N m] and angle [rad] at the last sample, and work so far [J]."""
+    """State of the work meter: torque [N m] and angle [rad] at the last sample, work so far [J]."""
 
     torque: float
     angle: float
@@ -160,12 +160,12 @@ class Work(NamedTuple):
 
 
 def start_work(course: ReferenceSummary, sample: Sample) -> Work:
-    """Zero work at the first sample."""
+    """Start the work meter at the first sample."""
     return Work(sample.torque, sample.angle, 0.0)
 
 
 def update_work(state: Work, course: ReferenceSummary, sample: Sample) -> Work:
-    """Add the work of one interval by the trapezoidal rule over the angle."""
+    """Update the work meter with a sample, by the trapezoidal rule over the angle."""
     piece = 0.5 * (state.torque + sample.torque) * (sample.angle - state.angle)
     return Work(sample.torque, sample.angle, state.work + piece)
 
@@ -175,7 +175,7 @@ WORK = MeterKind("work", Work, start_work, update_work, of_motion=True)
 
 
 def ratio(above: Floats, below: Floats) -> Floats:
-    """Quotient; nan if the divisor is not positive."""
+    """Quotient of two arrays; nan unless the divisor is positive."""
     # nan where a recording has None: a column has no other word for it.
     found: Floats = above / choose(below > 0.0, below, math.nan)
     return found
@@ -194,7 +194,7 @@ def of_gas(supplied: Floats, work: Floats) -> Floats:
 _BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
 ENERGIES = ("supplied_enthalpy", "vented_enthalpy", "wall_heat", "gas_work", "gas_energy")
 WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
-"""Channels that only runs of a gas with an energy balance have."""
+"""Channels present only with an energy balance of the gas."""
 _EFFORT = ("torque", "angle", "supplied_mass")
 
 
@@ -206,7 +206,7 @@ def _of_gains(
     function: PlainFunction | None = None,
     meter: MeterKind = GAS,
 ) -> MetricKind:
-    """Metric of the increase of a total, or of a function of several increases."""
+    """Declare a metric of the increase of a total, or of a function of several increases."""
     compute = partial(gained, channels=channels, function=function)
     places = tuple(f"meters.{meter.name}.gained.{channel}" for channel in channels)
     return MetricKind(name, unit, summary, channels, compute, ReadAt(places, function), (meter,))

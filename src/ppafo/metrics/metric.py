@@ -1,4 +1,4 @@
-"""Declaration and value of a metric; the two parts of a task, ramp and subsequent hold."""
+"""Metric: declaration, value and readings from meters; ramp and hold of a reference."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -34,7 +34,7 @@ class Metric:
         return np.array(self.value, dtype)
 
     def __float__(self) -> float:
-        """Return the value in SI."""
+        """Return the SI value as a float."""
         return float(self.value)
 
     def in_unit(self, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
@@ -49,7 +49,7 @@ class Metrics(dict[str, Metric]):
     """Metrics by name; an unknown name raises DataError with the nearest name."""
 
     def __missing__(self, name: str) -> Metric:
-        """Raise DataError with the nearest name, as for a channel of a recording."""
+        """Raise DataError with the nearest metric name."""
         raise DataError(
             f"there is no metric '{name}'{nearest_name(name, self)}; available: {', '.join(self) or 'none'}"
         )
@@ -57,7 +57,7 @@ class Metrics(dict[str, Metric]):
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """Final meter states of runs without recording; every number is an array (runs,), or a float for one run.
+    """Final meter states of runs without recording; numbers are arrays (runs,), or floats for a single run.
 
     ``meters`` maps each meter's name to its final state. ``course`` is the summary of the reference, () if no meter
     needs one. ``interval`` is the time between two samples [s] and ``samples`` their number. ``traces`` maps channels
@@ -73,7 +73,7 @@ class Readings:
 
 @dataclass(frozen=True, slots=True)
 class ReadAt:
-    """Rule that reads a metric from meters: a number at a path such as ``meters.work.work``, or a function of several.
+    """Reading of a metric from meters: number at a path such as ``meters.work.work``, or a function of several.
 
     Declared as data, so that an exported library has one expression for the metric instead of a function.
     """
@@ -82,7 +82,7 @@ class ReadAt:
     function: PlainFunction | None = None
 
     def __call__(self, readings: Readings) -> Floats:
-        """Metric of runs without recording (runs,)."""
+        """Return the metric of runs without recording (runs,)."""
         numbers = []
         for place in self.places:
             number: Any = readings
@@ -94,25 +94,25 @@ class ReadAt:
 
 
 def less(number: Floats, other: Floats) -> Floats:
-    """Difference of two numbers of one unit (runs,)."""
+    """Difference of two numbers in the same unit (runs,)."""
     return number - other
 
 
 def mean_of(total: Floats, count: Floats) -> Floats:
-    """Sum divided by the number of summands, in the unit of the sum; nan without summands (runs,)."""
+    """Mean from a sum and a number of summands; nan without summands (runs,)."""
     # Both sides of a choice are computed, in the lanes too: the divisor is never 0.
     mean: Floats = choose(count > 0.0, total / larger(count, 1.0), math.nan)
     return mean
 
 
 def root_mean(squares: Floats, count: Floats) -> Floats:
-    """Square root of the mean of squares; nan without squares (runs,)."""
+    """Root mean square from a sum of squares and their number; nan without squares (runs,)."""
     found: Floats = root(mean_of(squares, count))
     return found
 
 
 def time_if_any(time: Floats) -> Floats:
-    """Time [s] of an event; nan for a negative time, which stands for no event."""
+    """Time of an event [s]; nan for a negative time, which means no event."""
     # The state of a run is floats alone, and a column has no other word for None.
     found: Floats = choose(time >= 0.0, time, math.nan)
     return found
@@ -120,7 +120,7 @@ def time_if_any(time: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class MetricKind:
-    """Metric in the catalogue: required channels, and pure functions that give the value.
+    """Metric in the catalogue: unit, required channels, and pure functions that compute the value.
 
     ``compute(recording)`` gives the value from a recording with the ``channels``, or None if the metric does not apply,
     such as an error on the hold without a hold. ``read(readings)`` gives the values of many runs (runs,), nan instead
@@ -147,7 +147,7 @@ _WAY = "the largest way of the reference from the start"
 
 
 def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str], str]) -> tuple[MetricKind, ...]:
-    """Return metrics of a torque reference, and the same metrics for each other controlled quantity, in its unit.
+    """Return metrics of a torque reference, and their counterparts for every other controlled quantity.
 
     ``rename(name, controlled)`` gives the names of the latter.
     """
@@ -168,17 +168,17 @@ def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str
 
 
 def controlled_in(recording: Recording) -> ControlledQuantity | None:
-    """Return the quantity that the reference in a recording prescribes; None without a reference."""
+    """Return the controlled quantity of the reference in a recording; None without a reference."""
     return next((kind for kind in CONTROLLED.values() if kind.reference in recording), None)
 
 
 def reference_of(recording: Recording) -> Floats:
-    """Return the reference in a recording, which must have one."""
+    """Return the reference in a recording [SI unit of the controlled quantity]."""
     return next(recording[kind.reference] for kind in CONTROLLED.values() if kind.reference in recording)
 
 
 def followed(recording: Recording) -> tuple[Floats, Floats]:
-    """Return the reference in a recording, which must have one, and the controlled quantity."""
+    """Return reference and controlled quantity of a recording with a reference [SI]."""
     channel = next(kind.name for kind in CONTROLLED.values() if kind.reference in recording)
     return reference_of(recording), recording[channel]
 
@@ -192,7 +192,7 @@ def extent(recording: Recording) -> float:
 
 
 def hold_start(recording: Recording) -> int | None:
-    """Return the first sample of the final hold of the reference; None if the reference does not rest at the end."""
+    """Return the first sample of the final hold of a reference; None without a hold."""
     reference, tolerance = reference_of(recording), SAME_LEVEL * extent(recording)
     away = np.flatnonzero(np.abs(reference - reference[-1]) > tolerance)
     first = int(away[-1]) + 1 if away.size else 0
@@ -201,7 +201,7 @@ def hold_start(recording: Recording) -> int | None:
 
 
 def ramp(recording: Recording) -> slice | None:
-    """Return the samples up to the start of the hold; None without a ramp or without a hold."""
+    """Return the samples of the ramp, up to the start of the hold; None without a ramp or a hold."""
     # With the first sample of the hold, so that ramp and hold together are the whole task.
     start = hold_start(recording)
     return slice(start + 1) if start else None
@@ -214,7 +214,7 @@ def hold(recording: Recording) -> slice | None:
 
 
 def spans(readings: Readings) -> tuple[Floats, Floats]:
-    """Number of samples before the hold and of intervals on it (runs,), for runs without recording; nan if absent."""
+    """Return the number of samples before the hold, and of intervals in the hold (runs,); nan if absent."""
     # Read at the end of a run, where the course has seen the whole reference.
     start = readings.course.hold_start
     length = readings.samples - 1 - start

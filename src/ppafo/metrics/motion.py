@@ -1,4 +1,4 @@
-"""Metrics of the vane's motion."""
+"""Metrics of the motion of the vane: range, speed, travel times, foot errors."""
 
 from functools import partial
 from typing import NamedTuple
@@ -11,12 +11,12 @@ from ppafo.signals import Recording
 from ppafo.signals.meter import LED_SHANK, MeterKind, ReferenceSummary, Sample
 
 TRAVEL_FRACTION = 0.01
-"""Fraction of the travel after which a move has started, and remaining fraction at which it has arrived."""
+"""Fraction of the travel [-] after which a move has started, and remaining fraction at arrival."""
 
 # Travel [rad] below which nothing has moved: fractions of it would be rounding over rounding.
 _STANDSTILL = 1.0e-6
 _RETURNED = 0.1
-"""Smallest distance between start and end of a move, as a fraction of the range of the angle."""
+"""Least distance between start and end of a move, relative to the angle range [-]."""
 
 
 def angle_range(recording: Recording) -> float:
@@ -30,9 +30,9 @@ def largest_speed(recording: Recording) -> float:
 
 
 def time_of_fraction(recording: Recording, fraction: float) -> float | None:
-    """Time [s] at which a fraction of the travel from first to last angle is first reached; None without a move.
+    """Time at which a fraction of the travel is first reached [s]; None without a move.
 
-    A motion that ends near its start is no move.
+    A motion that ends near its start does not count as a move.
     """
     travelled = recording["angle"] - recording["angle"][0]
     if abs(travelled[-1]) < max(_STANDSTILL, _RETURNED * float(np.ptp(travelled))):
@@ -44,7 +44,7 @@ def time_of_fraction(recording: Recording, fraction: float) -> float | None:
 
 
 class Extremes(NamedTuple):
-    """Smallest and largest angle [rad], largest absolute angular velocity [rad/s]."""
+    """State of the motion meter: smallest and largest angle [rad], largest absolute angular velocity [rad/s]."""
 
     smallest: float
     largest: float
@@ -52,12 +52,12 @@ class Extremes(NamedTuple):
 
 
 def start_extremes(course: ReferenceSummary, sample: Sample) -> Extremes:
-    """Angle and speed of the first sample."""
+    """Start the motion meter at the first sample."""
     return Extremes(sample.angle, sample.angle, abs(sample.angular_velocity))
 
 
 def update_extremes(state: Extremes, course: ReferenceSummary, sample: Sample) -> Extremes:
-    """Extremes including the next sample."""
+    """Update the motion meter with a sample."""
     return Extremes(
         smallest=min(state.smallest, sample.angle),
         largest=max(state.largest, sample.angle),
@@ -69,7 +69,7 @@ EXTREMES = MeterKind("extremes", Extremes, start_extremes, update_extremes, of_m
 
 
 def read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
-    """Time [s] (runs,) at which a fraction of the travel is reached, from traces (samples, runs); nan if at rest."""
+    """Time at which a fraction of the travel is reached [s] (runs,), from traces (samples, runs); nan at rest."""
     travelled = readings.traces["angle"] - readings.traces["angle"][0]
     moves = np.abs(travelled[-1]) >= np.maximum(_STANDSTILL, _RETURNED * np.ptp(travelled, axis=0))
     done = travelled / np.where(moves, travelled[-1], np.nan)
@@ -93,7 +93,7 @@ def toe_clearance_error(recording: Recording) -> float:
 
 
 class _FootError(NamedTuple):
-    """Squared foot angle error at the last sample [rad^2], its trapezoidal sum [rad^2], lowest toe difference [m]."""
+    """State of the foot meter: last squared angle error [rad^2], its trapezoidal sum, lowest toe difference [m]."""
 
     last: float
     total: float
@@ -101,13 +101,13 @@ class _FootError(NamedTuple):
 
 
 def start_foot_error(course: ReferenceSummary, sample: Sample) -> _FootError:
-    """Foot error of the first sample."""
+    """Start the foot meter at the first sample."""
     error = sample.foot.angle - sample.foot.measured_angle
     return _FootError(error * error, 0.0, sample.foot.toe_difference)
 
 
 def update_foot_error(state: _FootError, course: ReferenceSummary, sample: Sample) -> _FootError:
-    """Foot error after one more interval."""
+    """Update the foot meter with a sample."""
     error = sample.foot.angle - sample.foot.measured_angle
     square = error * error
     return _FootError(square, state.total + 0.5 * (state.last + square), min(state.lowest, sample.foot.toe_difference))
@@ -120,12 +120,12 @@ FOOT_ERROR = MeterKind("foot_error", _FootError, start_foot_error, update_foot_e
 
 
 def read_foot_angle_error(readings: Readings) -> Floats:
-    """Metric ``foot_angle_error`` [rad] of runs without recording."""
+    """Metric ``foot_angle_error`` of runs without recording [rad]."""
     return root(readings.meters[FOOT_ERROR.name].total / (readings.samples - 1))
 
 
 def _time(name: str, fraction: float, summary: str) -> MetricKind:
-    """Metric of the time at which a fraction of the move is reached, from complete traces."""
+    """Declare a metric of the time at which a fraction of the travel is reached."""
     compute = partial(time_of_fraction, fraction=fraction)
     read = partial(read_time_of_fraction, fraction=fraction)
     return MetricKind(name, "s", summary, ("angle",), compute, read, traced=("angle",))

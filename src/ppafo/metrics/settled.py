@@ -1,4 +1,4 @@
-"""Settled part of runs without recording: the numbers from which the tracking verdict is derived.
+"""Settled part of a run without recording: numbers for the tracking verdict.
 
 The settled part is the second half of the hold, or of the run if the reference rests for less than a tenth of the run.
 These numbers are for verdicts only: no table and no study lists them.
@@ -16,11 +16,11 @@ from ppafo.model.columns import larger
 from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 SHORTEST_HOLD = 0.1
-"""Shortest hold that is judged as a hold, as a fraction of the run [-]."""
+"""Shortest hold accepted for a verdict, as a fraction of the run [-]."""
 
 
 class _SettledSums(NamedTuple):
-    """Sums over the samples of the settled part so far, and extremes of the controlled quantity over the run.
+    """State of the settled meter: sums and extremes of error, reference, angle and controlled quantity.
 
     ``squares`` is the sum of squared errors, ``total`` the sum of errors, ``taken`` the number of samples,
     ``reference_squares`` and ``reference_total`` the sums for the reference less ``begun``, ``swing`` the reversal
@@ -28,7 +28,7 @@ class _SettledSums(NamedTuple):
     the command in the last half of the settled part, and ``lowest_angle`` and ``highest_angle`` the extremes of the
     angle [rad]. ``begun`` is the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is
     1 once the value has been at or below the reference, and ``top`` the highest value since then; ``met_downwards`` and
-    ``bottom`` are the opposite.
+    ``bottom`` are the reverse.
     """
 
     squares: float
@@ -52,7 +52,7 @@ class _SettledSums(NamedTuple):
 
 
 def start_settled(course: ReferenceSummary, sample: Sample) -> _SettledSums:
-    """Sums with the first sample only."""
+    """Start the settled meter at the first sample."""
     value = sample.value
     error = value - sample.reference
     return _SettledSums(
@@ -78,7 +78,7 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> _SettledSums:
 
 
 def update_settled(state: _SettledSums, course: ReferenceSummary, sample: Sample) -> _SettledSums:
-    """Sums with one more sample; they restart at half of the run and at half of the hold.
+    """Update the settled meter with a sample; its sums restart at half of the run and at half of the hold.
 
     Reversals of the command restart at three quarters, too: a loop that has come to rest by then does not oscillate.
     """
@@ -127,7 +127,7 @@ def update_settled(state: _SettledSums, course: ReferenceSummary, sample: Sample
 
 
 def is_long_enough(hold_start: float, samples: float) -> bool:
-    """Tell whether the hold of a reference, from sample ``hold_start`` on, is long enough for a verdict."""
+    """Return whether the hold of a reference, from sample ``hold_start`` on, is long enough for a verdict."""
     length = samples - 1.0 - hold_start
     return length >= 1.0 and length >= SHORTEST_HOLD * (samples - 1.0)
 
@@ -136,13 +136,13 @@ SETTLED = MeterKind("settled", _SettledSums, start_settled, update_settled, True
 
 
 def farther(highest: Floats, lowest: Floats) -> Floats:
-    """Largest absolute value between two extremes, of which ``highest`` is above 0 or ``lowest`` below."""
+    """Largest magnitude of an error, given its extremes ``highest`` and ``lowest``."""
     found: Floats = larger(highest, -lowest)
     return found
 
 
 def deviation(squares: Floats, total: Floats, count: Floats) -> Floats:
-    """Standard deviation from the sum of squares, the sum and the number of samples."""
+    """Standard deviation from sum of squares, sum and number of samples."""
     return np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0))
 
 
@@ -181,4 +181,4 @@ SETTLED_METRICS = {
     f"settled_{name}": MetricKind(f"settled_{name}", "-", "for verdicts", (), None, read, (SETTLED,))
     for name, read in _NUMBERS.items()
 }
-"""Numbers of the settled part by name, in SI of the controlled quantity; kept out of METRICS and its lists."""
+"""Metrics of the settled part by name [SI unit of the controlled quantity], used for verdicts only."""

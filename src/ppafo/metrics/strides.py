@@ -1,4 +1,4 @@
-"""Metrics of a walk stride by stride, without a recording: one meter, updated once per sample.
+"""Metrics of a walk by strides, from a meter without a recording.
 
 ``walking/strides.py`` computes the same from a recording with its mean curves; tests compare the two.
 """
@@ -12,14 +12,14 @@ from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals.meter import REQUESTED, STEADY, WALK, MeterKind, ReferenceSummary, Sample, StrideSample
 
 SETTLING = 2
-"""Number of first strides excluded from averages, in which the controller learns the stride time."""
+"""Number of initial strides excluded from averages, while the controller learns the stride time."""
 NOT_YET = -1.0
-"""Placeholder time [s] for an event that has not occurred."""
+"""Time of an event that has not occurred [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class _StrideQuantity:
-    """Quantity per stride: unit, meaning, and path of the running total whose increase it is."""
+    """Quantity per stride: unit, meaning, and path of its running total."""
 
     unit: str
     summary: str
@@ -42,7 +42,7 @@ PER_STRIDE: dict[str, _StrideQuantity] = {
 
 
 class _StrideTotals(NamedTuple):
-    """Gas from the supply [kg], works of T_ex [J], toe clearances [m] and number of toe landings, since some instant.
+    """Running totals of a walk: supplied gas [kg], work of T_ex [J], toe clearances [m], toe landings.
 
     Fields have the names of ``PER_STRIDE``.
     """
@@ -55,9 +55,9 @@ class _StrideTotals(NamedTuple):
 
 
 class _CurrentStride(NamedTuple):
-    """Stride in progress.
+    """Sums over the stride in progress.
 
-    ``is_whole`` is 1 for a stride that started with a heel strike; the first one of a walk did not. ``on_toes`` is 1
+    ``is_whole`` is 1 for a stride that started with a heel strike; the first stride of a walk did not. ``on_toes`` is 1
     for a stride that started with a landing on the toes. ``at_strike`` are the totals since the start of the walk at
     the heel strike, including such a landing. ``lacked_help`` is 1 after a sample with reduced assistance.
     ``squared_errors`` [(N m)^2] is the sum of squared torque errors over ``push_off_samples`` samples in push-off.
@@ -72,7 +72,7 @@ class _CurrentStride(NamedTuple):
 
 
 class _EndedStrides(NamedTuple):
-    """Numbers of completed strides.
+    """Sums over completed strides.
 
     ``whole`` counts all but a partial first one, ``helped`` those with assistance throughout, and ``averaged`` the
     helped ones without the first strides of the walk. ``sums`` are the increases of the totals, ``squared_errors`` the
@@ -89,7 +89,7 @@ class _EndedStrides(NamedTuple):
 
 
 class StrideMeter(NamedTuple):
-    """State of a walk up to a sample: number of heel strikes, supplied gas [kg] at first and at present, strides.
+    """State of the stride meter: heel strikes, supplied gas at first and now [kg], current and ended strides.
 
     ``safe_time`` [s] is the time of the first sample with reduced assistance, ``NOT_YET`` if there was none.
     """
@@ -103,7 +103,7 @@ class StrideMeter(NamedTuple):
 
 
 def totals_at(sample: StrideSample) -> _StrideTotals:
-    """Totals since the start of the walk at a sample."""
+    """Return the running totals of a walk at a sample."""
     return _StrideTotals(
         gas=sample.supplied_mass,
         positive_push_off_work=sample.positive_push_off_work,
@@ -116,10 +116,10 @@ def totals_at(sample: StrideSample) -> _StrideTotals:
 def sums_with_stride(
     sums: _StrideTotals, at_strike: _StrideTotals, at_end: _StrideTotals, on_toes: float
 ) -> _StrideTotals:
-    """Sums over strides including one more, given the totals at its start and its end.
+    """Return the sums over strides with another stride added, from the totals at its start and end.
 
-    ``on_toes`` is 1 if the stride started on the toes: that landing belongs to this stride, the one at its end to the
-    next.
+    ``on_toes`` is 1 if the stride started on the toes: this landing belongs to the stride, a landing at its end to the
+    next stride.
     """
     # Field by field: compiled code has no loop over a row.
     return _StrideTotals(
@@ -133,7 +133,7 @@ def sums_with_stride(
 
 
 def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> _CurrentStride:
-    """Stride that starts at a sample, with empty sums."""
+    """Return a new stride that starts at a sample, with zero sums."""
     return _CurrentStride(
         is_whole=is_whole,
         on_toes=on_toes,
@@ -177,7 +177,7 @@ def _update(strides: StrideMeter, _course: ReferenceSummary, sample: Sample) -> 
 
 
 def stride_with_sample(stride: _CurrentStride, sample: Sample) -> _CurrentStride:
-    """Current stride after one more sample."""
+    """Update the current stride with a sample."""
     error = sample.reference - sample.torque
     pushes = sample.stride.phase == PUSH_OFF
     return stride._replace(
@@ -188,7 +188,7 @@ def stride_with_sample(stride: _CurrentStride, sample: Sample) -> _CurrentStride
 
 
 def ended_with_stride(ended: _EndedStrides, stride: _CurrentStride, sample: Sample) -> _EndedStrides:
-    """Completed strides including the one that ends at ``sample``, the first sample after a heel strike."""
+    """Add a stride to the completed strides; ``sample`` is the first sample after its heel strike."""
     # A stride with less help in a part of it is no example; in the first ones the controller still learns their time.
     is_helped = stride.is_whole > 0.5 and stride.lacked_help < 0.5
     is_averaged = is_helped and ended.whole >= float(SETTLING)
@@ -208,7 +208,7 @@ METER = MeterKind("strides", StrideMeter, _start, _update)
 
 
 def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats], *needs: str) -> MetricKind:
-    """Metric of a walk; ``needs`` are its further requirements."""
+    """Declare a metric of a walk; ``needs`` are its additional requirements."""
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
 
 
@@ -265,4 +265,4 @@ METRICS = (
         ReadAt(("meters.strides.safe_time",), time_if_any),
     ),
 )
-"""Metrics of a walk that need neither a mean curve nor the healthy gait."""
+"""Metrics of a walk computed without mean curve and healthy gait."""

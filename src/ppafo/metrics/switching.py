@@ -33,10 +33,10 @@ from ppafo.signals import Recording
 from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 OSCILLATION_THRESHOLD = 0.05
-"""Smallest reversal that counts as an oscillation, as a fraction of the reference's extent."""
+"""Smallest reversal that counts as oscillation, as a fraction of the extent of the reference [-]."""
 
 SHUT = 1.0e-6
-"""Command [-] up to which a valve counts as off or shut, above rounding error."""
+"""Largest command of a valve that is off [-], above rounding error."""
 
 _NEEDED = ("torque", "reference")
 
@@ -50,9 +50,10 @@ def switchings(recording: Recording) -> float:
 
 
 def reversals(values: Floats, swing: float) -> int:
-    """Return the number of times that a signal turns back by more than ``swing`` (its own unit) from its last extreme.
+    """Return the number of reversals of a signal by more than ``swing`` [unit of the signal].
 
-    Smaller fluctuations, such as noise, do not count, regardless of their number. A monotone signal has no reversal.
+    A reversal is a turn by more than ``swing`` from the last extreme; smaller fluctuations never count. A monotone
+    signal has no reversal.
     """
     # No way yet: the first swing, up or down, is no reversal.
     count, direction = 0, 0
@@ -74,7 +75,7 @@ def reversals(values: Floats, swing: float) -> int:
 
 
 def oscillations(recording: Recording, part_of: Callable[[Recording], slice | None]) -> float | None:
-    """Number of reversals by more than 5 % of the reference's extent in a part of a task; None without that part."""
+    """Number of reversals above 5 % of the reference extent in a part of a task; None without that part."""
     part, largest = part_of(recording), extent(recording)
     # Without a reference there is nothing that the smallest swing could be a fraction of.
     if part is None or largest == 0.0:
@@ -83,7 +84,7 @@ def oscillations(recording: Recording, part_of: Callable[[Recording], slice | No
 
 
 class Switchings(NamedTuple):
-    """Positions of valves A and B (1 for on), and number of changes of both so far."""
+    """State of the switching meter: positions of valves A and B (1 for on), number of changes."""
 
     position_a: float
     position_b: float
@@ -91,18 +92,18 @@ class Switchings(NamedTuple):
 
 
 def ordered_positions(command: float) -> tuple[float, float]:
-    """Commanded positions [-] of valves A and B: 1 on, 0 off."""
+    """Commanded positions of valves A and B [-]: 1 on, 0 off."""
     return (1.0 if command > SHUT and command < VENTS_ABOVE else 0.0), (1.0 if command < -SHUT else 0.0)
 
 
 def start_switchings(course: ReferenceSummary, sample: Sample) -> Switchings:
-    """Zero changes at the first sample."""
+    """Start the switching meter at the first sample."""
     position_a, position_b = ordered_positions(sample.command)
     return Switchings(position_a, position_b, 0.0)
 
 
 def update_switchings(state: Switchings, course: ReferenceSummary, sample: Sample) -> Switchings:
-    """Count each valve whose commanded position changes."""
+    """Update the switching meter: count each valve whose commanded position changes."""
     position_a, position_b = ordered_positions(sample.command)
     changes = abs(position_a - state.position_a) + abs(position_b - state.position_b)
     return Switchings(position_a, position_b, state.changes + changes)
@@ -112,7 +113,7 @@ SWITCHINGS = MeterKind("switchings", Switchings, start_switchings, update_switch
 
 
 class Swing(NamedTuple):
-    """State of the count of reversals, updated sample by sample.
+    """State of a reversal counter, updated sample by sample.
 
     ``play`` follows the signal with a backlash of one swing: it stays between the signal and one swing below, and moves
     only if the signal goes on or turns back by more. ``turns`` is positive while the signal rises and negative while it
@@ -129,7 +130,7 @@ UNDECIDED = -0.5
 
 
 def next_swing(state: Swing, value: float, swing: float) -> Swing:
-    """State after one more value, in the unit of ``swing``."""
+    """Update a reversal counter with a value; ``swing`` is the smallest reversal, in the unit of the value."""
     # The sign of ``turns`` is the way and its size counts: a turn changes the one and adds 1 to the other.
     play = min(max(state.play, value - swing), value)
     turns_back = (play - state.play) * state.turns < 0.0
@@ -140,25 +141,25 @@ def next_swing(state: Swing, value: float, swing: float) -> Swing:
 
 
 def count_of(turns: Floats) -> Floats:
-    """Number of reversals from ``Swing.turns`` (runs,)."""
+    """Number of reversals (runs,) from ``Swing.turns``."""
     return truncated(larger(abs(turns) - 1.0, 0.0))
 
 
 class _Oscillations(NamedTuple):
-    """Reversal state of the ramp, then of the hold; ``turns_on_ramp`` is the final ``turns`` of the ramp."""
+    """State of the oscillation meter: reversals of ramp, then hold; ``turns_on_ramp`` is final for the ramp."""
 
     swing: Swing
     turns_on_ramp: float
 
 
 def start_oscillations(course: ReferenceSummary, sample: Sample) -> _Oscillations:
-    """Zero reversals at the first sample."""
+    """Start the oscillation meter at the first sample."""
     value = sample.value
     return _Oscillations(Swing(value, UNDECIDED, value), UNDECIDED)
 
 
 def update_oscillations(state: _Oscillations, course: ReferenceSummary, sample: Sample) -> _Oscillations:
-    """State after one more sample; the first sample of the hold is also the last one of the ramp."""
+    """Update the oscillation meter; the first sample of the hold is also the last of the ramp."""
     value = sample.value
     swing = next_swing(state.swing, value, OSCILLATION_THRESHOLD * course.largest)
     anew = course.hold_start == sample.number
@@ -170,17 +171,17 @@ OSCILLATIONS = MeterKind("oscillations", _Oscillations, start_oscillations, upda
 
 
 def read_oscillations_ramp(readings: Readings) -> Floats:
-    """Metric ``oscillations_ramp``, the number of reversals on the ramp, of runs without recording."""
+    """Metric ``oscillations_ramp`` of runs without recording: number of reversals on the ramp."""
     return _where_swinging(readings, spans(readings)[0], count_of(readings.meters[OSCILLATIONS.name].turns_on_ramp))
 
 
 def read_oscillations_hold(readings: Readings) -> Floats:
-    """Metric ``oscillations_hold``, the number of reversals on the hold, of runs without recording."""
+    """Metric ``oscillations_hold`` of runs without recording: number of reversals on the hold."""
     return _where_swinging(readings, spans(readings)[1], count_of(readings.meters[OSCILLATIONS.name].swing.turns))
 
 
 def _where_swinging(readings: Readings, span: Floats, count: Floats) -> Floats:
-    """Number of reversals; nan without that part of the task, or for a reference that is always 0."""
+    """Number of reversals; nan if that part of the task is absent, or the reference is always 0."""
     found: Floats = choose(span > 0.0, choose(readings.course.largest != 0.0, count, math.nan), math.nan)
     return found
 

@@ -1,4 +1,4 @@
-"""Tracking errors of the controlled quantity against its reference."""
+"""Metrics of the tracking error between controlled quantity and reference."""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,19 +17,19 @@ _NEEDED = ("torque", "reference")
 ONE_INSTANT = frozenset(
     f"final_{name}error" for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
 )
-"""Names of metrics of a single instant, which are arbitrary if the controlled quantity oscillates."""
+"""Metrics of a single instant, which are arbitrary while the controlled quantity oscillates."""
 SUSTAINED = 4
-"""Number of reversals on the hold from which a loop oscillates; a settling loop has one or two."""
+"""Number of reversals on the hold from which a loop counts as oscillating; settling takes one or two."""
 
 
 def error_of(recording: Recording) -> Floats:
-    """Return reference minus controlled quantity, in the unit of the reference."""
+    """Return the tracking error, reference minus controlled quantity [unit of the reference]."""
     reference, value = followed(recording)
     return reference - value
 
 
 def rms_error(recording: Recording, part_of: Callable[[Recording], slice | None] | None = None) -> float | None:
-    """RMS error over time in all of a recording or a part of it; None without that part.
+    """RMS tracking error over time, in a recording or a part of it; None without that part.
 
     The integral is by the trapezoidal rule, valid for any sampling.
     """
@@ -42,17 +42,17 @@ def rms_error(recording: Recording, part_of: Callable[[Recording], slice | None]
 
 
 def peak_error(recording: Recording) -> float:
-    """Largest absolute error, in the unit of the reference."""
+    """Largest absolute tracking error [unit of the reference]."""
     return float(np.max(np.abs(error_of(recording))))
 
 
 def final_error(recording: Recording) -> float:
-    """Absolute error at the last sample, in the unit of the reference."""
+    """Absolute tracking error at the last sample [unit of the reference]."""
     return float(abs(error_of(recording)[-1]))
 
 
 class _SquaredError(NamedTuple):
-    """Squared error at the last sample, and its trapezoidal sums before the hold and on the hold, in intervals."""
+    """State of the squared-error meter: last squared error, trapezoidal sums before and on the hold, in intervals."""
 
     last: float
     before_hold: float
@@ -60,13 +60,13 @@ class _SquaredError(NamedTuple):
 
 
 def start_squared_error(course: ReferenceSummary, sample: Sample) -> _SquaredError:
-    """Squared error of the first sample."""
+    """Start the squared-error meter at the first sample."""
     error = sample.reference - sample.value
     return _SquaredError(error * error, 0.0, 0.0)
 
 
 def update_squared_error(state: _SquaredError, course: ReferenceSummary, sample: Sample) -> _SquaredError:
-    """Sums including one more interval."""
+    """Update the squared-error meter with a sample."""
     error = sample.reference - sample.value
     square = error * error
     # In intervals: all have one length, which cancels where the sum is read.
@@ -82,20 +82,20 @@ SQUARED_ERROR = MeterKind("squared_error", _SquaredError, start_squared_error, u
 
 
 class _AbsoluteError(NamedTuple):
-    """Largest absolute error so far, and absolute error at the last sample."""
+    """State of the absolute-error meter: largest and last absolute error."""
 
     largest: float
     last: float
 
 
 def start_absolute_error(course: ReferenceSummary, sample: Sample) -> _AbsoluteError:
-    """Absolute error of the first sample."""
+    """Start the absolute-error meter at the first sample."""
     error = abs(sample.reference - sample.value)
     return _AbsoluteError(error, error)
 
 
 def update_absolute_error(state: _AbsoluteError, course: ReferenceSummary, sample: Sample) -> _AbsoluteError:
-    """Absolute errors including the next sample."""
+    """Update the absolute-error meter with a sample."""
     error = abs(sample.reference - sample.value)
     return _AbsoluteError(max(state.largest, error), error)
 
@@ -104,19 +104,19 @@ ABSOLUTE_ERROR = MeterKind("absolute_error", _AbsoluteError, start_absolute_erro
 
 
 def read_rms_error(readings: Readings) -> Floats:
-    """Metric ``rms_error`` [N m] of runs without recording."""
+    """Metric ``rms_error`` of runs without recording [N m]."""
     squares = readings.meters[SQUARED_ERROR.name]
     return root((squares.before_hold + squares.on_hold) / (readings.samples - 1))
 
 
 def read_rms_error_ramp(readings: Readings) -> Floats:
-    """Metric ``rms_error_ramp`` [N m], before the hold, of runs without recording."""
+    """Metric ``rms_error_ramp`` of runs without recording [N m], before the hold."""
     start, _ = spans(readings)
     return root(readings.meters[SQUARED_ERROR.name].before_hold / start)
 
 
 def read_rms_error_hold(readings: Readings) -> Floats:
-    """Metric ``rms_error_hold`` [N m] of runs without recording."""
+    """Metric ``rms_error_hold`` of runs without recording [N m]."""
     _, length = spans(readings)
     return root(readings.meters[SQUARED_ERROR.name].on_hold / length)
 
@@ -160,4 +160,4 @@ _OF_TORQUE = (
 METRICS = for_each_reference(_OF_TORQUE, lambda name, controlled: name.replace("error", f"{controlled}_error"))
 
 TRACKING = tuple(kind.name for kind in METRICS)
-"""Names of the error metrics, for each controlled quantity."""
+"""Names of the tracking error metrics, for all controlled quantities."""

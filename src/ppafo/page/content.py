@@ -1,4 +1,4 @@
-"""Content of a page on its scenarios: settings with units, limits and sliders, relations, channels and metrics."""
+"""Content of a page: settings with units, limits and sliders, relations, channels and metrics."""
 
 import contextlib
 import json
@@ -53,20 +53,20 @@ _UNITS: dict[str, tuple[str, ...]] = {
     "kg m^2/s": ("g m^2/s", "kg m^2/s", "N m s"),
     "": ("", "percent"),
 }
-"""Units accepted for typed values, in addition to the display unit and the SI unit."""
+"""Units accepted for typed values, besides the display unit and the SI unit."""
 _GAUGES = ("psi_g", "kPa_g", "bar_g", "Pa_g")
 _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
 @cache
 def words() -> dict[str, Any]:
-    """Return the texts on claims, sliders and questions of pages, from ``words.toml``."""
+    """Load the texts of a page on claims, sliders and questions from ``words.toml``."""
     return tomllib.loads(files("ppafo.page").joinpath("words.toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True, slots=True)
 class PageSimulation:
-    """Scenario or walk with the module that simulates it; ``label`` distinguishes it from others in its tab."""
+    """Scenario or walk with its WebAssembly module; ``label`` distinguishes it within a tab."""
 
     scenario: Scenario
     module: WasmModule
@@ -74,7 +74,7 @@ class PageSimulation:
 
 
 def program_content(simulated: PageSimulation, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
-    """Return the page's data on a scenario; ``module`` is the id of the HTML element with its program."""
+    """Return the page data of a scenario; ``module`` is the id of the HTML element with its program."""
     described, joint = simulated.module.description, simulated.scenario.device.joint
     gauge = _gauge_texts(simulated.scenario, described["settings"])
     keys = {setting["key"] for setting in described["settings"]}
@@ -132,11 +132,11 @@ _SUSTAINED = {
     "lowered": "supply.dorsiflexion_pressure",
     "zero": ATMOSPHERE_PATH,
 }
-"""Settings that determine the static torques reachable with the supply pressures."""
+"""Settings that determine the static torque range at the supply pressures."""
 
 
 def usual_values(scenario: Scenario) -> dict[str, float]:
-    """Return the initial changes of a scenario on a page as SI numbers by key; all of them are times [s]."""
+    """Return the initial changes of a scenario on a page, as times [s] by key."""
     return {key: parse_quantity(text, "s") for key, text in usual_changes(scenario).items()}
 
 
@@ -147,7 +147,7 @@ def page_content(
     programs: Sequence[Mapping[str, Any]],
     joint: str = ANKLE.name,
 ) -> dict[str, Any]:
-    """Return all data of a page except its modules; ``joint`` is the joint in the titles of its plots."""
+    """Return all page data except modules; ``joint`` is the joint in plot titles."""
     shown = {
         (entry["unit"], entry["shown"])
         for program in programs
@@ -257,7 +257,7 @@ def _setting(
 
 
 def _bare(unit: str) -> str:
-    """Return a unit as typed by the user; empty for a plain number."""
+    """Return a display unit as typed by the user; empty for a plain number."""
     return "" if unit == "1" else unit
 
 
@@ -273,7 +273,7 @@ def _shown(entry: Mapping[str, Any], joint: JointNames) -> dict[str, str]:
 
 
 def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
-    """Return settings given as gauge pressures, as texts; their absolute values follow the atmosphere."""
+    """Return the settings given as gauge pressures, as texts by key, since absolute values follow the atmosphere."""
     following = {entry["key"] for entry in settings if entry["follows"]}
     gaps = {
         path: link.gap
@@ -295,5 +295,5 @@ def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> d
 
 
 def _typed(unit: str, si: str) -> str:
-    """Return a unit as typed by the user; the displayed unit of a pressure difference lacks its suffix."""
+    """Return the typed form of a display unit, with the suffix of a pressure difference."""
     return f"{unit}_d" if si == _DIFFERENCE and not unit.endswith("_d") else unit

@@ -40,16 +40,16 @@ _PAGE = """<!DOCTYPE html>
 SCRIPT, CONTENT = "workbench-script", "workbench-content"
 _MARK = b'content="ppafo workbench"'
 _MARKED = 2000
-"""Length [bytes] of the start of a page that contains its generator mark."""
+"""Length of the start of a page that contains its generator mark [bytes]."""
 
 
 def bundled(name: str) -> str:
-    """Return a script (``loader.js``, ``page.js``) or ``page.css``, built from ``page/`` of the repository."""
+    """Read a bundled script (``loader.js``, ``page.js``) or ``page.css``, built from ``page/`` of the repository."""
     return files("ppafo.page").joinpath("bundle", name).read_text(encoding="utf-8").strip()
 
 
 def is_page(path: Path) -> bool:
-    """Return True if a file is a page of this program and may be overwritten."""
+    """Return whether a file is a page of this program, which may be overwritten."""
     try:
         # A pipe would be waited for.
         if not path.is_file():
@@ -61,7 +61,7 @@ def is_page(path: Path) -> bool:
 
 
 def page_of(title: str, content: Mapping[str, Any], modules: Mapping[str, str], still: str) -> bytes:
-    """Return a page; ``modules`` maps names used in the content to packed programs.
+    """Return the HTML of a page; ``modules`` maps names in the content to packed programs.
 
     ``still`` is an SVG picture for browsers without scripts.
     """
@@ -74,7 +74,7 @@ def page_of(title: str, content: Mapping[str, Any], modules: Mapping[str, str], 
 
 
 def block_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> tuple[str, str]:
-    """Return an HTML block to embed (container, data, style and script), and the content security policy of its page.
+    """Return an HTML block to embed (container, data, style, script), and the security policy for its page.
 
     The policy allows this script and inline styles, and no network access.
     """
@@ -85,23 +85,23 @@ def block_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> tuple[st
 
 
 def data_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> str:
-    """Return the HTML elements with script, content and programs: compressed, in base 85."""
+    """Return the HTML elements of script, content and programs, compressed in base 85."""
     text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
     texts = {SCRIPT: packed_once(bundled("page.js").encode()), CONTENT: packed(text.encode()), **modules}
     return "\n".join(f'<script type="text/plain" id="{escape(name)}">{text}</script>' for name, text in texts.items())
 
 
 def digest(text: str) -> str:
-    """Return the SHA-256 of a script or style in the form used by a content security policy."""
+    """Return the SHA-256 of a script or style in the form of a content security policy."""
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
 
 
 def packed_once(content: bytes) -> str:
-    """Return compressed base-85 text of content shared by many pages; cached on disk."""
+    """Compress content shared by many pages to base-85 text, cached on disk."""
     return kept_bytes("packed", hashlib.sha256(content).hexdigest(), lambda: packed(content).encode()).decode()
 
 
 def packed(content: bytes) -> str:
-    """Return bytes compressed in base 85; such a text cannot end the HTML element that contains it."""
+    """Compress bytes to base-85 text, which cannot end its HTML element."""
     # Without the time of packing: the same content gives the same page.
     return base64.b85encode(gzip.compress(content, 9, mtime=0)).decode("ascii")

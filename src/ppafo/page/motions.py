@@ -1,4 +1,4 @@
-"""Presentation of scenarios and walks on a page: tab title, and limits of settings that only files declare."""
+"""Scenarios and walks on a page: tab title, initial changes, and limits declared only in files."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -10,11 +10,11 @@ from ppafo.simulation.motion_kind import WALK
 from ppafo.simulation.scenario import Scenario, vane_motion
 
 _WALKED = 6
-"""Initial duration [s] of a walk on a page: five strides."""
+"""Initial duration of a walk on a page [s]."""
 
 
 def is_walk(scenario: Scenario) -> bool:
-    """Return True for a walk."""
+    """Return whether a scenario is a walk."""
     return scenario.motion.motion_kind.layout == WALK
 
 
@@ -28,7 +28,7 @@ def declared_content(scenario: Scenario) -> DeclaredContent:
 
 
 def tab_title(scenario: Scenario) -> str:
-    """Return the title of the tab for scenarios with the same motion."""
+    """Return the title of the tab for scenarios of equal motion."""
     if is_walk(scenario):
         return "Walk"
     motion = vane_motion(scenario)
@@ -40,7 +40,7 @@ def tab_title(scenario: Scenario) -> str:
 
 
 def usual_changes(scenario: Scenario) -> dict[str, str]:
-    """Return the initial changes of a scenario on a page, texts by key: a walk is shortened."""
+    """Return the initial changes of a scenario on a page, as texts by key; a walk is shortened."""
     if not is_walk(scenario):
         return {}
     from ppafo.walking.motion import SHORTEST_STRIDES
@@ -49,7 +49,7 @@ def usual_changes(scenario: Scenario) -> dict[str, str]:
 
 
 def with_limits(entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
-    """Return a setting with the additional limits that a scenario file checks and a program does not."""
+    """Add the limits of a setting that a scenario file checks and a program does not."""
     if is_walk(scenario):
         from ppafo.walking.motion import LONGEST_MINUTES, SHORTEST_STRIDES
 

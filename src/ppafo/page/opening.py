@@ -1,4 +1,4 @@
-"""Initial state of a page, computed by running its programs: effect of each setting, and the first panel.
+"""Initial state of a page, computed by its programs: effect of each setting, and first panel.
 
 For bundled scenarios the package stores it in ``opening.json``, written by ``scripts/page_tables.py``. For others it is
 computed when the page is made.
@@ -23,20 +23,20 @@ from ppafo.simulation.scenario import Scenario
 
 MOST_FIRST = 12
 LEAST_CHANGE = 1e-3
-"""Relative change of a result below which the effect of a setting counts as invisible."""
+"""Relative change of a result [-] below which the effect of a setting is invisible."""
 _STEP = 0.2
-"""Change of a setting up and down, as a fraction of its value (of the gauge value for a pressure)."""
+"""Change of a setting up and down, relative to its value (gauge value for a pressure) [-]."""
 _MOST_POINTS = 300
 _NATURE = ("gas.", "gas_model.", "flow.", "run.", "sensors.seed", "supply.atmospheric_pressure")
-"""Settings excluded from the first sliders: physical constants, and step and duration of a run."""
+"""Prefixes of settings without a first slider: physical constants, step and duration of a run."""
 _RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", "derived", "assumed", "default")
-"""Provenances in order of preference: of two settings with the same effect, the better known one is displayed."""
+"""Provenances in order of preference, for the choice between settings of equal effect."""
 
 
 def opening_of(
     scenario: Scenario, module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
-    """Return ``changes`` by setting and the ``courses`` of the first panel, for a scenario with given SI values.
+    """Return the initial state of a page: ``changes`` by setting, and ``courses`` of the first panel.
 
     A change is a list of fractions: relative change of each claim, and change divided by the span of the first panel.
     """
@@ -54,7 +54,7 @@ def opening_of(
 
 
 def opening_like(module: WasmModule) -> dict[str, Any]:
-    """Return the stored initial state of the bundled scenario with most settings in common, without any run."""
+    """Return the stored initial state of the bundled scenario with most settings in common, without a run."""
     keys = {entry["key"] for entry in module.description["settings"]}
     stored = _stored()
     of_same_name = stored.get(module.description["name"])
@@ -62,7 +62,7 @@ def opening_like(module: WasmModule) -> dict[str, Any]:
 
 
 def _key(module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]) -> str:
-    """Return the hash that identifies a scenario by its file, overrides and changes on a page."""
+    """Return the hash of a scenario's file, overrides and changes on a page."""
     content = [module.description["document"], module.description["overrides"], sorted(changes.items()), list(claims)]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
@@ -76,7 +76,7 @@ def _stored() -> dict[str, Any]:
 def computed_opening(
     scenario: Scenario, module: WasmModule, initial: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
-    """Compute the initial state of a page on a scenario, by runs of the reference and of changed settings."""
+    """Compute the initial state of a page by runs with initial and changed settings."""
     from ppafo.simulation.ensemble import run_ensemble  # a report computes nothing
 
     known = [metric["name"] for metric in module.description["metrics"]]
@@ -128,7 +128,7 @@ def computed_opening(
 
 
 def _short(values: Floats) -> list[float | None]:
-    """Return values with four digits for plotting; None for samples of a failed run."""
+    """Round values to four digits for plotting; None for samples of a failed run."""
     return [float(f"{value:.4g}") if np.isfinite(value) else None for value in values.tolist()]
 
 
@@ -138,7 +138,7 @@ def _share(change: Floats, of: float) -> float:
 
 
 def first_settings(openings: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the keys of at most twelve settings with the largest changes over all configurations, largest first."""
+    """Return the keys of up to twelve settings with the largest effects over all configurations."""
     origins = {setting["key"]: setting["origin"] for program in programs for setting in program["settings"]}
     rank = {origin: index for index, origin in enumerate(_RANKED)}
     largest: dict[str, float] = {}

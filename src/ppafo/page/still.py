@@ -1,4 +1,4 @@
-"""Static SVG picture of a page for browsers without scripts: the first panel of its initial state."""
+"""Static SVG picture of a page for browsers without scripts: first panel of the initial state."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,11 +12,11 @@ from ppafo.report.style import BLACK, GREY, PAGE_COLOURS
 from ppafo.units.shown import quantity_of_unit
 
 Points = list[tuple[float, float]]
-"""Points of time [s] and value in its display unit."""
+"""Points of a curve: time [s] and value in its display unit."""
 
 _WIDTH, _HEIGHT = 720.0, 340.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 12.0, 30.0, 44.0
-"""Size of the picture, and its margins around the axes, in pixels."""
+"""Size of the picture, and margins around its axes [pixels]."""
 _NAMES = {
     "torque": "Torque",
     "angle": "Angle of the ankle",
@@ -28,18 +28,18 @@ _STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
 class _Axes(NamedTuple):
-    """Axes by their ticks of time [s] and value; the picture extends from the first to the last tick."""
+    """Axes with their ticks in time [s] and value; the picture spans the ticks."""
 
     times: list[float]
     values: list[float]
 
     def x(self, time: float) -> str:
-        """Return the horizontal position of a time in the picture [pixels]."""
+        """Return the horizontal position of a time [pixels]."""
         width = _WIDTH - _LEFT - _RIGHT
         return f"{_LEFT + width * (time - self.times[0]) / (self.times[-1] - self.times[0]):.1f}"
 
     def y(self, value: float) -> str:
-        """Return the vertical position of a value in the picture [pixels]."""
+        """Return the vertical position of a value [pixels]."""
         height = _HEIGHT - _TOP - _BOTTOM
         return f"{_TOP + height * (self.values[-1] - value) / (self.values[-1] - self.values[0]):.1f}"
 
@@ -50,7 +50,7 @@ def still_of(
     programs: Sequence[Mapping[str, Any]],
     joint: str = ANKLE.name,
 ) -> str:
-    """Return the first panel of a tab as SVG text: a curve for each configuration, and the reference.
+    """Draw the first panel of a tab as SVG: a curve for each configuration, and the reference.
 
     ``openings`` and ``programs`` belong to the initial configurations of the tab, in order. Empty if these have no
     common channel for a panel.
@@ -93,13 +93,13 @@ def still_of(
 
 
 def _points(opening: Mapping[str, Any], channel: str, quantity: str) -> Points:
-    """Return the initial curve of a channel as points, without missing samples."""
+    """Return the points of a channel's initial curve, without missing samples."""
     samples = zip(opening["times"], opening["courses"][channel], strict=True)
     return [(time, display_value(value, quantity)) for time, value in samples if value is not None]
 
 
 def _frame(axes: _Axes, label: str) -> list[str]:
-    """Return SVG lines and labels of the ticks, and the titles of both axes."""
+    """Return SVG grid lines, tick labels and axis titles."""
     below, middle = _HEIGHT - _BOTTOM + 16, _LEFT + (_WIDTH - _LEFT - _RIGHT) / 2
     lines = "".join(f"M{_LEFT} {axes.y(tick)}h{_WIDTH - _LEFT - _RIGHT}" for tick in axes.values)
     turned = f"translate(14 {_TOP + (_HEIGHT - _TOP - _BOTTOM) / 2}) rotate(-90)"
@@ -116,7 +116,7 @@ def _frame(axes: _Axes, label: str) -> list[str]:
 
 
 def _line(axes: _Axes, curve: Points, look: str) -> str:
-    """Return the SVG of a curve; intervals of constant value are reduced to their end points."""
+    """Return the SVG of a curve; constant intervals are reduced to their end points."""
     points = [(axes.x(time), axes.y(value)) for time, value in curve]
     heights = [height for _, height in points]
     ends = (0, len(points) - 1)
@@ -133,7 +133,7 @@ def _text(words: str, attributes: str) -> str:
 
 
 def _ticks(values: Sequence[float]) -> list[float]:
-    """Return five to ten round numbers that enclose the given values."""
+    """Return five to ten round numbers that enclose values."""
     low, high = min(values), max(values)
     # A level line has no height of its own.
     size = (high - low) / 8.0 or 1.0

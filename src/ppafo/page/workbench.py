@@ -1,4 +1,4 @@
-"""Workbench page of scenarios and walks: tabs, labels and content."""
+"""Workbench page: scenarios and walks in tabs, with labels and content."""
 
 import contextlib
 import json
@@ -26,11 +26,11 @@ from ppafo.units import from_si, parse_quantity, split_pressure_kind
 from ppafo.units.shown import shown_in, shown_unit
 
 TITLE = "The powered ankle-foot orthosis, live"
-"""Title of a page of devices on the ankle."""
+"""Title of a page of ankle devices."""
 DEFAULT = ("torque-task-solenoid", "torque-task-proportional", "step-response", "solenoid")
 MOST_SCENARIOS = 24
 _OPEN = 2
-"""Number of configurations initially displayed in a tab."""
+"""Number of configurations displayed initially in a tab."""
 _LABELS = {
     "torque-task-solenoid": "Solenoid pair",
     "torque-task-proportional": "Proportional valve",
@@ -46,7 +46,7 @@ _LABELS = {
 
 @checked
 def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = (), plugins: Plugins = ()) -> bytes:
-    """Interactive page, one file of HTML, that simulates scenarios again as their numbers are changed.
+    """Create an interactive HTML page that simulates scenarios again as their numbers change.
 
     Scenarios with the same kind of motion share a tab. The first two scenarios of a tab are displayed initially.
 
@@ -72,7 +72,7 @@ def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides
 
 
 def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
-    """Return a page section with the most important controls; None if one of the programs cannot be built.
+    """Return a page section with the most important controls; None if a program cannot be built.
 
     Of several scenarios with the same name only the first is included.
     """
@@ -98,7 +98,7 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
 def _content(
     scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], form: str
 ) -> tuple[dict[str, Any], dict[str, str], str]:
-    """Return the content of a ``"page"`` or ``"block"``, its packed modules by name, and the picture of its first tab.
+    """Return page or block content, packed modules by name, and the picture of the first tab.
 
     Identical programs share one module. Raises ScenarioError for no scenario, too many, or two of one name.
     """
@@ -159,7 +159,7 @@ def _content(
 
 
 def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Return the newly computed initial states of bundled scenarios and walks on a page, by name."""
+    """Compute the initial states of bundled scenarios and walks on a page, by name."""
     openings = {}
     for name in names:
         simulated = PageSimulation(load_scenario(name), module_of(load_scenario(name)), name)
@@ -173,7 +173,7 @@ def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 @cache
 def known_intervals() -> Mapping[str, Interval]:
-    """Return 95 % intervals in SI, by key, of numbers for which the parameter set states no uncertainty.
+    """Return 95 % intervals [SI] by key, for numbers without a stated uncertainty in the set.
 
     ``scripts/known_intervals.py`` writes them to a file, because the underlying study takes long to read.
     """
@@ -182,7 +182,7 @@ def known_intervals() -> Mapping[str, Interval]:
 
 
 def _fits(changes: Mapping[str, str], units: Mapping[str, str]) -> bool:
-    """Return True if all changed settings are among ``units`` [SI], and the changes are in units of these."""
+    """Return whether all changed settings are among ``units`` [SI], with fitting units."""
     with contextlib.suppress(KeyError, UnitError):
         for key, text in changes.items():
             parse_quantity(text, units[key] or "1")
@@ -191,7 +191,7 @@ def _fits(changes: Mapping[str, str], units: Mapping[str, str]) -> bool:
 
 
 def _question(question: Mapping[str, Any], atmosphere: float) -> dict[str, Any]:
-    """Return text and changes of a question, its supply pressure in the display unit of pressures."""
+    """Return text and changes of a question, with the supply pressure in its display unit."""
     text, changes = question["text"], dict(question["changes"])
     key, unit = "supply.pressure", shown_unit("Pa_a")
     bare, kind = split_pressure_kind(unit)

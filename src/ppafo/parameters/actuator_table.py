@@ -1,4 +1,4 @@
-"""Curves of a measured actuator, fitted to the volumes in its file: cubic splines in the angle, linear in the pressure.
+"""Curves of a measured actuator through the volumes of its file: cubic splines in angle, linear in pressure.
 
 ``model/actuators/table.py`` evaluates these curves in a run.
 """
@@ -24,13 +24,13 @@ _NOTHING = Curve((0.0,) * _POWERS, (0.0,) * BENDS)
 _CHECKED_SHARES = np.linspace(0.0, 1.0, 201)
 """Fractions of the angle range [-] at which curves are checked; at most 12 angles are measured."""
 _CLEAR = 1.0e-5
-"""Margin of a moved curve above 0, in units of the last digit."""
+"""Margin of a moved curve above 0, in units of the last digit [-]."""
 _ROUNDING = 1.0e-9
-"""Negative volume or fall with the pressure, divided by the largest volume, that counts as rounding error."""
+"""Largest negative volume, or fall with pressure, that counts as rounding error, relative to the largest volume [-]."""
 
 
 def read_actuator_table(path: Path) -> Table:
-    """Return the curves of a measured actuator from its file; ParameterError names the file if they cannot be built."""
+    """Read the curves of a measured actuator from its file. Raises ParameterError if they cannot be built."""
     return table_of(read_measured_volumes(path), label(str(path)))
 
 
@@ -64,7 +64,7 @@ def table_of(measured: MeasuredVolumes, file: str) -> Table:
 
 
 def largest_move(path: Path) -> tuple[float, float]:
-    """Return the largest move of a volume of a file [m^3] and its last digit [m^3]; the move is 0 for exact curves."""
+    """Return the largest move of a volume in a file [m^3], and the last digit [m^3]; the move is 0 for exact curves."""
     measured = read_measured_volumes(path)
     shares = (measured.angles - measured.angles[0]) / (measured.angles[-1] - measured.angles[0])
     _, first = within_resolution(measured.volume_1, shares, measured.resolution_1)
@@ -75,7 +75,7 @@ def largest_move(path: Path) -> tuple[float, float]:
 
 
 def within_resolution(volume: Floats, shares: Floats, resolution: float) -> tuple[Floats, float]:
-    """Volumes [m^3] (angles, pressures) with admissible chamber curves, and the largest move of a volume [m^3].
+    """Return volumes [m^3] (angles, pressures) moved to give admissible curves, and the largest move [m^3].
 
     Admissible curves are 0 or more, grow with the pressure and, at the highest pressure, grow from angle to angle.
     Linear programming minimises the largest move. No volume is moved if more than half of the last digit ``resolution``
@@ -116,14 +116,14 @@ def within_resolution(volume: Floats, shares: Floats, resolution: float) -> tupl
 
 
 def measured_pressures(table: Table) -> tuple[float, float]:
-    """Return the lowest and the highest measured pressure [Pa, gauge]; infinite if the file has only one pressure."""
+    """Return lowest and highest measured gauge pressure [Pa]; infinite if the file has a single pressure."""
     rises = [rise for rise in table.chamber_1.rises if rise.lower < _UNREACHED]
     lowest = min((rise.lower for rise in rises), default=-math.inf)
     return lowest, max((rise.lower + rise.length for rise in rises), default=math.inf)
 
 
 def _chamber(volume: Floats, pressures: Floats, shares: Floats) -> TabulatedChamber:
-    """Return a chamber from volumes [m^3] (angles, pressures), gauge pressures [Pa] and fractions of the range."""
+    """Return the curves of a chamber from volumes [m^3] (angles, pressures), gauge pressures [Pa], angle fractions."""
     rises = [
         Rise(float(lower), float(upper - lower), _curve(volume[:, index + 1] - volume[:, index], shares))
         for index, (lower, upper) in enumerate(pairwise(pressures))

@@ -47,14 +47,14 @@ from ppafo.wording import nearest_name, one_line
 _SAME = 1.0e-9
 """Angle difference [rad] below which two angles count as the same."""
 _COVERED = 1.01
-"""Ratio by which the supply may exceed the pressures of a table."""
+"""Largest ratio of supply pressure to the highest pressure of a volume table [-]."""
 _BESIDE_ANOTHER = "; the other supply is above it, and both must be on the same side of the atmosphere"
 _UNUSED_VOLUME = 1.0e-6
-"""Constant volume [m^3] in place of the second chamber of an actuator that has one; no gas flows into it."""
+"""Constant volume [m^3] of chamber 2 for an actuator with one chamber; no gas flows into it."""
 _NO_LEAK = Orifice(area=0.0, discharge_coefficient=1.0)
 SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
 Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
-"""Function that reads a section by its declared quantities: numbers in SI, by name."""
+"""Function that reads the declared quantities of a section as numbers [SI] by name."""
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 
 
@@ -77,7 +77,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
 
 
 def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
-    """Return the device in SI units with a valve of the set, whose values may still contradict each other."""
+    """Return the device in SI units with a valve of the set, without a check for contradictions."""
     missing = missing_values(parameter_set, name)
     if missing:
         completed = parameter_set.completed_by
@@ -121,7 +121,7 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
 
 
 def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield the contradictions for which a run refuses a device of a set: paths of the values, and the message."""
+    """Yield contradictions between the values of a set that prevent a run: their paths, and a message."""
     actuator, valve = device.actuator, device.valve
     stops = ("actuator.angle_min", "actuator.angle_max")
     is_ordered = actuator.angle_min < actuator.angle_max
@@ -160,7 +160,7 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
 
 
 def growth_and_problem(device: Device) -> tuple[Any, Problem]:
-    """Return the mean volume change of chamber 1 with angle [m^3/rad], and the problem if not positive; elementwise."""
+    """Return mean growth of chamber 1 with angle [m^3/rad], and the problem if not positive; elementwise over runs."""
     # That of a vane is a number of its set, which is above 0.
     growth = device.actuator.displacement_per_radian if device.actuator.kind == VANE else shape_and_growth(device)[1]
 
@@ -198,7 +198,7 @@ def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
 
 
 def actuator_problem(actuator: Actuator) -> str:
-    """Return a message on actuator numbers that contradict each other; empty if consistent."""
+    """Return a message on contradictory actuator numbers; empty if consistent."""
     stops = Range(
         angle_min=actuator.angle_min,
         angle_max=actuator.angle_max,
@@ -219,7 +219,7 @@ def actuator_problem(actuator: Actuator) -> str:
 
 
 def beyond_pressures(device: Device) -> Problem:
-    """Return the problem of a supply pressure outside the measured range of the actuator table; elementwise."""
+    """Return the problem of a supply outside the measured pressures of a volume table; elementwise over runs."""
     table, supply = device.actuator.table, device.supply
     if table is None:
         lowest, highest = -math.inf, math.inf
@@ -244,7 +244,7 @@ def beyond_pressures(device: Device) -> Problem:
 
 
 def _reader(parameter_set: ParameterSet) -> Reader:
-    """Return a reader of a section: values in SI, checked against declared units and ranges, defaults for missing ones.
+    """Return a function that reads a section [SI], checks units and ranges, and fills in defaults.
 
     A number without a default must be present.
     """
@@ -273,14 +273,14 @@ def _orifice(parameter_set: ParameterSet, read: Reader, section: str) -> Orifice
 
 
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
-    """Return the names of the orifice numbers if they mix both forms; empty if they use one form or none."""
+    """Return the names of orifice numbers that mix both forms; empty if they use one form or none."""
     paths = [f"{section}.{name}" for form in FORMS["valve"] for name in sorted(form)]
     stated = [path for path in paths if path in parameter_set.numbers]
     return tuple(path.rpartition(".")[2] for path in stated) if in_two_forms(stated) else ()
 
 
 def _orifice_form(parameter_set: ParameterSet, section: str) -> tuple[Quantity, ...]:
-    """Return the quantities of the form in which an orifice is given; ParameterError for an orifice in both forms."""
+    """Return the quantities of the form of an orifice. Raises ParameterError for an orifice in both forms."""
     both = both_forms(parameter_set, section)
     if both:
         wanted = either(f"{section}.{both[0]}")
@@ -290,7 +290,7 @@ def _orifice_form(parameter_set: ParameterSet, section: str) -> tuple[Quantity, 
 
 
 def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
-    """Return the paths of the values that a device with this valve needs and the set lacks."""
+    """Return the paths of values that a device with this valve needs and the set lacks."""
     needed = [
         f"{name}.{member.name}"
         for name in _FLAT_SECTIONS
@@ -308,7 +308,7 @@ def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
 
 
 def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
-    """Rules between two numbers: path, relation, path of the other, and True if it holds (elementwise over runs)."""
+    """Rules between two numbers: path, relation, other path, and True if satisfied (elementwise over runs)."""
     actuator, friction, supply = device.actuator, device.friction, device.supply
     # Of two supplies on either side of the atmosphere both would turn the joint one way.
     pressures = supply.pressure, supply.dorsiflexion_pressure

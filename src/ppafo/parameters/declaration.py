@@ -1,4 +1,4 @@
-"""All numbers that a parameter set may contain: section, name, SI unit, range and meaning.
+"""Declarations of all numbers of a parameter set: section, name, SI unit, range and meaning.
 
 The schema, the conversion to SI, the messages and the table of ``ppafo sets show`` use this list. A pressure level is
 in ``Pa_a``, absolute. The limits are wide: they exclude typing errors and numbers that no solver could handle.
@@ -80,32 +80,32 @@ OF_SECOND_CHAMBER = frozenset(
         *(f"actuator.leak.{quantity.name}" for quantity in ORIFICE),
     }
 )
-"""Paths of the numbers that an actuator with one chamber does not have."""
+"""Paths of numbers that an actuator with one chamber lacks."""
 WHY_ONE_CHAMBER = "the actuator has one chamber (no column volume_2 in its volume table)"
 
 _ALTERNATIVE_UNITS = {"N m s/rad": ("N m s",)}
 
 
 def alternatives(quantity: Quantity) -> tuple[str, ...]:
-    """Return the SI units in which a value may be given: a damping also without 1/rad, as in the paper."""
+    """Return the SI units accepted for a quantity; for a damping also without 1/rad, as in the paper."""
     return (quantity.unit, *_ALTERNATIVE_UNITS.get(quantity.unit, ()))
 
 
 def is_within(value: Any, quantity: Quantity) -> Any:
-    """Return True if an SI value is within its declared limits; for an array, of each of its values."""
+    """Return True if an SI value is within its declared limits; elementwise for an array."""
     is_above = value >= quantity.minimum if quantity.minimum_allowed else value > quantity.minimum
     return is_above & (value <= quantity.maximum)
 
 
 def actuator_quantities(kind: str) -> tuple[Quantity, ...]:
-    """Return the quantities that a set may state for an actuator type, leak excluded; ``ACTUATOR`` for the vane."""
+    """Return the quantities of an actuator type, without leak; ``ACTUATOR`` for the vane."""
     if kind == VANE.name:
         return ACTUATOR
     return (*ACTUATORS[kind].quantities, *(quantity for quantity in ACTUATOR if quantity.name not in _OF_A_VANE))
 
 
 def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
-    """Return the declared numbers of a section of ``SECTIONS``, for an actuator type."""
+    """Return the declared quantities of a section of ``SECTIONS``, for an actuator type."""
     return actuator_quantities(actuator_kind) if section == "actuator" else SECTIONS[section]
 
 
@@ -115,7 +115,7 @@ def quantities(
     species: str = "",
     has_one_chamber: bool = False,
 ) -> Mapping[str, Quantity]:
-    """Return the declarations of all numbers by path, for the valves of a set by name, its actuator and its gas."""
+    """Return the declarations of all numbers by path, given valve kinds by name, actuator and gas."""
     # Effects are part of the key: another package's may be loaded between two calls.
     return _by_path(tuple(valve_kinds.items()), actuator_kind, species, has_one_chamber, device_effects())
 
@@ -158,7 +158,7 @@ def range_rule(quantity: Quantity, given: str = "") -> str:
 
 
 def limits_text(quantity: Quantity, given: str = "") -> str:
-    """Return declared limits as text for a message: ``at least 0 cm^3 and at most 1000 cm^3``.
+    """Format declared limits for a message: ``at least 0 cm^3 and at most 1000 cm^3``.
 
     The limits are in the unit ``given`` by the user if it is known and fits, else in the display unit.
     """

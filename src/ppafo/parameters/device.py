@@ -1,4 +1,4 @@
-"""Device in SI units, as immutable values used by all computations."""
+"""Device in SI units, as immutable data classes."""
 
 import math
 from collections.abc import Mapping
@@ -21,13 +21,13 @@ VANE = "vane"
 
 
 class _Holding(Protocol):
-    """Section of a device or scenario that exposes the numbers of its fields ``HELD`` as attributes."""
+    """Section of a device or scenario with numbers of its fields ``HELD`` as attributes."""
 
     HELD: ClassVar[tuple[str, ...]]
 
 
 def held_in(section: _Holding, name: str) -> str | None:
-    """Return the field of ``HELD`` that contains a number; None if no field does."""
+    """Return the field of ``HELD`` that contains a number, None if no field does."""
     for field_name in section.HELD:
         holder = getattr(section, field_name)
         if name in holder if isinstance(holder, Mapping) else hasattr(holder, name):
@@ -36,7 +36,7 @@ def held_in(section: _Holding, name: str) -> str | None:
 
 
 def held(section: _Holding, name: str) -> Any:
-    """Return a number from the fields of ``HELD``, for ``__getattr__``; AttributeError if no field has it."""
+    """Return a number from the fields of ``HELD``, for ``__getattr__``. Raises AttributeError if absent."""
     # A copy asks for names that begin so, and for the fields themselves, before there are any.
     if not name.startswith("_") and name not in section.HELD:
         field_name = held_in(section, name)
@@ -172,7 +172,7 @@ class Supply:
 
 @dataclass(frozen=True, slots=True)
 class Valve:
-    """Valve: kind in the catalogue, orifice when fully open, and complete settings in SI.
+    """Valve: kind in the catalogue, orifice when fully open, and all settings [SI].
 
     Settings and orifice numbers are attributes: ``valve.area``, ``valve.dead_band``.
     """
@@ -189,7 +189,7 @@ class Valve:
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """Flow computation: pressure ratio [-] above which the flow is linear in the ratio, as in ISO 6358."""
+    """Numerical setting of the flow: pressure ratio [-] above which flow is linear in the ratio, as in ISO 6358."""
 
     linear_ratio: Annotated[
         float, Number("", "pressure ratio above which flow is linear", minimum=0.99, maximum=0.9999)

@@ -1,4 +1,4 @@
-"""Effects of a device: active effects, their settings, and the parameter rows used by a program."""
+"""Effects of a device: active effects, their settings, and their parameter rows in a program."""
 
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -12,16 +12,16 @@ from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device
 
 SEEN_BY_EFFECTS = ("gas", "actuator", "friction", "foot_plate", "supply")
-"""Device sections that ``prepare`` of an effect may read; an exported library contains them in C."""
+"""Device sections that ``prepare`` of an effect may read; exported libraries contain these sections in C."""
 
 
 Sections = Mapping[str, Any]
-"""Settings objects by file section, for effects whose settings are outside the device (such as the sensors)."""
+"""Settings by file section of effects with settings outside the device, such as the sensors."""
 _NO_SECTIONS: Sections = {}
 
 
 def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS) -> dict[str, Any]:
-    """Return the settings [SI] of an effect, arrays (runs,) if varied; defaults for settings that are not given."""
+    """Return the settings of an effect [SI], with defaults for missing ones; arrays (runs,) if varied."""
     if effect.section in others or effect.always:
         section = others[effect.section] if effect.section in others else getattr(device, effect.section)
         return {quantity.name: getattr(section, quantity.name) for quantity in effect.quantities}
@@ -29,19 +29,19 @@ def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS)
 
 
 def all_settings(device: Device) -> dict[str, dict[str, Any]]:
-    """Return the settings [SI] of all loaded effects of devices, by name."""
+    """Return the settings [SI] of all loaded device effects, by name."""
     return {effect.name: settings_of(device, effect) for effect in _effects(device) if effect.is_of_device}
 
 
 def number_under(node: Any, attributes: Iterable[str]) -> Any:
-    """Return the number at a chain of attributes below a device or its owner; may be an array (runs,)."""
+    """Return the number at a chain of attributes of a device or its owner; an array (runs,) if varied."""
     for name in attributes:
         node = part_of(node, name)
     return node
 
 
 def part_of(node: Any, name: str) -> Any:
-    """Return an attribute of an object, or an entry of a mapping, by name."""
+    """Return a named attribute of an object, or a named entry of a mapping."""
     # A device has settings of the effects that its set names; those of all others are their defaults.
     if name == SECTION and isinstance(node, Device):
         return all_settings(node)
@@ -58,24 +58,24 @@ def effects_of(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Effect,
 
 
 def switches_of(device: Device) -> dict[Effect, Any]:
-    """Return, for each effect of a device, True if active; an array (runs,) if the deciding settings vary."""
+    """Return for each device effect True if active; an array (runs,) if the deciding settings vary."""
     settings = all_settings(device)
     return {effect: effect.is_on(settings[effect.name]) for effect in ordered_effects() if effect.is_of_device}
 
 
 def _effects(device: Device) -> tuple[Effect, ...]:
-    """Return all loaded effects in order, after loading the effects that the device names."""
+    """Return all loaded effects in order, including those named by the device."""
     find_effects(f"{SECTION}.{name}" for name in device.effects)
     return ordered_effects()
 
 
 def effect_rows(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Any, ...]:
-    """Return the parameter rows of the active effects; numbers are arrays (runs,) if settings or device vary."""
+    """Return the parameter rows of the active effects; numbers are arrays (runs,) if varied."""
     return tuple(effect_row(effect, device, others) for effect in effects_of(device, others))
 
 
 def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) -> Any:
-    """Return the parameter row of an effect, active or not; numbers are arrays (runs,) if they vary."""
+    """Return the parameter row of an effect, active or not; numbers are arrays (runs,) if varied."""
     settings, prepare = settings_of(device, effect, others), effect.prepare
     # Most effects compute with their settings as they are.
     if prepare is None:
@@ -95,7 +95,7 @@ def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) 
 
 
 def _number(device: Device, section: str, name: str) -> Any:
-    """Return a number of a device; an actuator setting takes precedence over a field of the same name."""
+    """Return a number of a device; an actuator setting has precedence over a field of the same name."""
     if section == "actuator" and name in device.actuator.settings:
         return device.actuator.settings[name]
     return getattr(getattr(device, section), name)

@@ -14,10 +14,10 @@ from ppafo.errors import UnitError
 from ppafo.units import flow_of, is_volume_flow, split_number, to_si
 
 USUAL_CRITICAL_RATIO = 0.3
-"""Critical pressure ratio b [-] of spool valves, used if a data sheet does not state it."""
+"""Usual critical pressure ratio b of spool valves [-], for data sheets without b."""
 
 CV_PER_KV = 1.156
-"""US gal/min at 1 psi per m^3/h at 1 bar, both of water (IEC 60534-1)."""
+"""Ratio of Cv to Kv: US gal/min at 1 psi per m^3/h at 1 bar, both of water (IEC 60534-1)."""
 
 _BEFORE, _BEHIND = 7.0, 6.0
 """Upstream and downstream pressures of nominal flow [bar absolute]."""
@@ -38,7 +38,7 @@ def nominal_flow_of_cv(cv: float) -> float:
 
 
 def conductance_of(name: str, text: str) -> float | None:
-    """Return C [m^3/(s Pa)] for ``cv``, ``kv`` or ``qn`` given as text, ``0.05 m^3/h``; None for an invalid text."""
+    """Parse ``cv``, ``kv`` or ``qn`` text, ``0.05 m^3/h``, into C [m^3/(s Pa)]; None for an invalid text."""
     try:
         value, unit = split_number(text)
         is_flow = bool(unit) and is_volume_flow(unit)

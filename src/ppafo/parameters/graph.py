@@ -1,4 +1,4 @@
-"""Graph of settings: numbers that follow others unless given. Links are declared once and resolved by one function.
+"""Links between settings: default numbers computed from other numbers unless given explicitly.
 
 Overrides, study columns, tuned and fitted values, exported libraries and FMUs, and episodes of agents all resolve
 their settings here, so that a setting has the same meaning in all of them.
@@ -20,29 +20,30 @@ ATMOSPHERE_PATH = "supply.atmospheric_pressure"
 PRESSURE_PATH, SECOND_PRESSURE_PATH = "supply.pressure", "supply.dorsiflexion_pressure"
 TORQUE_CONSTANT_PATH, DISPLACEMENT_PATH = "actuator.torque_constant", "actuator.displacement_per_radian"
 SAME_PRESSURE = 1.0e-6
-"""Relative difference below which two pressures count as the same pressure in two units."""
+"""Relative difference [-] below which two pressures in different units count as equal."""
 _LEVEL, _GAUGE = "Pa_a", "_g"
 _COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.", "reference.")
 
 
 def itself(number: Any) -> Any:
-    """Return the source number unchanged."""
+    """Return a number unchanged, the link function of equality."""
     return number
 
 
 def fill(row: type, numbers: Sequence[Any]) -> Any:
-    """Return a row of a NamedTuple class with the given numbers."""
+    """Create a row of a NamedTuple class from numbers."""
     return row(*numbers)
 
 
 @dataclass(frozen=True, slots=True)
 class LinkFunction:
-    """Function of other numbers, floats or arrays (runs,); its scalar form can be translated to C.
+    """Function from which the default of a number is computed; takes floats or arrays (runs,).
 
     The first sources fill ``rows``, NamedTuple classes that declare their numbers, and each row is one argument. The
-    remaining sources are arguments one by one. ``orifice`` is the section of an orifice whose form selects the sources;
-    ``in_other_form`` is the function for its other form. ``stages``, if any, are two functions that give the same
-    number: the first takes the same arguments and is common to several links, its results are arguments of the second.
+    remaining sources are single arguments. The scalar form can be translated to C. ``orifice`` is the section of an
+    orifice whose form selects the sources; ``in_other_form`` is the function for its other form. ``stages``, if any,
+    are two functions that give the same number: the first takes the same arguments and is common to several links, its
+    results are arguments of the second.
     """
 
     sources: tuple[str, ...]
@@ -53,14 +54,14 @@ class LinkFunction:
     stages: tuple[PlainFunction, PlainFunction] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the recipe of the function, which need not be defined in a module."""
+        """Pickle the function by its recipe, since it may not be defined in a module."""
         return _term, (
             *(self.sources, recipe_of(self.function), self.rows, self.orifice, self.in_other_form),
             recipe_of(self.stages),
         )
 
     def number(self, present: Callable[[str], Any], computed: dict[Any, Any] | None = None) -> Any:
-        """Return the value of the function, with its sources read by ``present``.
+        """Return the function value, with sources read by ``present``.
 
         ``computed`` keeps results of first stages, which links with the same sources use again.
         """
@@ -77,7 +78,7 @@ class LinkFunction:
         return gather([float(second(*result)) for result in results], combination_of_run)
 
     def arguments(self, numbers: Sequence[Any], filled: Callable[[type, Sequence[Any]], Any] = fill) -> list[Any]:
-        """Return the arguments of the function from the source numbers; ``filled`` builds a row from its numbers."""
+        """Convert source numbers to function arguments; ``filled`` builds a row from its numbers."""
         arguments: list[Any] = []
         rest = list(numbers)
         for row in self.rows:
@@ -93,7 +94,7 @@ def _term(sources: tuple[str, ...], recipe: Any, rows: Any, orifice: str, other:
 
 @dataclass(frozen=True, slots=True)
 class LinkedDefault:
-    """Default of a number as the sum of functions of other numbers and an offset ``gap``, in SI units.
+    """Default of a number [SI]: sum of functions of other numbers, and an offset ``gap``.
 
     With ``when_set`` the link acts only if its first source is given directly, not if that source follows another
     number.
@@ -114,19 +115,19 @@ class LinkedDefault:
         return not self.gap and [term.function for term in self.terms] == [itself]
 
     def number(self, present: Callable[[str], Any], computed: dict[Any, Any] | None = None) -> Any:
-        """Return the number that follows from its sources, read by ``present``; ``computed`` as of LinkFunction."""
+        """Return the default computed from its sources, read by ``present``; ``computed`` as in LinkFunction."""
         first, *others = (term.number(present, computed) for term in self.terms)
         total = sum(others, first)
         return total + self.gap if self.gap else total
 
 
 def follows(source: str, gap: float = 0.0, when_set: bool = False) -> LinkedDefault:
-    """Return a link to one number plus an offset ``gap``."""
+    """Return a link to a single source number plus an offset ``gap``."""
     return LinkedDefault((LinkFunction((source,)),), gap, when_set)
 
 
 Graph = Mapping[str, tuple[LinkedDefault, ...]]
-"""Links by path of the follower; the first link whose sources change is used. Sources precede their followers."""
+"""Links by path of the dependent number; the first link with a changed source acts. Sources come first."""
 
 
 def counts_from(path: str, atmosphere: float) -> float:
@@ -140,19 +141,19 @@ def counts_from(path: str, atmosphere: float) -> float:
 
 
 def fixed_zero(path: str) -> float | None:
-    """Return the standard atmosphere [Pa] if gauge pressures at a path count from it, None if from the device's."""
+    """Return the standard atmosphere [Pa] if it is the gauge zero of a path, None for the device's atmosphere."""
     return None if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
 
 
 def gauge_link(path: str, value: float, unit: str) -> tuple[LinkedDefault, ...]:
-    """Return the link of a gauge pressure to the atmosphere; an empty tuple for any other number."""
+    """Return the link of a gauge pressure to the atmosphere; empty for any other number."""
     if not unit.endswith(_GAUGE) or path == ATMOSPHERE_PATH or not path.startswith(_COUNTS_FROM_ATMOSPHERE):
         return ()
     return (follows(ATMOSPHERE_PATH, to_si(value, unit, _LEVEL, 0.0)),)
 
 
 def acting(graph: Graph, set_paths: Collection[str], turned: Collection[str] = ()) -> dict[str, LinkedDefault]:
-    """Return the links that change a number when the numbers at ``set_paths`` are given, in the order of resolution.
+    """Return the links that change a number when the numbers at ``set_paths`` are given, in evaluation order.
 
     Numbers at the paths of ``turned`` have new terms and are recomputed in any case.
     """
@@ -173,7 +174,7 @@ def acting(graph: Graph, set_paths: Collection[str], turned: Collection[str] = (
 def resolved(
     graph: Graph, replaced: Mapping[str, Any], present: Mapping[str, Any], orifices: Collection[str] = ()
 ) -> dict[str, Any]:
-    """Return all given numbers, and all numbers that follow them by links consistent with ``present``.
+    """Return the given numbers and all numbers computed from them by the links that hold in ``present``.
 
     The given ``orifices`` (section names) change from area form to ISO 6358 form or back.
     """
@@ -189,14 +190,14 @@ def resolved(
 
 
 def paths_in(graph: Graph) -> set[str]:
-    """Return all paths named by links: followers and sources, the latter in both forms of an orifice."""
+    """Return all paths in links: dependent numbers and sources, in both forms of an orifice."""
     terms = [term for links in graph.values() for link in links for term in link.terms]
     turned = [term.in_other_form for term in terms if term.in_other_form is not None]
     return {*graph, *(source for term in (*terms, *turned) for source in term.sources)}
 
 
 def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
-    """Return the links with the given orifices (section names) converted from area form to ISO 6358 form or back."""
+    """Return the links with the given orifices (section names) converted between area form and ISO 6358 form."""
     if not orifices:
         return graph
 
@@ -211,7 +212,7 @@ def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
 
 
 def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return the links that remain after numbers are given: a given number has none, acting ``when_set`` links win."""
+    """Return the links that remain after numbers are given; an acting link with ``when_set`` replaces the others."""
     changed = acting(graph, replaced)
     return {
         path: (changed[path],) if path in changed and changed[path].when_set else links
@@ -226,7 +227,7 @@ def outside(graph: Graph, *sections: str) -> dict[str, tuple[LinkedDefault, ...]
 
 
 def holding(graph: Graph, present: Mapping[str, Any]) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return the links that still hold for the numbers ``present``, which may have been changed independently."""
+    """Return the links satisfied by the numbers ``present``, which may have been changed independently."""
     links_held: dict[str, tuple[LinkedDefault, ...]] = {}
     computed: dict[Any, Any] = {}
     for path, links in graph.items():

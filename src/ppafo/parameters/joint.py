@@ -1,4 +1,4 @@
-"""Joint driven by an actuator: its name and the names of its two movements."""
+"""Names of the joint driven by an actuator, and of its two movements."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ OPPOSITES = {
     "internal rotation": "external rotation",
 }
 OPPOSITES |= {second: first for first, second in OPPOSITES.items()}
-"""Opposite of each joint movement."""
+"""Opposite movement by movement of a joint."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class JointNames:
     negative: str = "dorsiflexion"
 
     def said(self, text: str) -> str:
-        """Return a text about the ankle reworded for this joint."""
+        """Replace the ankle's words in a text by the words of this joint."""
         words = zip(("ankle", "plantarflexion", "dorsiflexion"), (self.name, self.positive, self.negative), strict=True)
         for usual, own in words:
             text = text.replace(usual, own).replace(usual.capitalize(), own.capitalize())

@@ -59,7 +59,7 @@ def _capital(kind: str) -> str:
 
 
 def _actuator_section(kind: str) -> Any:
-    """Return the model of the actuator section for an actuator type; key ``kind`` is optional for a vane."""
+    """Return the validation model of the actuator section; key ``kind`` is optional for a vane."""
     described = ACTUATORS[kind].summary
     named = Field(kind, description=described) if kind == VANE else Field(description=described)
     leak = _section("Leak", declaration.ORIFICE)
@@ -74,7 +74,7 @@ def _actuator_section(kind: str) -> Any:
 
 
 def _sections() -> dict[str, Any]:
-    """Return the models of all sections with values; all are optional, since a set may be incomplete."""
+    """Return the validation models of all sections; all are optional, since a set may be incomplete."""
     valve_reports = _section("ReportedOfAValve", declaration.REPORTED_OF_A_VALVE)
     reported = {
         declaration.REPORTED_FORMULA: optional(TextEntry, "exponent inside C1, a formula in k"),
@@ -99,7 +99,7 @@ def _sections() -> dict[str, Any]:
 
 
 def parameter_file() -> type[BaseModel]:
-    """Return the model of a parameter set file, for the valves, actuators and effects that are loaded.
+    """Return the validation model of a parameter set file, for the loaded valves, actuators and effects.
 
     If a file names no valve, actuator or effect, all kinds of this package are used.
     """
@@ -108,7 +108,7 @@ def parameter_file() -> type[BaseModel]:
 
 
 def whole_parameter_file() -> type[BaseModel]:
-    """Return the model of a parameter set file with every valve, actuator and effect of this package."""
+    """Return the validation model of a parameter set file with all valves, actuators and effects of this package."""
     for kinds in _KINDS:
         kinds.load_own()
     return parameter_file()
@@ -217,7 +217,7 @@ def load_device(
 
 @checked
 def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> ParameterSet:
-    """Return a parameter set by its name in the package or by the path of a TOML file.
+    """Load a parameter set, by bundled name or path of a TOML file.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
 
@@ -231,14 +231,14 @@ def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> P
 
 
 def set_or_load(parameter_set: ParameterSet | str | Path | None) -> ParameterSet | None:
-    """Return a ParameterSet unchanged, load one by name or path, and return None for None."""
+    """Return a ParameterSet unchanged, or load it by name or path; None for None."""
     if parameter_set is None or isinstance(parameter_set, ParameterSet):
         return parameter_set
     return load_parameter_set(parameter_set)
 
 
 def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -> ParameterSet:
-    """Return the parameter set in the bytes of a TOML file; ``file`` is the label used in messages.
+    """Parse the bytes of a parameter set file; ``file`` is the label in messages.
 
     The file of a measured actuator is searched relative to ``folder``. Raises ParameterError if the set is not usable.
     """
@@ -312,7 +312,7 @@ def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
 
 
 def _leaves(node: object, path: str) -> Iterator[tuple[str, object]]:
-    """Yield every entry below a node with its dotted path."""
+    """Yield every entry of a validated file with its dotted path."""
     if isinstance(node, Entry | TextEntry | FlagEntry):
         yield path, node
         return

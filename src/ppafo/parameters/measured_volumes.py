@@ -1,4 +1,4 @@
-"""File of a measured actuator: one line for each angle and pressure, with the chamber volumes.
+"""Volume table of a measured actuator: chamber volumes, one line for each angle and pressure.
 
 angle [deg],pressure [kPa_g],volume_1 [mL],volume_2 [mL]
 
@@ -28,7 +28,7 @@ from ppafo.wording import nearest_name, one_line, reason, said_missing
 
 
 class _VolumeColumn(NamedTuple):
-    """Column of the file: SI unit, magnitude [SI] above which a number is rejected, and an example of a unit."""
+    """Column of a volume table: SI unit, largest accepted magnitude [SI], and an example of a unit."""
 
     unit: str
     largest: float
@@ -43,13 +43,13 @@ COLUMNS = {
 }
 _NEEDED = ("angle", "pressure", "volume_1")
 _NEAREST_ANGLES = 0.01
-"""Minimum distance of angles as a fraction of their range; closer ones make a spline oscillate."""
+"""Least distance of two angles, as a fraction of their range [-], for a smooth spline."""
 _NEAREST_PRESSURES = 1.0
-"""Minimum distance of pressures [Pa]; closer ones count as one pressure written twice."""
+"""Least distance of two pressures [Pa] that are not the same pressure."""
 _STEPS = (1, 2, 5, 10, 20, 50, 100)
 """Possible rounding steps of readings, in units of the last digit."""
 _TELLING = 10
-"""Count of different numbers above which a common step is no coincidence."""
+"""Number of different values from which a common step is no coincidence."""
 _LONGEST = 40
 """Maximum length of a cell in characters, in messages and as a number."""
 
@@ -71,7 +71,7 @@ class MeasuredVolumes:
 
 
 def read_measured_volumes(path: Path) -> MeasuredVolumes:
-    """Return the content of the file of a measured actuator; ParameterError names file and line of a fault."""
+    """Read the volume table of a measured actuator. Raises ParameterError with file and line of a fault."""
     file = label(str(path))
     try:
         text = decoded(read_regular_file(path, MAXIMUM_BYTES_TYPED))
@@ -101,7 +101,7 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
 
 
 def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]:
-    """Return the columns of a file by name, each (lines,), and the rounding step of each column, in SI units.
+    """Return the columns of a file by name, each (lines,), and their rounding steps, in SI units.
 
     Pressures are gauge pressures.
     """
@@ -144,7 +144,7 @@ def _step(numbers: Sequence[Decimal]) -> float:
 
 
 def _units(header: Sequence[str], file: str) -> dict[str, str]:
-    """Return the unit of each column by name, in the order of the file."""
+    """Return the unit of each column by name, in file order."""
     units: dict[str, str] = {}
     for cell in header:
         name, bracket, unit = (part.strip() for part in cell.strip().removesuffix("]").partition("["))
@@ -175,7 +175,7 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
 
 
 def _numbers(cells: Sequence[str], names: Sequence[str], line: str) -> list[float]:
-    """Return the numbers of a line in the order of the columns ``names``."""
+    """Parse the numbers of a line in the order of the columns ``names``."""
     if len(cells) != len(names):
         raise ParameterError(f"{line}: has {len(cells)} values, the header has {len(names)}")
     numbers = []
@@ -258,5 +258,4 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
 
 
 def _point_text(angle: float, pressure: float) -> str:
-    """Return an angle [rad] and a gauge pressure [Pa] as text for a message."""
     return f"{math.degrees(angle):.6g} deg and {pressure / 1e3:.6g} kPa_g"

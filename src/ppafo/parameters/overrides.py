@@ -1,4 +1,4 @@
-"""Overrides of a parameter set: one per value, one form per orifice, independent of their order; layers of overrides.
+"""Overrides of parameter set values: parsing, conflicts, alternative forms, and layers.
 
 A form is one of several alternative ways to state a quantity. Files, overrides and study columns are checked against
 the same table of forms. Overrides of the kinds of a scenario are in ``simulation/overrides.py``.
@@ -41,13 +41,13 @@ from ppafo.wording import nearest_name, one_line, override_text
 
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]
-"""Alternative forms of a section's numbers, each as the names of its values."""
+"""Alternative forms of the numbers of a section, each as the names of its values."""
 _ORIFICE = tuple(tuple(quantity.name for quantity in form) for form in (AREA_FORM, SONIC_FORM))
 FORMS: Forms = {"valve": _ORIFICE, "actuator.leak": _ORIFICE, "controller": (("rate",), ("period",))}
 
 
 class Override(NamedTuple):
-    """Override: full text, path and value, as typed by the user."""
+    """Override as typed by the user: full text, path and value."""
 
     words: str
     typed: str
@@ -59,7 +59,7 @@ class Override(NamedTuple):
 
 
 def split_override(override: str, error: type[PpafoError] = ParameterError) -> Override:
-    """Return path and value of a text such as ``run.duration=1 s``; raises ``error`` for any other text."""
+    """Split a text such as ``run.duration=1 s`` into path and value. Raises ``error`` for any other text."""
     on_one_line = one_line(override)
     path, separator, text = (part.strip() for part in on_one_line.partition("="))
     if not separator or not path or not text:
@@ -68,7 +68,7 @@ def split_override(override: str, error: type[PpafoError] = ParameterError) -> O
 
 
 def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterError) -> tuple[Override, ...]:
-    """Return texts as overrides in their order; raises ``error`` for the first invalid one in sorted order."""
+    """Parse texts as overrides in their order. Raises ``error`` for the first invalid text in sorted order."""
     in_order = tuple(texts)
     read = {text: split_override(text, error) for text in sorted(in_order)}
     return tuple(read[text] for text in in_order)
@@ -81,7 +81,7 @@ def override_set(
     valve: str = "",
     forms: Forms = FORMS,
 ) -> dict[str, Override]:
-    """Return overrides by path, sorted, so that the result does not depend on their order.
+    """Return overrides by path, sorted, so that the order of input does not matter.
 
     ``same`` maps a path to another path of the same value; ``valve`` is the name of the chosen valve, whose values have
     two paths. Raises ``error``, naming both overrides, if a value is given twice or in two forms.
@@ -107,7 +107,7 @@ def layered(
     same: Mapping[str, str] | None = None,
     valve: str = "",
 ) -> dict[str, Override]:
-    """Return two layers as one set by path: a later override replaces earlier ones of the value and of its other forms.
+    """Merge two layers by path: a later override replaces earlier overrides of the value and of its other forms.
 
     The order within each layer is kept. The other arguments are described in ``override_set``.
     """
@@ -121,29 +121,26 @@ def layered(
 def over(
     earlier: Iterable[str], later: Iterable[str], error: type[PpafoError] = ParameterError, valve: str = ""
 ) -> tuple[str, ...]:
-    """Return two layers of override texts merged as in ``layered``."""
+    """Merge two layers of override texts, as in ``layered``."""
     old, new = (read_overrides(texts, error) for texts in (earlier, later))
     return tuple(override.words for override in layered(old, new, error, valve=valve).values())
 
 
 def one_path(path: str, valve: str) -> str:
-    """Return the path with ``valve.`` in place of ``valves.NAME.`` if NAME is the chosen valve."""
+    """Replace ``valves.NAME.`` in a path by ``valve.`` if NAME is the chosen valve."""
     own = f"{NAMED_VALVE}{valve}."
     return CHOSEN_VALVE + path.removeprefix(own) if valve and path.startswith(own) else path
 
 
 def of_another_valve(path: str, valve: str) -> bool:
-    """Return True if a path names a valve other than the chosen one."""
+    """Return True if a path names a valve other than the chosen valve."""
     return path.startswith(NAMED_VALVE) and not path.startswith(f"{NAMED_VALVE}{valve}.")
 
 
 def check_valve(
     overrides: Iterable[Override], valve: str | None, choice: str, error: type[PpafoError] = ParameterError
 ) -> None:
-    """Raise ``error`` if an override concerns a valve other than the chosen ``valve``; None if none is chosen.
-
-    The message quotes the override and the ``choice`` as given.
-    """
+    """Raise ``error`` if an override concerns another valve than the chosen ``valve``, None if none is chosen."""
     for override in sorted(overrides) if valve else ():
         if valve and of_another_valve(override.typed, valve):
             raise error(
@@ -152,7 +149,7 @@ def check_valve(
 
 
 def other_forms(path: str, forms: Forms = FORMS) -> tuple[str, ...]:
-    """Return the paths of the alternative forms of a value; an empty tuple if it has only one form."""
+    """Return the paths of the alternative forms of a value; empty if it has a single form."""
     section, _, name = path.rpartition(".")
     ways = forms.get("valve" if section.startswith(NAMED_VALVE) else section, ())
     if not any(name in way for way in ways):
@@ -161,13 +158,13 @@ def other_forms(path: str, forms: Forms = FORMS) -> tuple[str, ...]:
 
 
 def in_two_forms(paths: Collection[str], forms: Forms = FORMS) -> tuple[str, str] | None:
-    """Return the first two paths that give one quantity in two forms; None if there are none."""
+    """Return the first two paths that state a quantity in two forms, None if there are none."""
     pairs = ((path, other) for path in sorted(paths) for other in sorted(other_forms(path, forms)) if other in paths)
     return next(pairs, None)
 
 
 def either(path: str, forms: Forms = FORMS) -> str:
-    """Return the sentence of a message that asks for a single form of a quantity."""
+    """Return the sentence of a message that asks for one of two forms of a quantity."""
     section = path.rpartition(".")[0]
     ways = forms["valve" if section.startswith(NAMED_VALVE) else section]
     return f"give either {' or '.join(' and '.join(f'{section}.{name}' for name in way) for way in ways)}, not both"
@@ -175,11 +172,11 @@ def either(path: str, forms: Forms = FORMS) -> str:
 
 @checked
 def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve: Name | None = None) -> ParameterSet:
-    """Return a parameter set with values replaced.
+    """Apply overrides to a parameter set.
 
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
     Naming another gas brings that gas's molar mass and heat capacity ratio, unless they are given too; giving an
-    orifice in the form of ISO 6358 drops its area and discharge coefficient, and the reverse. What follows a number
+    orifice in the form of ISO 6358 drops its area and discharge coefficient, and the reverse. Dependent numbers
     (``links_of_set``) is set with it, unless it is given too.
 
     Arguments:
@@ -202,7 +199,7 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve:
 
 
 def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], valve: str | None) -> ParameterSet:
-    """Return the set with overrides applied; ``valve`` is described in ``apply_overrides``."""
+    """Apply overrides to a parameter set; ``valve`` as in ``apply_overrides``."""
     chosen = chosen_valve(parameter_set, valve)
     overrides_by_path = {
         f"{NAMED_VALVE}{chosen}.{path.removeprefix(CHOSEN_VALVE)}" if path.startswith(CHOSEN_VALVE) else path: override
@@ -267,7 +264,7 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
 
 
 def _in_conductance(override: Override) -> str:
-    """Return a note with the equivalent ISO 6358 settings of a Cv, Kv or nominal flow; empty for any other value."""
+    """Return a note with the ISO 6358 settings equivalent to a Cv, Kv or nominal flow; empty for other values."""
     section, _, name = override.typed.rpartition(".")
     if name.lower() not in ("cv", "kv", "qn"):
         return ""
@@ -313,6 +310,6 @@ _CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}
 
 
 def _before(parameter_set: ParameterSet, path: str) -> str:
-    """Return a note with the previous value at a path, so that an override never hides it."""
+    """Return a note with the previous value at a path, to record with an override."""
     entry = with_followers(parameter_set).entries().get(path)
     return f"the set has {entry_text(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"

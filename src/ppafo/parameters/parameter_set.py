@@ -1,4 +1,4 @@
-"""Parameter set: every value with its origin, as given and in SI."""
+"""Parameter set: values with origin, as given and in SI."""
 
 import contextlib
 import math
@@ -34,15 +34,15 @@ if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
 
 Origin = Literal["published", "datasheet", "derived", "identified", "fitted", "assumed"]
-"""Provenance of a value; ``fitted``: neither determined by its recordings nor explained by a model of them."""
+"""Provenance of a value; ``fitted`` values hold for one model of the recordings only."""
 
 
 CONFIDENCE = 0.95
-"""Confidence level of the interval whose half width an entry states."""
+"""Confidence level [-] of the interval whose half-width an entry states."""
 
 
 class Entry(StrictTable):
-    """Number in its given unit, with origin and source."""
+    """Number in a parameter set, in its given unit, with origin and source."""
 
     value: Annotated[float, Field(description="the number, in the unit beside it")]
     unit: Annotated[str, Field(description="such as 'mm^2', 'psi_g' (gauge), 'psi_a' (absolute); '' for a number")]
@@ -78,7 +78,7 @@ class FlagEntry(StrictTable):
 
 
 class Citation(StrictTable):
-    """Publication or report on which the set is based; unknown fields are left out."""
+    """Publication or report behind a parameter set; unknown fields are left out."""
 
     title: Text
     authors: Texts = ()
@@ -88,7 +88,7 @@ class Citation(StrictTable):
 
 
 class Accepted(StrictTable):
-    """Contradiction that the author of the set knows and keeps, with the reason."""
+    """Contradiction in a parameter set that its author accepts, with the reason."""
 
     finding: Annotated[Text, Field(description="identifier of the finding, as 'ppafo sets audit' prints it")]
     reason: Text
@@ -96,7 +96,7 @@ class Accepted(StrictTable):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class ParameterSet:
-    """Values as given, with their provenance; conflicts and gaps are allowed until ``build_device``.
+    """Parameter set: values as given, with provenance; gaps and conflicts are allowed until ``build_device``.
 
     ``file`` is the label used in messages. ``numbers``, ``texts`` and ``flags`` are keyed by paths such as
     ``actuator.leak.area`` or ``valves.solenoid.area``. ``valve_kinds`` gives the catalogue kind of each valve,
@@ -151,18 +151,18 @@ _SPEAKING = {
     "N m": ("friction.static_torque",),
     "rad": ("actuator.angle_max", "actuator.angle_min"),
 }
-"""Paths of values whose unit is used to display all values of the quantity, by SI unit."""
+"""Paths of the values whose unit sets the display unit of a quantity, by SI unit."""
 _SPEAKING_ENDS = {
     "kg/s": (".mass_flow",),
     "m^3/(s Pa)": (".sonic_conductance",),
     "m^2": (".area",),
     "m^3": (".dead_volume_1", ".dead_volume"),
 }
-"""Suffixes of paths whose unit is used to display all values of the quantity, by SI unit."""
+"""Path suffixes of the values whose unit sets the display unit of a quantity, by SI unit."""
 
 
 def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
-    """Return the units in which the author of a set writes pressures, torques, angles and flows, by SI unit.
+    """Return the author's units for pressures, torques, angles and flows, by SI unit.
 
     ``numbers`` are the entries of the set by path. Quantities without a number are left out.
     """
@@ -190,7 +190,7 @@ def units_of_texts(texts: Iterable[object]) -> dict[str, str]:
 
 
 def chosen_units(texts: Iterable[object]) -> dict[str, str]:
-    """Return the units of texts as in ``units_of_texts``, except the default units of the package.
+    """Return the units used in texts as in ``units_of_texts``, without default units of the package.
 
     A file in default units makes no choice: the units of a parameter set take precedence.
     """
@@ -198,14 +198,14 @@ def chosen_units(texts: Iterable[object]) -> dict[str, str]:
 
 
 def unit_in(text: object) -> str:
-    """Return the unit of a text with number and unit; empty for anything else."""
+    """Return the unit in a text of number and unit; empty for anything else."""
     with contextlib.suppress(UnitError):
         return split_quantity(text)[1] if isinstance(text, str) else ""
     return ""
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
-    """Return the name of the valve to use: the requested one, else the set's default.
+    """Return the name of the requested valve, else of the default valve of the set.
 
     Raises ParameterError if the set has no such valve.
     """
@@ -236,7 +236,7 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
 def links_of_set(
     parameter_set: ParameterSet, set_paths: Collection[str] = (), atmosphere: float | None = None
 ) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return the links of a set: gauge pressures follow the atmosphere, the second regulator follows the first.
+    """Return the links of a parameter set: gauge pressures to the atmosphere, the second regulator to the first.
 
     The second regulator follows the first if the set has the same pressure for both, unless ``set_paths`` contains only
     the second; of an actuator with one chamber it follows the atmosphere. The pressures are compared at ``atmosphere``
@@ -264,7 +264,7 @@ def links_of_set(
 
 
 def has_one_pressure(parameter_set: ParameterSet, atmosphere: float | None = None) -> bool:
-    """Return True if both regulators have the same pressure, at the set's or the given atmosphere [Pa absolute]."""
+    """Return True if both regulators have equal pressure, with the given atmosphere [Pa absolute] or the set's."""
     entries = [parameter_set.numbers.get(path) for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)]
     declared = parameter_set.declarations()
     zero = atmospheric_pressure(parameter_set) if atmosphere is None else atmosphere
@@ -276,7 +276,7 @@ def has_one_pressure(parameter_set: ParameterSet, atmosphere: float | None = Non
 
 
 def with_followers(parameter_set: ParameterSet) -> ParameterSet:
-    """Return the set completed with the numbers that follow from others.
+    """Return the set completed with linked numbers that it does not state.
 
     The second regulator gets the pressure of the first. The displacement of a vane per radian gets its torque constant:
     by virtual work, T dtheta = (P1 - P2) dV.
@@ -299,7 +299,7 @@ def with_followers(parameter_set: ParameterSet) -> ParameterSet:
 
 
 def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
-    """Return the value of an entry in the SI unit of its quantity; UnitError if the dimension is wrong."""
+    """Convert the value of an entry to the SI unit of its quantity. Raises UnitError for a wrong dimension."""
     refused: UnitError | None = None
     for unit in alternatives(quantity):
         try:
@@ -310,7 +310,7 @@ def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
 
 
 def allowed_number(written: str, entry: Any, quantity: Quantity, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the SI value of an entry or a figure of a part; messages begin with the text ``written``.
+    """Return the checked SI value of an entry or part figure; messages begin with the text ``written``.
 
     Raises ParameterError if the unit has a wrong dimension or the value is out of range.
     """
@@ -322,7 +322,7 @@ def allowed_number(written: str, entry: Any, quantity: Quantity, atmosphere: flo
 
 
 def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
-    """Return the value at a path in SI; None if the set lacks it.
+    """Return the value of a parameter [SI]; None if the set lacks it.
 
     A value of a wrong dimension is converted to the base units of its own unit, so that the audit can report the unit
     once and still compare the number elsewhere.
@@ -337,12 +337,12 @@ def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
 
 
 def number_text(entry: Entry) -> str:
-    """Return the value and unit of an entry as text."""
+    """Format the value and unit of an entry."""
     return format_quantity(entry.value, entry.unit)
 
 
 def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
-    """Return the value of any entry as text: a number with its unit, a text, true or false."""
+    """Format the value of any entry: number with unit, text, true or false."""
     if isinstance(entry, Entry):
         return number_text(entry)
     return str(entry.value).lower() if isinstance(entry, FlagEntry) else entry.value

@@ -13,14 +13,14 @@ from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice, Valve
 
 
 class Restriction(NamedTuple):
-    """Orifice for a given gas: conductance [kg/(s Pa)] and flow function."""
+    """Orifice for a given gas: conductance [kg/(s Pa)] and flow function of the pressure ratio."""
 
     conductance: float
     curve: FlowCurve
 
 
 def area_restriction(orifice: Orifice, gas: Gas, linear_ratio: float) -> Restriction:
-    """Return the paper's orifice for a gas, with linear flow above ratio ``linear_ratio`` [-]; equations (6), (7)."""
+    """Return the paper's orifice for a gas, with linear flow above ``linear_ratio`` [-]; equations (6), (7)."""
     conductance = area_conductance(
         orifice.area,
         orifice.discharge_coefficient,
@@ -45,17 +45,17 @@ def restriction(orifice: Orifice | SonicOrifice, gas: Gas, linear_ratio: float) 
 
 
 def orifice_conductance(orifice: Orifice | SonicOrifice, gas: Gas) -> float:
-    """Conductance [kg/(s Pa)] of an orifice in either form: choked flow divided by upstream pressure. Equation (6)."""
+    """Conductance of an orifice in either form [kg/(s Pa)]: choked flow divided by upstream pressure. Equation (6)."""
     return restriction(orifice, gas, 0.0).conductance
 
 
 def valve_settings(valve: Valve) -> Any:
-    """Return the settings [SI] of a valve as the class of its kind; numbers may be arrays (runs,)."""
+    """Return the settings of a valve [SI] as the class of its kind; arrays (runs,) if varied."""
     return VALVES[valve.kind].settings(**valve.settings)
 
 
 def first_settings(valve: Valve) -> Any:
-    """Return the settings [SI] of a valve in the first run of an ensemble, which select the model of all runs."""
+    """Return the settings [SI] of a valve in the first run of an ensemble, which selects the model."""
     return valve_settings(valve)._make(map(first, valve_settings(valve)))
 
 
@@ -87,7 +87,7 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
 
 
 def shape_and_growth(device: Device) -> tuple[Any, Any]:
-    """Shape of an actuator other than a vane, and mean volume change of chamber 1 with angle [m^3/rad]."""
+    """Shape of an actuator other than a vane, and mean growth of chamber 1 with angle [m^3/rad]."""
     actuator, supply = device.actuator, device.supply
     kind = ACTUATORS[actuator.kind]
     model = kind.model
@@ -106,7 +106,7 @@ def shape_and_growth(device: Device) -> tuple[Any, Any]:
 
 
 def plant_with(device: Device, valve: Restriction, leak: Restriction, external_torque: float) -> PlantParameters:
-    """Plant parameters of a device with given orifices; external torque [N m]."""
+    """Plant parameters of a device with given orifices and external torque [N m]."""
     actuator, gas, supply = device.actuator, device.gas, device.supply
     return PlantParameters(
         gas_product=gas.specific_gas_constant * gas.temperature,

@@ -1,4 +1,4 @@
-"""Static torque limits of any actuator at an angle, from its torque function.
+"""Static torque limits of an actuator at an angle, from its torque function.
 
 At the upper limit chamber 1 is at its supply pressure and chamber 2 is vented, at the lower limit the reverse. With a
 vacuum supply, chamber 2 raises the torque and chamber 1 lowers it.
@@ -12,24 +12,24 @@ from ppafo.parameters.graph import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.plant import plant_parameters
 
 HIGHEST_PRESSURE = 1.6e6
-"""Highest supply pressure [Pa gauge] in the search: the usual maximum of pneumatic parts."""
+"""Highest supply pressure in the search [Pa gauge]: the usual maximum of pneumatic parts."""
 _HALVINGS = 60
 """Number of bisection steps, enough to reduce any bracket to rounding error."""
 _LOWEST_PRESSURE = 1.0e3
-"""Lowest absolute pressure [Pa] of a vacuum in the search: the lower limit in a parameter set."""
+"""Lowest absolute pressure of a vacuum in the search [Pa]: the lower limit in a parameter set."""
 
 StaticTorque = Callable[[float, float, float], float]
-"""Function of an angle [rad] and the absolute pressures [Pa] of chambers 1 and 2 that returns the torque [N m]."""
+"""Static torque [N m] as a function of angle [rad] and absolute pressures of chambers 1 and 2 [Pa]."""
 
 
 def static_torque(device: Device) -> StaticTorque:
-    """Return the torque function of the actuator of a device with the numbers of a single run."""
+    """Return the static torque function of a device, for a single run."""
     torque, plant = ACTUATORS[device.actuator.kind].model.torque, plant_parameters(device)
     return lambda angle, pressure_1, pressure_2: float(torque(plant, angle, pressure_1, pressure_2))
 
 
 def torque_reach(device: Device, angle: float, torque: StaticTorque | None = None) -> tuple[float, float]:
-    """Lowest and highest static torque [N m] of a device at an angle [rad].
+    """Return lowest and highest static torque [N m] of a device at an angle [rad].
 
     ``torque`` is the ``static_torque`` of the device, for repeated calls.
     """
@@ -40,12 +40,12 @@ def torque_reach(device: Device, angle: float, torque: StaticTorque | None = Non
 
 
 def supply_that_moves(device: Device, upwards: bool) -> str:
-    """Path of the supply pressure that raises the torque of a device, or lowers it if ``upwards`` is False."""
+    """Return the path of the supply pressure that raises the torque, or lowers it if ``upwards`` is False."""
     return PRESSURE_PATH if upwards != device.supply.is_vacuum else SECOND_PRESSURE_PATH
 
 
 def supply_for(device: Device, angle: float, torque: float) -> float | None:
-    """Supply pressure [Pa absolute] for which a device gives a static torque [N m] at an angle [rad].
+    """Return the supply pressure [Pa absolute] for a static torque [N m] at an angle [rad].
 
     Chamber 1 raises the torque above the torque of the vented actuator, chamber 2 lowers it; with a vacuum the reverse.
     None if no supply up to ``HIGHEST_PRESSURE``, or no vacuum, gives the torque.

@@ -1,4 +1,4 @@
-"""Processors with firmware support. To add one here: a description, and the files of its board."""
+"""Catalogue of processors with firmware support, each with its board files and simulator."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,16 +14,16 @@ from ppafo.wording import nearest_name
 # mspdebug's simulator of an MSP430, driven by its console.
 
 _CYCLES = re.compile(rb"MCLK:\s+(\d+)")
-"""Regular expression of the cycle counter in mspdebug's output."""
+"""Pattern of the cycle count in mspdebug's output."""
 _QUERIES = "asked.txt"
-"""Name of the file with mspdebug commands for some samples."""
+"""File with the mspdebug commands for a batch of samples."""
 _SHOW_OUTPUTS = "simio info counter\nmd simulated_outputs 4"
-"""Command to mspdebug after each sample: cycle count, and the four output bytes."""
+"""mspdebug command after each sample: cycle count, and the four output bytes."""
 
 
 @final
 class _MspdebugSimulator:
-    """Simulator of an MSP430 by mspdebug, with an image loaded."""
+    """MSP430 simulator mspdebug with a loaded image."""
 
     def __init__(self, target: Target, image: Image) -> None:
         self._cycles = 0
@@ -42,7 +42,7 @@ class _MspdebugSimulator:
         self._answer()
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
-        """Controller decisions for up to 50 consecutive samples, requested in one batch to avoid a round trip each."""
+        """Return the decisions for consecutive samples, requested in one batch."""
         queries = []
         for readings in every:
             content = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
@@ -59,7 +59,7 @@ class _MspdebugSimulator:
         return decisions
 
     def stack(self) -> int:
-        """Deepest use of the stack [bytes]: the overwritten part of RAM that was filled before."""
+        """Return the deepest use of the stack [bytes], from overwritten fill bytes in RAM."""
         self._say(f"md {self._start} {self._free}\n{_SHOW_OUTPUTS}")
         response = self._console.until(b"simulated_outputs 4\n")
         self._console.until(b"\n")
@@ -70,7 +70,7 @@ class _MspdebugSimulator:
         self._console.say(f"{text}\n".encode())
 
     def _answer(self) -> bytes:
-        """Return the four output bytes at the end of the response, and record the cycle count."""
+        """Return the four output bytes of a response, and store the cycle count."""
         response = self._console.until(b"simulated_outputs 4\n")
         self._cycles = int(_CYCLES.findall(response)[-1])
         return bytes.fromhex(self._console.until(b"\n").split(b":")[1].split(b"|")[0].decode())
@@ -89,7 +89,7 @@ firmware.hex: firmware.elf
 """
 
 _FLASH = "\n# {said}. Read README.md first.\nflash: {needs}\n\t{command}\n"
-"""Part of a make file that writes the program to the processor."""
+"""Make file rule that writes the program to the processor."""
 
 
 MSP430F2013 = Target(
@@ -129,7 +129,7 @@ MSP430F2013 = Target(
 
 
 def _cortex(name: str, part: str, pins: Mapping[str, str], flash: int, ram: int, **more: Any) -> Target:
-    """Cortex-M on a micro:bit with given flash and RAM [bytes]; the compiler may be gcc, clang or zig."""
+    """Declare a Cortex-M on a micro:bit with flash and RAM [bytes]; compilers are gcc, clang or zig."""
     for_zig = f"zig cc -target thumb-freestanding-eabi -mcpu={name.replace('-', '_')}"
     copy_rule = _FLASH.format(
         said="Onto the drive that the board is", needs="firmware.hex", command='cp firmware.hex "$(MICROBIT)"'
@@ -209,11 +209,11 @@ CORTEX_M4 = _cortex(
 )
 CATALOG: dict[str, Target] = {target.name: target for target in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
 TARGETS = tuple(CATALOG)
-"""Names of the processors with firmware support, the default first."""
+"""Names of the processors with firmware support, default first."""
 
 
 def target_of(name: str) -> Target:
-    """Return the target of a name. Raises ScenarioError if there is none."""
+    """Return a target by name. Raises ScenarioError for an unknown name."""
     if name not in CATALOG:
         hint = nearest_name(name, CATALOG)
         raise ScenarioError(f"there is no target '{name}'{hint}; available: {', '.join(CATALOG)}")

@@ -10,7 +10,7 @@ from ppafo.errors import ScenarioError
 from ppafo.wording import argument_text
 
 MOST_SAMPLES = 10_000_000
-"""Largest number of drawn samples in a comparison."""
+"""Largest number of random samples in a comparison."""
 
 
 COMMAND = "export firmware"

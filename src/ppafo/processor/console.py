@@ -1,4 +1,4 @@
-"""Simulator process, controlled by its standard input and output, and the stack depth in its memory."""
+"""Simulator process with text input and output, and stack depth from its memory."""
 
 import os
 import select
@@ -12,14 +12,14 @@ from ppafo.errors import SimulationError
 from ppafo.wording import one_line, reason
 
 UNTOUCHED = 0xA5
-"""Fill byte of the stack's RAM, which reveals the bytes that the stack has overwritten."""
+"""Fill byte of stack memory, which shows how deep the stack was overwritten."""
 _PATIENCE = 60.0
-"""Timeout [s] without a byte from a simulator; QEMU takes about 10 s to start on a busy machine."""
+"""Longest time without output from a simulator [s]; QEMU needs about 10 s to start on a busy machine."""
 
 
 @final
 class Console:
-    """Local program controlled by its standard input and output; ``close`` ends the program."""
+    """Local process with text input and output; ``close`` ends it."""
 
     def __init__(self, command: Sequence[str], folder: Path) -> None:
         self._name = command[0]
@@ -39,7 +39,7 @@ class Console:
         self.close = finalize(self, _end, self._process)
 
     def say(self, text: bytes) -> None:
-        """Write text to the program. Raises SimulationError if the program has ended."""
+        """Write text to the process. Raises SimulationError if it has ended."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(text)
@@ -47,7 +47,7 @@ class Console:
             raise SimulationError(f"{self._name} has ended: {reason(error)}; {self._last()}") from error
 
     def until(self, mark: bytes) -> bytes:
-        """Return the output of the program up to a mark. Raises SimulationError if no output comes."""
+        """Return the output of the process up to a mark. Raises SimulationError without output."""
         assert self._process.stdout is not None
         while mark not in self._unread:
             ready, _, _ = select.select([self._process.stdout], [], [], _PATIENCE)
@@ -70,5 +70,5 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 
 
 def depth_of_stack(memory: bytes) -> int:
-    """Deepest use of a stack [bytes] that grows down from the end of memory filled with ``UNTOUCHED``."""
+    """Return the deepest use of a stack [bytes] that grows down in memory filled with ``UNTOUCHED``."""
     return len(memory) - next((depth for depth, byte in enumerate(memory) if byte != UNTOUCHED), len(memory))

@@ -1,4 +1,4 @@
-"""Firmware of a scenario's controller for a small processor: range proof, translated C, board layer, make file."""
+"""Firmware of a controller for a small processor: range proof, C translation, board layer, make file."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,11 +37,11 @@ from ppafo.version import __version__
 PRELUDE = "prelude_whole.h"
 _NUMBER = r"(?:bool|int16_t|int32_t) \w+"
 _OF_NUMBERS = re.compile(rf"^PPAFO_INLINE(?= {_NUMBER}\((?:{_NUMBER},\s+)*{_NUMBER}\)$)", re.MULTILINE)
-"""Qualifier in front of a C function whose parameters and result are numbers."""
+"""Pattern of the qualifier of a C function whose parameters and result are numbers."""
 
 
 def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
-    """Typed functions of a law in 16 and 32 bits, and proven ranges of the command and of the next state.
+    """Prove the integer widths of a law; return its typed functions, and ranges of command and next state.
 
     The proof covers every number in the declared ranges of ``numbers`` (default: the numbers of the law), every state
     in the ranges of the law, and every reading. Raises ProgramError if a value may exceed 32 bits, or the next state
@@ -70,7 +70,7 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
 
 
 def law_source(law: FixedLaw) -> str:
-    """Return the law in C, with its state and the numbers of ``parameters.h``."""
+    """Return the C source of a law, with its state and the numbers of ``parameters.h``."""
     collector = SourceCollector("")
     entry = collector.add(law.sample)
     documents = documents_of(collector)
@@ -112,17 +112,17 @@ bool controller_is_sound(void)
 
 
 def _written(row: Any) -> str:
-    """Return the C initialiser of a NamedTuple, nested ones included."""
+    """Return the C initialiser of a NamedTuple, nested NamedTuples included."""
     return "{" + ", ".join(_written(part) if isinstance(part, tuple) else str(part) for part in row) + "}"
 
 
 def macro(quantity: Quantity) -> str:
-    """Return the name of a number in ``parameters.h``."""
+    """Return the macro name of a number in ``parameters.h``."""
     return f"CONTROLLER_{quantity.name.upper()}"
 
 
 def parameters_header(fixed: "FixedPointController") -> str:
-    """Return ``parameters.h``: every number of a law with unit, meaning and origin; C refuses numbers out of range."""
+    """Return ``parameters.h``: the numbers of a law with unit, meaning, origin and range check."""
     scenario, law = fixed.scenario, fixed.law
     control = scenario.controller
     declared: dict[str, Quantity] = {quantity.name: quantity for quantity in CONTROLLERS[control.kind].quantities}
@@ -156,26 +156,26 @@ def parameters_header(fixed: "FixedPointController") -> str:
 
 
 def _nested(row: type, ranges: Iterator[IntegerRange]) -> Range:
-    """Return the ranges of a NamedTuple's numbers, nested like the NamedTuple."""
+    """Arrange ranges of numbers in the nested form of a NamedTuple."""
     return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
 
 
 def _typed_row(kind: Any, collector: SourceCollector) -> Row:
-    """Return a NamedTuple of integers as a row type for the range analysis."""
+    """Return the row type of a NamedTuple of integers."""
     hints = get_type_hints(kind)
     fields = tuple((name, _typed_row(hints[name], collector) if is_row(hints[name]) else INT) for name in kind._fields)
     return Row(collector.add(kind), fields)
 
 
 TICK = 125.0e-6
-"""Unit of the sample period [s]: one pulse of the timer."""
+"""Timer tick [s], the unit of the sample period."""
 MOST_TICKS = 32767
-"""Largest number of ticks in a signed 16-bit integer."""
+"""Largest number of timer ticks in a signed 16-bit integer."""
 _TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controller.h", "host.c", "main.c")
 
 
 class FixedPointController(NamedTuple):
-    """Integer controller: scenario in integer form, law, integers by name, converter, ticks per sample period."""
+    """Integer controller: scenario, law, integers by name, converter resolution and limits, timer ticks per sample."""
 
     scenario: Scenario
     law: FixedLaw
@@ -186,7 +186,7 @@ class FixedPointController(NamedTuple):
 
 
 def integer_form(scenario: Scenario) -> Scenario:
-    """Return the scenario with its controller in integer arithmetic; default converter settings are added.
+    """Return a scenario with its controller in integer arithmetic, with default converter settings.
 
     Raises ScenarioError if the controller has no integer form.
     """
@@ -211,7 +211,7 @@ def integer_form(scenario: Scenario) -> Scenario:
 
 
 def fixed_point_controller(scenario: Scenario) -> FixedPointController:
-    """Integer controller of a scenario. Raises ScenarioError if the timer cannot produce the sample period."""
+    """Return the integer controller of a scenario. Raises ScenarioError if the timer cannot produce its period."""
     scenario = integer_form(scenario)
     period = scenario.controller.period
     ticks = round(period / TICK)
@@ -230,7 +230,7 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
 
 
 def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
-    """Firmware files of a scenario's controller, by name. Raises ScenarioError if it has no integer form."""
+    """Return the firmware files of a controller by name. Raises ScenarioError without an integer form."""
     chosen = target_of(target)
     fixed = fixed_point_controller(scenario)
     scenario, steps, (top, middle) = fixed.scenario, fixed.steps, fixed.limits

@@ -1,4 +1,4 @@
-"""Arithmetic of a small processor: products by shifts and additions, integer gains, converter readings.
+"""Integer arithmetic of a small processor: products by shifts and additions, gains, converter readings.
 
 A gain is a 15-bit fraction and a right shift: ``(value * fraction >> 15) >> places``, rounded down each time.
 """
@@ -12,17 +12,17 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 
 FRACTION_BITS = 15
-"""Number of fractional bits."""
+"""Number of fractional bits of a gain."""
 LARGEST_FRACTION: int = 2**FRACTION_BITS - 1
 """Largest fraction in a signed 16-bit integer."""
 MOST_PLACES = 30
-"""Largest right shift of a 32-bit product."""
+"""Largest right shift of a 32-bit product [bits]."""
 SHARPENED = int(1.0 / SHARPNESS)
-"""Inverse of the smallest opening, as a fraction of full opening, at which the dead band is compensated in full."""
+"""Reciprocal of the smallest opening, relative to full opening, with full dead-band compensation [-]."""
 
 
 def fraction_of(value: int, fraction: int) -> int:
-    """``value`` (at most 2^30 in magnitude) times ``fraction`` / 2^15, rounded down at every bit of the fraction."""
+    """Return ``value`` (at most 2^30 in magnitude) times ``fraction`` / 2^15, rounded down at every bit."""
     # The MSP430 has no multiplier, and a product in C would ask for a run-time library that the image does not have.
     total = 0
     left = fraction
@@ -34,7 +34,7 @@ def fraction_of(value: int, fraction: int) -> int:
 
 
 def beyond_band(opening: int, band: int, full: int) -> int:
-    """Command for an ``opening`` from -``full`` to ``full`` with compensation of the dead band ``band`` / 2^15.
+    """Return the command for an ``opening`` from -``full`` to ``full``, with dead band ``band`` / 2^15 compensated.
 
     The law of ``control.torque_loop.beyond_dead_band``, rounded down to integer parts of ``full``; a ``band`` of 0
     returns the opening.
@@ -45,7 +45,7 @@ def beyond_band(opening: int, band: int, full: int) -> int:
 
 
 def shifted(value: int, places: int) -> int:
-    """``value`` divided by 2 to the power ``places``, rounded down."""
+    """Return ``value`` divided by 2 to the power ``places``, rounded down."""
     result = value
     # One place at a time: a shift by a variable is a call of the run-time library too.
     for _ in range(places):
@@ -54,12 +54,12 @@ def shifted(value: int, places: int) -> int:
 
 
 def limited(value: int, limit: int) -> int:
-    """``value`` limited to the range from -``limit`` to ``limit``."""
+    """Return ``value`` limited to the range from -``limit`` to ``limit``."""
     return max(min(value, limit), -limit)
 
 
 def gain_of(factor: float) -> tuple[float, float]:
-    """Fraction of 15 bits and right shift that multiply by ``factor`` / 2^15, for a factor from 0 to 32767.
+    """Return the 15-bit fraction and right shift for a gain of ``factor`` / 2^15, factor 0 to 32767.
 
     The fraction uses as many bits as possible; a larger factor is limited to the largest representable one.
     """
@@ -77,7 +77,7 @@ def gain_of(factor: float) -> tuple[float, float]:
 
 FEWEST_BITS, MOST_BITS = 8, 14
 COMMAND_STEPS = 1000
-"""Integer command for a command of 1: half the ticks of the pulse that drives a proportional valve."""
+"""Integer command of a full command: half the timer ticks of a proportional valve's pulse."""
 LARGEST_READING: int = 2**MOST_BITS - 1
 
 SETTINGS = (
@@ -92,25 +92,25 @@ SETTINGS = (
         follows=(nominal_term("converter_range"),),
     ),
 )
-"""Settings of the converter of an integer controller."""
+"""Converter settings of an integer controller."""
 
 
 class ConverterLimits(NamedTuple):
-    """Largest reading of a converter, and mid-range reading that represents a reference of 0 N m."""
+    """Largest converter reading, and mid-range reading of a reference of 0 N m [counts]."""
 
     top: int
     middle: int
 
 
 class CountResolution(NamedTuple):
-    """Pressure [Pa] and torque [N m] of one count of a converter."""
+    """Pressure [Pa] and torque [N m] per converter count."""
 
     pressure_step: float
     torque_step: float
 
 
 class ConverterCounts(NamedTuple):
-    """Converter readings from 0 to the largest one: reference, pressure in chamber 1, pressure in chamber 2."""
+    """Converter readings [counts]: reference, pressure in chamber 1, pressure in chamber 2."""
 
     reference: int
     pressure_1: int
@@ -125,13 +125,13 @@ OF_LIMITS = (
     Quantity("top", "", "largest reading of the converter", None, 0.0, float(LARGEST_READING)),
     Quantity("middle", "", "reading that stands for a reference of 0 N m", None, 0.0, float(2 ** (MOST_BITS - 1))),
 )
-"""Fields of ``CountResolution`` and of ``ConverterLimits``, in order."""
+"""Declared fields of ``CountResolution`` and ``ConverterLimits``, in order."""
 
 
 def converter_of(
     bits: float, pressure_range: float, torque_constant: float
 ) -> tuple[CountResolution, tuple[float, float]]:
-    """Steps and limits of a converter with a number of bits and a full scale of ``pressure_range`` [Pa].
+    """Return resolution and limits of a converter with full scale ``pressure_range`` [Pa].
 
     A reference of 0 N m is in mid-range, and one count of the reference is the torque of one count of pressure.
     """
@@ -141,7 +141,7 @@ def converter_of(
 
 
 def count_of(value: float, step: float, top: float) -> int:
-    """Converter count of a value in the unit of its ``step``: rounded, and limited to 0 and ``top``."""
+    """Return the converter count of a value in the unit of ``step``, rounded and limited to 0 and ``top``."""
     # What is not negative is rounded by adding a half, in C as in Python.
     return int(max(0.0, min(top, value / step + 0.5)))
 
@@ -149,7 +149,7 @@ def count_of(value: float, step: float, top: float) -> int:
 def read(
     steps: CountResolution, limits: ConverterLimits, reference: float, measurement: Measurement
 ) -> ConverterCounts:
-    """Converter readings of a reference [N m] and of the measured pressures [Pa]."""
+    """Return the converter readings of a reference [N m] and measured pressures [Pa]."""
     return ConverterCounts(
         reference=count_of(reference + limits.middle * steps.torque_step, steps.torque_step, limits.top),
         pressure_1=count_of(measurement.pressure_1, steps.pressure_step, limits.top),
@@ -158,12 +158,12 @@ def read(
 
 
 def is_inside(reading: int, top: int) -> bool:
-    """Return whether a reading is not at an end of its range, where a broken wire or a short circuit puts it."""
+    """Return whether a reading is inside its range, unlike a broken wire or a short circuit."""
     return reading > 0 and reading < top
 
 
 def still_sound(sound: int, readings: ConverterCounts, limits: ConverterLimits) -> int:
-    """Return 1 while no reading has been at an end of its range, else 0 permanently."""
+    """Return 1 while all readings so far were inside their range, else 0 permanently."""
     inside = (
         is_inside(readings.reference, limits.top)
         and is_inside(readings.pressure_1, limits.top)
@@ -173,5 +173,5 @@ def still_sound(sound: int, readings: ConverterCounts, limits: ConverterLimits) 
 
 
 def error_of(readings: ConverterCounts, limits: ConverterLimits) -> int:
-    """Reference minus torque, in counts of pressure."""
+    """Return the torque error, reference minus torque, in counts of pressure."""
     return readings.reference - limits.middle - (readings.pressure_1 - readings.pressure_2)

@@ -1,4 +1,4 @@
-"""Small processors and their firmware images: memory and tools of a target, building and measuring of images."""
+"""Firmware images and targets: memory and tools of a processor, build and size of an image."""
 
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ from ppafo.wording import one_line
 
 
 class Decision(NamedTuple):
-    """Decision for one sample: command in steps, 1 while all readings are valid, and cycles or instructions used."""
+    """Controller decision for a sample: command [steps], 1 for valid readings, and cycles or instructions."""
 
     command: int
     is_sound: int
@@ -23,7 +23,7 @@ class Decision(NamedTuple):
 
 
 class ImageSizes(NamedTuple):
-    """Flash of an image and RAM of its data [bytes]."""
+    """Flash of an image, and RAM of its data [bytes]."""
 
     flash: int
     data: int
@@ -31,7 +31,7 @@ class ImageSizes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """Program built for the simulator: its file, its sizes, and the addresses of its symbols.
+    """Firmware image for the simulator: file, sizes, and symbol addresses.
 
     ``shipped`` are the sizes of the program for the board, which has the hardware layer around the controller.
     """
@@ -43,24 +43,24 @@ class Image:
 
 
 class ProcessorSimulator(Protocol):
-    """Simulator with a loaded image that waits for a sample. Methods raise SimulationError if it does not respond."""
+    """Processor simulator with a loaded image. Methods raise SimulationError if it does not respond."""
 
     def begin(self) -> None:
         """Reset the processor and run it until it waits for a sample."""
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
-        """Controller decisions for up to 50 consecutive samples, in one batch where the simulator can."""
+        """Return the decisions for consecutive samples, in one batch if possible."""
 
     def stack(self) -> int:
-        """Deepest use of the stack [bytes]."""
+        """Return the deepest use of the stack [bytes]."""
 
     close: Callable[[], object]
-    """Function that ends the simulator."""
+    """Function that ends the simulator process."""
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Processor with firmware support.
+    """Processor with firmware support: memory, tools, templates and simulator.
 
     ``processor`` and ``board`` describe it, ``clock`` is the clock frequency [Hz], ``flash`` and ``ram`` are address
     ranges, ``interrupt_stack`` is the stack use of an interrupt on the board [bytes], ``converter_bits`` the resolution
@@ -92,21 +92,21 @@ class Target:
 
 
 _LOADED = 2
-"""SHF_ALLOC of the ELF format: the flag of a section that is in memory while the program runs."""
+"""SHF_ALLOC of ELF, the flag of a section in memory at run time."""
 _WITH_VALUES, _SYMBOL_TABLE = 1, 2
-"""SHT_PROGBITS and SHT_SYMTAB of the ELF format: kinds of sections."""
+"""SHT_PROGBITS and SHT_SYMTAB of ELF, types of sections."""
 _SECTION = struct.Struct("<IIIIIIIIII")
 _SYMBOL = struct.Struct("<IIIBBH")
-"""A section header and a symbol of a 32-bit ELF file."""
+"""Layouts of a section header and a symbol in a 32-bit ELF file."""
 
 
 def missing_tools(target: Target) -> tuple[str, ...]:
-    """Tools of a target that are not installed on this computer."""
+    """Return the tools of a target that are not installed on this computer."""
     return tuple(tool for tool in target.tools if which(tool) is None)
 
 
 def make_firmware(folder: Path, goals: Sequence[str] = ("all",)) -> None:
-    """Run make for some goals in a folder with firmware files. Raises SimulationError if it fails."""
+    """Run make for goals in a firmware folder. Raises SimulationError if it fails."""
     done = asked(["make", "-C", str(folder), *goals], scratch=folder.absolute())
     if done.returncode != 0:
         # Make says which goal failed; the line of the compiler says why.
@@ -116,7 +116,7 @@ def make_firmware(folder: Path, goals: Sequence[str] = ("all",)) -> None:
 
 @contextmanager
 def processor_simulator(contents: Mapping[str, bytes], target: Target) -> Iterator[tuple[ProcessorSimulator, Image]]:
-    """Context manager of the simulator of a target with the firmware of these files loaded; yields simulator and image.
+    """Build firmware files and load them into the target's simulator; yields simulator and image.
 
     Raises SimulationError if a tool is missing, the files cannot be built, or the simulator does not respond.
     """
@@ -151,7 +151,7 @@ class _Section(NamedTuple):
 
 
 def _sections(content: bytes) -> list[_Section]:
-    """Sections of a little-endian 32-bit ELF file."""
+    """Return the sections of a little-endian 32-bit ELF file."""
     # Where the section headers begin, how long each is, and how many there are (e_shoff, e_shentsize, e_shnum).
     (start,) = struct.unpack_from("<I", content, 0x20)
     length, count = struct.unpack_from("<HH", content, 0x2E)
@@ -159,7 +159,7 @@ def _sections(content: bytes) -> list[_Section]:
 
 
 def sizes(image: Path, target: Target) -> ImageSizes:
-    """Flash and RAM of a program on a target."""
+    """Return flash and RAM of a program on a target [bytes]."""
     loaded = [section for section in _sections(image.read_bytes()) if section.flags & _LOADED]
     in_ram = [section for section in loaded if section.address in target.ram]
     values = sum(section.size for section in in_ram if section.kind == _WITH_VALUES)
@@ -169,7 +169,7 @@ def sizes(image: Path, target: Target) -> ImageSizes:
 
 
 def read_image(folder: Path, target: Target) -> Image:
-    """Image for the simulator from a folder with built firmware."""
+    """Return the simulator image of a folder with built firmware."""
     file, shipped = folder / "simulated.elf", folder / "firmware.elf"
     content = file.read_bytes()
     sections, symbols = _sections(content), {}

@@ -1,4 +1,4 @@
-"""Comparison of a controller on the processor's simulator and in Python: for random samples, or in a run."""
+"""Comparison of a controller on a simulated processor and in Python, for random samples or in a run."""
 
 import random
 from collections.abc import Iterator, Sequence
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 
 EPISODE = 200
-"""Number of random samples between two resets of the controller."""
+"""Number of random samples between resets of the controller."""
 
 TURN = 50
-"""Number of random samples per query to the simulated processor."""
+"""Number of random samples per batch of the simulated processor."""
 
 
 class PythonProcessor:
-    """Integer controller of a scenario in Python, with the arithmetic of the processor."""
+    """Integer controller of a scenario in Python, with processor arithmetic."""
 
     def __init__(self, fixed: FixedPointController) -> None:
         self.law = fixed.law
@@ -38,17 +38,17 @@ class PythonProcessor:
         self.state: Any = fixed.law.begins
 
     def begin(self) -> None:
-        """Reset the state."""
+        """Reset the controller state."""
         self.state = self.law.begins
 
     def sample(self, readings: ConverterCounts) -> tuple[int, int]:
-        """Command in steps, and status word of the processor."""
+        """Return command [steps] and validity flag for readings."""
         command, self.state = self.law.sample(self.numbers, self.state, readings)
         return command, self.state.sound
 
 
 class _SimulatedController:
-    """Simulated processor as a controller of a scenario, which stores the decision of every sample."""
+    """Simulated processor as the controller of a scenario; stores the decision of every sample."""
 
     def __init__(self, simulator: ProcessorSimulator, fixed: FixedPointController) -> None:
         self.simulator = simulator
@@ -61,7 +61,7 @@ class _SimulatedController:
         self.decisions.clear()
 
     def update(self, time: float, reference: float, measurement: Any) -> float:
-        """Command from -1 to 1 for the converter readings; the processor counts samples instead of time [s]."""
+        """Return the command from -1 to 1 for the converter readings; the time [s] is not used."""
         del time
         readings = read(self.fixed.steps, self.fixed.limits, reference, measurement)
         (decision,) = self.simulator.samples((readings,))
@@ -70,7 +70,7 @@ class _SimulatedController:
 
 
 class Cost(NamedTuple):
-    """Resources of a target that a controller needs.
+    """Resources that a controller needs on a target.
 
     Sizes of the program and depth of the stack [bytes]; maximum and mean of the cycles or instructions of a sample, in
     the unit of the target.
@@ -85,7 +85,7 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ProcessorRun:
-    """Scenario run with the simulated processor and with the integer controller in Python, and resources used.
+    """Scenario run twice, on the simulated processor and with the integer controller in Python, with resources.
 
     ``differences`` is the number of samples with different commands; ``same_bits`` is True if all channels are equal.
     """
@@ -100,7 +100,7 @@ class ProcessorRun:
 
 
 def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorRun:
-    """Run a scenario with its controller on the processor's simulator, in virtual time, and again in the engine.
+    """Run a scenario with its controller on the simulated processor in virtual time, and again in the engine.
 
     Raises ScenarioError if the controller has no integer form, SimulationError if a tool is missing.
     """
@@ -118,7 +118,7 @@ def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorR
 
 @dataclass(frozen=True, slots=True)
 class DecisionComparison:
-    """Decisions on the processor's simulator and in Python: number of samples, of differences, and resources used."""
+    """Comparison of decisions on the simulated processor and in Python: samples, differences, resources."""
 
     samples: int
     differences: int
@@ -127,7 +127,7 @@ class DecisionComparison:
 
 
 def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str = TARGETS[0]) -> DecisionComparison:
-    """Compare decisions for random readings on the simulator and in Python, with a reset every ``EPISODE`` samples."""
+    """Compare decisions for random readings on the simulated processor and in Python, with regular resets."""
     fixed, chosen = fixed_point_controller(scenario), target_of(target)
     reference = PythonProcessor(fixed)
     expected: list[tuple[int, int]] = []
@@ -155,7 +155,7 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
 
 
 def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCounts]:
-    """Random converter readings up to a largest reading: signals that wander, jump, rest at a limit, or break.
+    """Yield random converter readings: wandering, jumping, resting at a limit, or broken signals.
 
     Each episode has one kind of signal; in two of five a reading reaches an end of its range at some time.
     """
@@ -177,7 +177,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCount
 
 
 def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:
-    """Resources used by decisions on a processor. Raises SimulationError if there are no decisions."""
+    """Return the resources used by decisions on a processor. Raises SimulationError without decisions."""
     if not decisions:
         raise SimulationError("the simulated processor took no sample; simulate a longer run")
     work = [decision.work for decision in decisions]
@@ -185,13 +185,13 @@ def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision])
 
 
 _MARGINS = FigureMargins(left=0.68, right=0.15, top=0.42, bottom=0.52, row_gap=0.36)
-"""Margins of the figure [inches]."""
+"""Figure margins [inches]."""
 _WIDTH, _TORQUE, _COMMAND = 7.6, 2.6, 0.9
 _LANES = (0, (1, 3))
 
 
 def processor_figure(runs: Sequence[ProcessorRun]) -> "Figure":
-    """Return the figure of some runs, two panels for each: torque with its reference, and the command to the valve.
+    """Draw runs on the processor, two panels for each: torque with its reference, and valve command.
 
     The run in the engine is drawn as dots on the lines of the processor. With ``torque-task-solenoid`` and
     ``torque-task-proportional`` it is figure 8 of the paper.

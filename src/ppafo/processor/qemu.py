@@ -1,4 +1,4 @@
-"""QEMU with a Cortex-M, controlled by the gdb remote protocol over its standard input and output."""
+"""QEMU machine with a Cortex-M, controlled by the gdb remote protocol over standard input and output."""
 
 import struct
 from collections.abc import Callable, Iterable, Sequence
@@ -9,24 +9,24 @@ from ppafo.processor.console import UNTOUCHED, Console, depth_of_stack
 from ppafo.processor.images import Decision, Image, Target
 
 DEEPEST = 1024
-"""Size of the memory below the end of RAM that is searched for used stack [bytes]."""
+"""Size of the memory at the end of RAM that is searched for used stack [bytes]."""
 _SHIFT = 7
-"""Binary logarithm of the duration of an instruction in QEMU, in nanoseconds."""
+"""Binary logarithm of the instruction time in QEMU [ns]."""
 _NANOSECONDS = 2**_SHIFT
-"""Duration of an instruction on the machine [ns]: more than two ticks of the counter, so that none is missed."""
+"""Instruction time of the machine [ns], more than two counter ticks, so that every instruction counts."""
 _COUNTER_BITS = 24
-"""Number of bits of SysTick, which counts down the ticks of the processor's clock."""
+"""Number of bits of SysTick, which counts processor clock ticks down."""
 _PIECE = 1024
-"""Bytes read or written in one packet, close to the largest packet size."""
+"""Bytes per packet of the protocol, close to its limit."""
 _FORM_OF_OUTPUTS = struct.Struct("<hhII")
-"""Memory layout of the outputs: command, validity of the readings, and counter before and after the sample."""
+"""Memory layout of the outputs: command, validity of readings, counter before and after the sample."""
 _THUMB, _LENGTH_OF_NOP = 1, 2
-"""Address bit of a Thumb instruction, and length in bytes of an instruction without effect (nop)."""
+"""Address bit of a Thumb instruction, and length of a nop instruction [bytes]."""
 
 
 @final
 class Debugger:
-    """QEMU machine that is stopped except between ``go_on`` and the next breakpoint; addresses are the processor's."""
+    """Debugger connection to a QEMU machine, which runs only from ``go_on`` to the next breakpoint."""
 
     def __init__(self, machine: str, image: Image) -> None:
         time = f"shift={_SHIFT},sleep=off"
@@ -39,23 +39,23 @@ class Debugger:
         self._console.say(b"+")
 
     def reset(self) -> None:
-        """Reset the machine and leave it stopped at its entry."""
+        """Reset the machine; it remains stopped at its entry."""
         answer = self.packet(f"qRcmd,{b'system_reset'.hex()}")
         # Before its OK, QEMU may send what the command has to say.
         while answer != "OK":
             answer = self._answer()
 
     def stop_at(self, address: int) -> None:
-        """Set a breakpoint before the instruction at an address."""
+        """Set a breakpoint at an address."""
         self._expect(self.packet(f"Z0,{address:x},2"), "OK")
 
     def go_on(self, address: int | None = None) -> None:
-        """Run the machine, from ``address`` if given, until the next breakpoint."""
+        """Run the machine, from ``address`` if given, to the next breakpoint."""
         # Bit 0 of an address says that the instruction is Thumb; a Cortex-M has no other.
         self._expect(self.packet("c" if address is None else f"c{address | _THUMB:x}")[:3], "T05")
 
     def read(self, address: int, size: int) -> bytes:
-        """Content of memory."""
+        """Read bytes from memory."""
         content = b""
         for start in range(address, address + size, _PIECE):
             count = min(_PIECE, address + size - start)
@@ -72,7 +72,7 @@ class Debugger:
             self._expect(self.packet(f"M{address + start:x},{len(piece):x}:{piece.hex()}"), "OK")
 
     def packet(self, text: str) -> str:
-        """Send a packet of the protocol and return the reply."""
+        """Send a protocol packet and return the reply."""
         self._console.say(b"$%b#%02x" % (text.encode(), sum(text.encode()) % 256))
         return self._answer()
 
@@ -87,7 +87,7 @@ class Debugger:
 
 @final
 class QemuSimulator:
-    """QEMU with the image of a controller loaded.
+    """QEMU simulator of a Cortex-M with the image of a controller.
 
     QEMU does not model cycles: instructions are counted, by a clock that advances by the same time for each.
     """
@@ -109,7 +109,7 @@ class QemuSimulator:
         self.debugger.go_on()
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
-        """Controller decisions for consecutive samples."""
+        """Return the decisions for consecutive samples."""
         decisions = []
         for readings in every:
             self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
@@ -123,5 +123,5 @@ class QemuSimulator:
         return decisions
 
     def stack(self) -> int:
-        """Deepest use of the stack [bytes]: the overwritten part of RAM that was filled before."""
+        """Return the deepest use of the stack [bytes], from overwritten fill bytes in RAM."""
         return depth_of_stack(self.debugger.read(self._bottom, DEEPEST))

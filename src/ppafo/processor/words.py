@@ -1,4 +1,4 @@
-"""Output of comparisons on a processor simulator: text, data and figure."""
+"""Output of comparisons on a simulated processor: text, data and figure."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 SAMPLES_OF_TABLE = 1000
-"""Default number of samples of each controller in the table."""
+"""Default number of samples per controller in the table."""
 
 TABLE = (
     ("pid", "torque-task-proportional", ()),
@@ -30,11 +30,11 @@ TABLE = (
     ("on_off", "torque-task-solenoid", ()),
     ("on_off_dead_zone", "torque-task-proportional", ("controller.kind=on_off_dead_zone",)),
 )
-"""Controllers of the table, each with its scenario and overrides."""
+"""Controllers of the comparison table, with scenario and overrides."""
 
 
 def verify_samples(name: str, target: str, samples: int, overrides: Sequence[str]) -> CommandOutput:
-    """Compare the decisions for drawn samples on the simulator of a target and in Python."""
+    """Compare decisions for random samples on the simulated processor and in Python."""
     scenario = load_scenario(name, overrides)
     comparison = compare_drawn(scenario, samples, target=target)
     lines = [
@@ -50,7 +50,7 @@ def verify_samples(name: str, target: str, samples: int, overrides: Sequence[str
 
 
 def verify_runs(names: Sequence[str], target: str, overrides: Sequence[str]) -> CommandOutput:
-    """Run scenarios with the controller on the simulated processor in sequence, and draw them in one figure."""
+    """Run scenarios with the controller on the simulated processor, and draw them in a figure."""
     runs = [run_on_processor(load_scenario(name, overrides), target) for name in names]
     texts, documents = [], []
     for run in runs:
@@ -75,7 +75,7 @@ def verify_runs(names: Sequence[str], target: str, overrides: Sequence[str]) -> 
 
 
 def verify_table(targets: Sequence[str], samples: int | None) -> CommandOutput:
-    """Compare every controller on every target, and return a table."""
+    """Compare every controller on every target, as a table."""
     lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
     lines.append("|---|---|---|---|---|---|---|")
     documents: list[dict[str, Any]] = []

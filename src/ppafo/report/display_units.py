@@ -1,4 +1,4 @@
-"""Quantities and metrics in display units, as set in ``units/shown.py``; files and data stay in SI units."""
+"""Conversion of quantities and metrics from SI to the display units set in ``units/shown.py``, for text and axes."""
 
 import math
 from collections.abc import Mapping
@@ -14,11 +14,11 @@ Floats = NDArray[np.float64]
 
 
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
-"""Kind of quantity of a metric by its SI unit: a mass among the metrics is a mass of gas."""
+"""Quantity of a metric by SI unit, where the unit alone is ambiguous: masses among the metrics are gas masses."""
 _ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
-"""Units with a different form on an axis."""
+"""Forms of display units on the axes of figures, where these differ from the form in tables."""
 _PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
-"""Words for the suffix of a pressure unit on an axis."""
+"""Words for the suffixes of pressure units on the axes of figures."""
 _METRIC = ".4g"
 """Number format of a metric."""
 
@@ -34,7 +34,7 @@ def display_unit(quantity: str) -> str:
 
 
 def change_unit(quantity: str, given: str = "") -> str:
-    """Return the display unit of a difference of two values; empty for a dimensionless number."""
+    """Return the display unit of a difference of two values of a quantity; empty for a dimensionless number."""
     unit = given or display_unit(quantity)
     # A difference of pressures is neither gauge nor absolute.
     return unit[:-2] if quantity == "pressure" and unit.endswith(("_g", "_a")) else unit
@@ -51,7 +51,7 @@ def axis_unit(quantity: str, given: str = "") -> str:
 
 
 def display_value(value: float, quantity: str, atmosphere: float | None = None, unit: str = "") -> float:
-    """Return a value given in SI in its display unit.
+    """Convert a value from SI to its display unit.
 
     Gauge pressure is relative to ``atmosphere`` [Pa absolute], by default of the active device (``units/shown.py``).
 
@@ -65,25 +65,25 @@ def display_value(value: float, quantity: str, atmosphere: float | None = None, 
 
 
 def display_difference(value: float, quantity: str, unit: str = "") -> float:
-    """Return a difference of two values, given in SI, in its display unit or in ``unit``."""
+    """Convert a difference of two values from SI to its display unit or to ``unit``."""
     # The zero of gauge pressures and of degrees Celsius falls out.
     return display_value(value, quantity, unit=unit) - display_value(0.0, quantity, unit=unit)
 
 
 def display_values(values: Floats, quantity: str, atmosphere: float | None = None, unit: str = "") -> Floats:
-    """Return an array of values, given in SI (any shape), in the display unit or in ``unit``."""
+    """Convert an array of values (any shape) from SI to the display unit or to ``unit``."""
     # Units are affine, so that two values decide all.
     zero, one = (display_value(number, quantity, atmosphere, unit) for number in (0.0, 1.0))
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 
 
 def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
-    """Return a value given in SI as text in its display unit, with this unit."""
+    """Format a value given in SI as number and display unit."""
     return f"{without_exponent(display_value(value, quantity), form)} {display_unit(quantity)}".rstrip()
 
 
 def metric_quantity(si_unit: str) -> str:
-    """Return the kind of quantity of a metric or channel from its SI unit; empty for a dimensionless number."""
+    """Return the quantity of a metric or channel by its SI unit; empty for a dimensionless number."""
     return _OF_GAS.get(si_unit) or quantity_of_unit(si_unit)
 
 
@@ -105,7 +105,7 @@ def metrics_lines(metrics: Mapping[str, Metric]) -> list[str]:
 
 
 def metric_text(value: float, si_unit: str) -> str:
-    """Return the value of a metric or channel as text in its display unit, with this unit."""
+    """Format the value of a metric or channel, given in SI, as number and display unit."""
     shown, unit = metric_level(value, si_unit)
     return f"{without_exponent(shown, _METRIC)} {unit}".rstrip()
 
@@ -117,13 +117,13 @@ def name_lines(metrics: Mapping[str, Metric]) -> list[str]:
 
 
 def metric_level(value: float, si_unit: str) -> tuple[float, str]:
-    """Return the value of a metric or channel in its display unit, and this unit."""
+    """Convert the value of a metric or channel from SI; returns number and display unit."""
     quantity = metric_quantity(si_unit)
     return display_value(value, quantity), display_unit(quantity) or si_unit.removeprefix("-")
 
 
 def metric_change(value: float, si_unit: str) -> tuple[float, str]:
-    """Return the difference of two values of a metric or channel in its display unit, and this unit."""
+    """Convert a difference of two values of a metric or channel from SI; returns number and display unit."""
     quantity = metric_quantity(si_unit)
     # A difference of temperatures counts in kelvin.
     unit = {"degC": "K"}.get(change_unit(quantity), change_unit(quantity))

@@ -1,4 +1,4 @@
-"""Import of Matplotlib without parts of its start-up that are not needed here."""
+"""Fast import of Matplotlib, without property tables in docstrings, 3D axes and TeX glyph names."""
 
 import importlib
 import importlib.util
@@ -16,11 +16,9 @@ _AXES_IN_SPACE = "mpl_toolkits.mplot3d"
 
 
 def load_drawing() -> None:
-    """Import Matplotlib without slow initialisation that is not needed here.
+    """Import Matplotlib without property tables in docstrings, three-dimensional axes and TeX glyph names.
 
-    Matplotlib would fill its docstrings with property tables, and load three-dimensional axes and the glyph names of
-    TeX. The glyph names are loaded at first use, the other parts never. Raises DataError if a setting of the user
-    prevents the import.
+    The glyph names are loaded at first use. Raises DataError if a Matplotlib setting of the user prevents the import.
     """
     if "matplotlib.artist" in sys.modules:
         return

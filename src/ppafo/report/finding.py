@@ -1,6 +1,6 @@
 """Report of an analysis as data: sentences, tables and figure panels, in SI units until converted to text.
 
-A ``Finding`` is the return value of every analysis; this module generates its text, JSON, page, figures and folder.
+Every analysis returns a ``Finding``; this module generates its text, JSON, page, figures and folder.
 """
 
 import html
@@ -31,17 +31,17 @@ Cell = str | float | ConfidenceInterval | None
 NOTHING = "-"
 """Text of an empty cell."""
 MARK = "*"
-"""Mark before a highlighted row."""
+"""Mark before a highlighted row of a table."""
 REPORT = "report.html"
 FORMATS = ("png", "svg")
-"""File formats of a figure in a folder."""
+"""File formats in which a figure is saved in a folder."""
 _UNIT_IN_BRACKETS = re.compile(r"\([^(]*\)$")
 _ORIGINS = {
     "simulated": "Every run is of the model; nothing on this page was measured.",
     "synthetic": "The recordings are synthetic: the simulated test bench made them, nothing was measured.",
     "measured": "",
 }
-"""Statement on the origin of the numbers of a page, by kind."""
+"""Statement on a report page about the origin of its numbers, by kind of recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +126,7 @@ class Section:
 
     @property
     def has_head(self) -> bool:
-        """True if any column has a title."""
+        """True if any column of the table has a title."""
         return any(column.title for column in self.columns)
 
     @property
@@ -149,7 +149,7 @@ class Section:
         return align_columns(lines, self.left + bool(self.marked))
 
     def drawn(self, kind: RecordingKind) -> "matplotlib.figure.Figure | bytes":
-        """Return the figure; its panels are marked with the kind of the numbers."""
+        """Draw the figure of the section, marked as simulated or synthetic unless ``kind`` is measured."""
         if self.draw is not None:
             return self.draw()
         panels = self.panels() if callable(self.panels) else self.panels
@@ -160,8 +160,8 @@ class Section:
 class LivePart:
     """Interactive simulation on a page: HTML with its script, and the content security policy for this script alone.
 
-    ``remark`` is a sentence on differences between the start of its runs and of the page's, empty without differences.
-    Without ``html``, it gives the reason that nothing can be simulated.
+    ``remark`` says how the initial state of its runs differs from the runs of the page, empty if it does not. Without
+    ``html``, it gives the reason that nothing can be simulated.
     """
 
     policy: str = ""

@@ -33,7 +33,7 @@ class ConfidenceInterval:
 
     @property
     def width(self) -> float:
-        """Width of the interval."""
+        """Width of the confidence interval, in the unit of the estimate."""
         return self.high - self.low
 
 

@@ -11,7 +11,7 @@ from ppafo.report.finding import LivePart
 LIVE_PARTS: Kinds[FunctionType] = Kinds(
     "ppafo.live_parts", "live part", FunctionType, {"workbench": "ppafo.page.workbench:live_part"}
 )
-"""Builders of a page's live part from scenarios: each returns a ``LivePart``, or None if there can be none."""
+"""Builders of the interactive part of a page from scenarios; a builder returns a ``LivePart``, or None."""
 
 
 def live_part(scenarios: Sequence[Any], name: str = "workbench") -> LivePart | None:

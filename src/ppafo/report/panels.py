@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 class Mark:
     """Graphical element of a panel: shape (of ``SHAPES``), positions [SI], label, colour and Matplotlib keywords.
 
-    ``to`` is a third number, as an end, a half width or the value of a colour, depending on the shape.
+    ``to`` holds further numbers [SI], by shape: end positions, half widths or values shown as colours.
     """
 
     shape: str
@@ -53,8 +53,8 @@ class Panel:
     """Panel of a figure.
 
     Panels in the same column with ``shares_x`` share the horizontal axis and show the label of the vertical axis as
-    title. A panel without marks stays empty; one with ``shares_x`` beside nothing but empty panels is widened to the
-    whole row.
+    title. A panel without marks stays empty; a panel with ``shares_x`` is widened to the whole row if all other panels
+    of the row are empty.
 
     - ``x``, ``y``: kinds of the numbers on the axes
     - ``marks``: graphical elements
@@ -78,31 +78,31 @@ class Panel:
 
 
 _TOP = 0.28
-"""Space above the panels for the kind of the numbers, such as "simulated" [inches]."""
+"""Height above the panels for the mark "simulated" or "synthetic" [inches]."""
 _LINE = 0.17
 """Line height of the note, and of a legend above all panels [inches]."""
 _UNDER_NAMES = 0.08
-"""Space between that legend and the panels [inches]."""
+"""Space between a legend above all panels and the panels [inches]."""
 _LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
-"""Letters of a title per inch, least letters per line, and width of the kind of the numbers [inches]."""
+"""Letters of a title per inch, fewest letters per line, and width of the mark "simulated" [inches]."""
 _ENTRY, _ENTRY_LETTERS = 0.53, 14.5
-"""Width of a legend entry without its name [inches], and letters of names per inch."""
+"""Width of a legend entry without its label [inches], and letters of a label per inch."""
 _ROW, _ABOVE = 13.0, 6.0
 """Height of a legend row, and distance from the axes to a title [points]."""
 _HIGHEST = 9.4
-"""Largest height of a figure [inches]: the text of a page."""
+"""Largest height of a figure [inches]: the height of the text on a page."""
 _EDGES, _NARROWEST = 0.3, 2.4
 """Width of a figure outside its panels, and least width of a panel beside another, at a font of 10 pt [inches]."""
 _LABEL_LETTERS, _AXIS_ROOM = 13.0, 0.55
-"""Letters of an axis label per inch, and part of the panel height outside the axis [inches]."""
+"""Letters of an axis label per inch, and width or height of a panel outside its axes [inches]."""
 _DASHED_SHAPES = ("line", "bars")
-"""Shapes with dashes that depend on their colour."""
+"""Shapes whose dashes follow their colour, so that lines differ in greyscale too."""
 _TITLE_SIZE, _SMALLEST_TITLE = 11.0, 0.72
 """Font size of a title [points], and smallest relative size of a shortened title."""
 _MARKUP = re.compile(r"\\[a-z]+|[${}_^]")
 """Pattern of the markup in a title, which takes no space on the page."""
 _SMALLEST_PLAIN, _LARGEST_PLAIN = 1.0e-4, 1.0e7
-"""Limits of a logarithmic axis whose numbers are written without an exponent."""
+"""Limits of a logarithmic axis whose tick labels are written without an exponent."""
 _TITLE_LINE = 0.2
 """Line height of the title [inches]."""
 _OF_LEGEND: Mapping[str, Any] = {
@@ -152,11 +152,11 @@ SHAPES: "Mapping[str, Callable[[Axes, Mark, Any, Any], object]]" = {
         x, y, c=mark.to, s=9, linewidths=0, cmap="cividis", rasterized=True, **mark.style
     ),
 }
-"""Drawing function of a mark, by its shape: takes axes, mark, and its positions in the units shown.
+"""Drawing functions of marks by shape; arguments are axes, mark, and its positions in display units.
 
 ``line``, ``bars`` (edges and counts), ``reach`` (points with the half width ``to``), ``band`` (between two rows of y),
-``span`` and ``strip`` (between two x, two y), ``upright`` (from one y to another), ``level`` and ``at`` (a line across
-or upright), ``text`` (its name, written there), ``map`` and ``points`` (coloured by ``to``).
+``span`` and ``strip`` (between two x, two y), ``upright`` (line from one y to another), ``level`` and ``at``
+(horizontal and vertical line), ``text`` (the label), ``map`` and ``points`` (coloured by ``to``).
 """
 
 
@@ -168,7 +168,7 @@ def draw_panels(
     note: str = "",
     kind: RecordingKind = "simulated",
 ) -> "Figure":
-    """Return a figure of panels, with ``across`` panels per row, each of a size [inches].
+    """Draw panels of a ``size`` [inches] as a figure, with ``across`` panels per row.
 
     ``note`` is printed below the panels.
     """
@@ -375,7 +375,7 @@ class _DrawnPanel(NamedTuple):
 
 
 def _share_scales(figure: "Figure", drawn: Sequence[_DrawnPanel], height: float) -> None:
-    """Apply common limits and one colour bar to consecutive panels with the same scale; panel height in [inches]."""
+    """Apply common limits and a colour bar to consecutive panels with the same scale; panel ``height`` [inches]."""
     for scale, group in groupby(drawn, key=lambda each: each.panel.scale):
         members = list(group)
         if scale is None:

@@ -1,4 +1,4 @@
-"""Figure of a recording: one panel per quantity over a common time axis, in the usual unit of the field."""
+"""Figure of a recording: a panel for each quantity over a common time axis, in display units."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
 _SIZE = (5.4, 1.5)
-"""Size of a panel with its title [inches]."""
+"""Size of a panel with its title [inches]: width, height."""
 _HEADROOM = 0.06
-"""Margin above and below the data, as a fraction of the axis."""
+"""Margin above and below the data, relative to the range of the data [-]."""
 _MAXIMUM_TICKS = 5
 """Largest number of intervals between ticks of a value axis."""
 

@@ -39,7 +39,7 @@ _LOOKS = {
 }
 """Styles of measured points by name."""
 _ROUNDING = 1.0e-9
-"""Residual relative to the range of the samples that counts as zero."""
+"""Largest residual, relative to the range of the samples, that counts as zero [-]."""
 
 
 def readings_mark(label: str, x: Floats, y: Floats, look: str = "measured") -> Mark:
@@ -50,7 +50,7 @@ def readings_mark(label: str, x: Floats, y: Floats, look: str = "measured") -> M
 
 
 def curve_mark(label: str, x: Floats, y: Floats) -> Mark:
-    """Return the curve of a model [SI], sorted by x; a curve with an empty label is not in the legend."""
+    """Return the curve of a model [SI], sorted by x, as a mark; an empty label keeps it out of the legend."""
     order = np.argsort(x, kind="stable")
     return Mark("line", x[order], y[order], (), label, BLACK, {"linewidth": 1.4})
 
@@ -67,7 +67,7 @@ def with_residuals(
 
 @dataclass(frozen=True, slots=True)
 class FittedCurve:
-    """Samples and fitted model at the same times; ``time`` and ``level`` are the kinds of the numbers.
+    """Samples and fitted model at the same times; ``time`` and ``level`` are the kinds of the numbers on the axes.
 
     ``change`` is the kind of the residual, ``names`` are the legend labels of samples and model, ``colour`` is the
     colour of the model.

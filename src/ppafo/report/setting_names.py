@@ -1,4 +1,4 @@
-"""Display names of settings from ``setting_names.toml``, for axis labels and for the page that simulates."""
+"""Display names of settings from ``setting_names.toml``, for axis labels and for the interactive page."""
 
 import tomllib
 from functools import cache
@@ -6,7 +6,7 @@ from importlib.resources import files
 
 _PREFIXES = {"sensors": "Sensors: ", "supply_line": "Line: "}
 REFERENCE_LEVELS = {"reference.level": "to hold", "reference.start_level": "before the ramp"}
-"""Settings in the unit of the controlled quantity, by what follows its name."""
+"""Labels of reference settings after the name of the controlled quantity, as in "Torque before the ramp"."""
 
 
 @cache

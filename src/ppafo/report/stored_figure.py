@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LARGEST = 1e9
-"""Upper limit for the atmosphere [Pa absolute] and for times [s] in a document."""
+"""Upper limit of the atmosphere [Pa absolute] and of times [s] in a document."""
 _LONGEST_SHOWN = 60
 """Largest number of characters of a key, value or word in a message or figure."""
 _LONGEST_REMARK = 500
-"""Largest number of characters of a document's message on the end of a run."""
+"""Largest number of characters of a document's message about the end of a run."""
 _END_OF_WALK = 5.0
 """Duration drawn from the end of a walk [s]: a few strides, since a longer one would be unreadable."""
 
@@ -143,5 +143,5 @@ def _under(file: Path, document: Mapping[str, Any], *keys: str) -> Mapping[str, 
 
 
 def _other_form(file: Path, path: str, given: object, wanted: str) -> DataError:
-    """Return the error for an invalid value at a dotted path of a file; ``wanted`` describes the valid values."""
+    """Build the error for an invalid value at a dotted path of a file; ``wanted`` describes the valid values."""
     return DataError(f"{file}: {path} = {one_line(repr(given))[:_LONGEST_SHOWN]} must be {wanted}")

@@ -1,4 +1,4 @@
-"""Common style of all figures: fonts, colours, sizes, grids of panels, and rendering to bytes."""
+"""Common style of all figures: fonts, colours, sizes, grids of panels, and rendering to files."""
 
 import io
 import textwrap
@@ -26,7 +26,7 @@ ORANGE = "#E69F00"
 PURPLE = "#A33F77"
 """Colours that are distinguishable with any kind of colour vision (Okabe and Ito, 2008)."""
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK, GREY)
-"""Order of the colours of lines of one kind."""
+"""Colours of several lines of the same kind, in order."""
 DASHES = MappingProxyType(
     {
         VERMILION: (0, (6, 1.5, 1.2, 1.5)),
@@ -36,13 +36,13 @@ DASHES = MappingProxyType(
         GREY: (0, (6, 1.2, 1.2, 1.2, 1.2, 1.2)),
     }
 )
-"""Dashes by colour for lines of several colours, half of which are equal in greyscale; other colours are solid."""
+"""Dashes by colour, for lines of several colours, some of which are equal in greyscale; other colours are solid."""
 MARKERS = MappingProxyType({VERMILION: "s", GREEN: "^", ORANGE: "D", PURPLE: "v", BLACK: "P", GREY: "X"})
-"""Marker by colour; the default is a circle."""
+"""Marker of a data series by its colour; the default is a circle."""
 
 
 class DrawingStyle(NamedTuple):
-    """Style of an item in every figure, and on the page that simulates: colour, line style and marker."""
+    """Drawing style of a data series in all figures and on the interactive page: colour, line style and marker."""
 
     colour: str
     line: str = "-"
@@ -62,13 +62,13 @@ ACTUAL = DrawingStyle(BLUE)
 """Style of a device regardless of its valve."""
 _VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})
 PAGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
-"""Colours of curves on the page that simulates, on white: numbers 1 to 4 of its style sheet."""
+"""Colours of curves on the interactive page, which is white: colours 1 to 4 of its style sheet."""
 PAGE_LOOKS = MappingProxyType({kind: PAGE_COLOURS.index(look.colour) + 1 for kind, look in _VALVES.items()})
-"""Index of the page's colour for each kind of valve."""
+"""Number of the curve colour on the interactive page (from 1), by kind of valve."""
 
 
 def look_of_valve(kind: str) -> DrawingStyle:
-    """Return the drawing style of a device with this kind of valve."""
+    """Return the drawing style of a device by its kind of valve."""
     return _VALVES.get(kind, ACTUAL)
 
 
@@ -118,7 +118,7 @@ _FONT_SIZES = MappingProxyType(
 FULL_WIDTH = 5.7
 """Width of a figure from which on its font is 10 pt [inches]: 145 mm, the text of a thesis."""
 _SMALLEST_SCALE, _SMALLEST_TEXT = 0.8, 7.0
-"""Smallest size of fonts relative to a figure of full width, 8 pt for 10 pt, and smallest font size [points]."""
+"""Smallest font scale relative to a figure of full width (8 pt for 10 pt), and smallest font size [points]."""
 _INCHES_PER_METRE = 1.0 / 0.0254
 _width: ContextVar[float | None] = ContextVar("_width", default=None)
 
@@ -165,7 +165,7 @@ def house_style() -> Iterator[None]:
 
 
 def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, bytes]:
-    """Return the content of files by format (``png``, ``svg``, ``pdf``); equal figures give equal bytes."""
+    """Render a figure to file content by format (``png``, ``svg``, ``pdf``); equal figures give equal bytes."""
     # A date would give the same figure other bytes every second.
     undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     files = {}
@@ -205,7 +205,7 @@ def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
 
 @dataclass(frozen=True, slots=True)
 class FigureMargins:
-    """Margins of a figure [inches]: around the panels, between rows and columns, and from a panel to its axis label."""
+    """Margins of a figure [inches]: at its edges, between rows and columns, and from a panel to its axis label."""
 
     left: float
     right: float

@@ -55,8 +55,8 @@ def with_paths_as_code(text: str) -> "Markup":
 def sentence(text: str, title: str = "") -> str:
     """Return text as a sentence, with a capital letter and a full stop; a path or symbol at the start is unchanged.
 
-    Names are unchanged too: a word with a digit, the first word of the page ``title`` and, before a colon, any word of
-    it.
+    Names keep their case: a word with a digit, the first word of the page ``title``, and any word of the title before
+    a colon.
     """
     stripped = text.strip()
     if not stripped:
@@ -70,9 +70,9 @@ def sentence(text: str, title: str = "") -> str:
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
-    """Return number and unit as plain text, such as ``0.1000 N m``; a dash for None.
+    """Format a number with its unit, such as ``0.1000 N m``; a dash for None.
 
-    A number with the unit ``-`` is dimensionless; a whole one is written without decimals.
+    A number with the unit ``-`` is dimensionless; an integral number is written without decimals.
     """
     if value is None:
         return UNKNOWN
@@ -84,12 +84,12 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
 
 
 def format_reported_quantity(value: float, unit: str) -> str:
-    """Return number and unit with no more digits than in the reported number."""
+    """Format a reported number with its unit, without adding digits."""
     return f"{value:g} {'' if unit == '-' else unit}".rstrip()
 
 
 def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
-    """Return rows of texts as aligned lines: the first ``left`` columns left-aligned, the others right-aligned."""
+    """Format rows of texts as aligned lines: the first ``left`` columns left-aligned, the others right-aligned."""
     columns = []
     for place, column in enumerate(zip(*rows, strict=True)):
         width = max(map(len, column))
@@ -98,7 +98,7 @@ def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
 
 
 def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.report") -> str:
-    """Return a template of a package filled with values; texts are escaped, and a missing value is an error."""
+    """Render a page template of a package; texts are escaped, and a missing value raises an error."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     # A page of an analysis includes the style sheet, which all pages share.

@@ -1,4 +1,4 @@
-"""Simulated test bench: a more detailed model than the identified one, which records synthetic data."""
+"""Simulated test bench: a detailed model beyond the identified model, which records synthetic data."""
 
 from ppafo.rig.experiments import RigRecording, record
 from ppafo.rig.preset import Preset, list_presets, load_preset

@@ -25,7 +25,7 @@ from ppafo.model.sensors import follow_rate
 
 
 class RigPhysics(NamedTuple):
-    """Physics of the rig beyond the plant, SI units.
+    """Physics of the simulated bench beyond the plant model, in SI units.
 
     ``virial`` is the second virial coefficient b [m^3/kg]. A follow rate [1/s] of 0 means a sensor without lag; a
     ``supply_rate`` [1/s] of 0 means a regulator without droop.
@@ -62,7 +62,7 @@ class RigNumbers(NamedTuple):
 
 
 class RigState(NamedTuple):
-    """Unknowns of the rig, SI units.
+    """Unknowns of the simulated bench, in SI units.
 
     Angle and velocity of the vane, mass [kg] and internal energy [J] of chambers and lines, totals since the start
     [kg], [J], droop of the regulated pressures [Pa], and the outputs of the sensors after their lag.
@@ -128,7 +128,7 @@ class _ChamberFlows(NamedTuple):
 
 
 class VaneInputs(NamedTuple):
-    """Inputs of the vane equations: angle [rad], prescribed angular velocity [rad/s] and torque of a leg [N m].
+    """Inputs of the vane equations: angle [rad], prescribed angular velocity [rad/s], torque of a leg [N m].
 
     ``rate`` is 0 for an unconstrained vane, whose angular velocity is an unknown of the equations.
     """
@@ -139,14 +139,14 @@ class VaneInputs(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """Valve openings and vane inputs passed with each call, in the order of their array."""
+    """Inputs of a call of the compiled equations, in array order: valve openings and vane inputs."""
 
     openings: Openings
     vane: VaneInputs
 
 
 class Observables(NamedTuple):
-    """Observable quantities of a bench.
+    """Observable quantities of the simulated bench.
 
     ``pressure_1``, ``pressure_2``: chamber pressures [Pa absolute]
     ``torque``: driving torque, with the torque of a leg [N m]
@@ -160,7 +160,7 @@ class Observables(NamedTuple):
 
 
 def gas_node(rig: RigPhysics, mass: float, energy: float, volume: float) -> _Node:
-    """Return the gas state in a volume [m^3] from mass [kg] and internal energy [J]."""
+    """Return the gas state from mass [kg], internal energy [J] and volume [m^3]."""
     temperature = gas_temperature(energy, mass, rig.heat_capacity)
     pressure = real_pressure(mass, volume, temperature, rig.gas_constant, rig.virial)
     enthalpy = gas_enthalpy(temperature, mass / volume, rig.gas_constant, rig.heat_capacity, rig.virial)
@@ -168,7 +168,7 @@ def gas_node(rig: RigPhysics, mass: float, energy: float, volume: float) -> _Nod
 
 
 def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> _Node:
-    """Return the gas state outside the chambers at an absolute pressure [Pa] and a temperature [K]."""
+    """Return the state of gas outside the chambers at an absolute pressure [Pa] and a temperature [K]."""
     density = real_density(pressure, temperature, rig.gas_constant, rig.virial)
     enthalpy = gas_enthalpy(temperature, density, rig.gas_constant, rig.heat_capacity, rig.virial)
     return _Node(pressure, temperature, enthalpy)
@@ -191,7 +191,7 @@ def orifice_exchange(
 
 
 def leak_exchange(rig: RigPhysics, a: _Node, b: _Node, orifice: ExactOrifice) -> Exchange:
-    """Leak across the vane [kg/s], [W], positive from a to b: flow through an orifice and a laminar gap."""
+    """Leak flow across the vane [kg/s], [W], positive from a to b, through an orifice and a laminar gap."""
     through_orifice = orifice_exchange(rig, a, b, 1.0, orifice, 1.0)
     laminar = rig.laminar_conductance * (a.pressure * a.pressure - b.pressure * b.pressure)
     # Gas brings the enthalpy of where it comes from.
@@ -206,7 +206,7 @@ def wall_heat(rig: RigPhysics, node: _Node, volume: float) -> float:
 
 
 def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> tuple[_Node, _Node]:
-    """Return the gas state of both chambers at an angle [rad]; ambient air if the chambers are open."""
+    """Return the gas state of both chambers at an angle [rad]; ambient air for open chambers."""
     # A number, not a truth value: all that the compiled functions read is a float.
     if rig.chambers_open > 0.5:
         room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
@@ -218,7 +218,7 @@ def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angl
 
 
 def observables(given: RigNumbers, state: RigState, inputs: Inputs) -> Observables:
-    """Return the observable quantities of a bench in a given state."""
+    """Return the observable quantities of the bench in a state."""
     plant, rig, vane = given.plant, given.rig, inputs.vane
     node_1, node_2 = chamber_nodes(plant, rig, state, vane.angle)
     torque = driving_torque(plant, vane.angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS)

@@ -1,4 +1,4 @@
-"""Experiments of the rig by name. To add one: ``ExperimentRequest -> ExperimentResult``, and a row of ``EXPERIMENTS``.
+"""Experiments of the simulated bench by name, each a function ``ExperimentRequest -> ExperimentResult``.
 
 ``record`` runs one experiment and returns the synthetic recording with the true parameters.
 """
@@ -25,7 +25,7 @@ _LARGEST_SEED = 2**32 - 1
 _DEFAULT_DEVICE = "ppafo2011"
 _DEFAULT_PRESET = "paper-bench"
 NOTICE = "synthetic: made by the simulated test bench of ppafo in place of a measurement"
-"""Statement in the metadata of every recording of the rig that the data are synthetic."""
+"""Notice in the metadata of every recording of the simulated bench."""
 
 EXPERIMENTS: dict[str, tuple[str, Callable[[ExperimentRequest], ExperimentResult]]] = {
     "static-torque": ("torque on a scale over pressure, three times up and down", record_static_torque),
@@ -37,7 +37,7 @@ EXPERIMENTS: dict[str, tuple[str, Callable[[ExperimentRequest], ExperimentResult
     "step-response": ("figure 7: valve opened fully, vane from stop to stop", record_step_response),
     "torque-task": ("figure 8: torque ramp and hold under control", record_torque_task),
 }
-"""Experiments by name: their summary, and the function that records them."""
+"""Experiments by name: summary, and function that records."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def record(
     overrides: Iterable[str] = (),
     valve: str | None = None,
 ) -> RigRecording:
-    """Run an experiment on the rig and return its synthetic recording; equal arguments give equal bytes.
+    """Run an experiment on the simulated bench; equal arguments give identical bytes.
 
     ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (dynamic
     experiments) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). Raises SimulationError if the solver fails.
@@ -109,7 +109,7 @@ def record(
 
 
 def find_experiment(name: str) -> tuple[str, Callable[[ExperimentRequest], ExperimentResult]]:
-    """Return summary and function of the experiment with a name. Raises ParameterError for an unknown name."""
+    """Return summary and function of an experiment. Raises ParameterError for an unknown name."""
     if name not in EXPERIMENTS:
         hint = nearest_name(name, EXPERIMENTS)
         raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; available: {', '.join(EXPERIMENTS)}")
@@ -117,7 +117,7 @@ def find_experiment(name: str) -> tuple[str, Callable[[ExperimentRequest], Exper
 
 
 def overview() -> tuple[str, dict[str, Any]]:
-    """Return a list of the experiments and presets with their descriptions, as text and as plain data."""
+    """Return the list of experiments and presets with descriptions, as text and as plain data."""
     experiments = {name: summary for name, (summary, _) in EXPERIMENTS.items()}
     presets = {name: load_preset(name).title for name in list_presets()}
     width = max(map(len, [*experiments, *presets]))

@@ -1,4 +1,4 @@
-"""Folder of recordings of the rig: one CSV file for each experiment, and ``rig.json`` with the true values of all."""
+"""Folder of synthetic recordings: a CSV file for each experiment, and ``rig.json`` with all true values."""
 
 from pathlib import Path
 from typing import Any
@@ -16,13 +16,13 @@ _FORMAT = "ppafo rig"
 
 
 def check_rig_folder(folder: Path, experiment: str) -> None:
-    """Raise DataError, before any run, if a folder is not writable or contains files of another origin."""
+    """Raise DataError if a folder is not writable or contains files of another origin; called before a run."""
     _earlier(folder, f"{experiment}.csv")
     check_files_can_be_added(folder, [f"{experiment}.csv", RIG_FILE])
 
 
 def write_rig_recording(folder: Path, recorded: RigRecording) -> tuple[str, ...]:
-    """Write recording and true parameters into a folder, beside other experiments; returns the file names.
+    """Write recording and true parameters into a folder, and return the file names.
 
     Raises DataError if the folder contains files of another origin.
     """
@@ -40,7 +40,7 @@ def write_rig_recording(folder: Path, recorded: RigRecording) -> tuple[str, ...]
 
 
 def _earlier(folder: Path, name: str) -> dict[str, Any]:
-    """Return the entries of ``rig.json`` for the recordings that are already in a folder.
+    """Return the entries of ``rig.json`` for the recordings already in a folder.
 
     Raises DataError if the folder was not written by the rig, or if the recording ``name`` would replace a file of
     another origin.

@@ -1,4 +1,4 @@
-"""Presets of the rig: deviations from the identified model, as TOML files with a unit and a reason for each value.
+"""Presets of the simulated bench: TOML files of deviations from the model, each with unit and reason.
 
 Every value of a preset is declared here with section, name, SI unit, range and meaning.
 """
@@ -23,13 +23,13 @@ from ppafo.units import parse_quantity, to_si
 from ppafo.wording import nearest_name
 
 PREFIX = "rig."
-"""Prefix of overrides of the preset; any other override concerns the device or the experiment."""
+"""Prefix of preset overrides; other overrides change the device or the experiment."""
 
 _FILE = TomlKind("preset of the rig", "rig", resources.files("ppafo.rig") / "presets", ParameterError)
 
 
 _DIFFERENCE: Any = {"minimum": -80.0, "maximum": 80.0}
-"""Range of the temperature differences of the bench [K]."""
+"""Range of temperature differences on the bench [K]."""
 
 
 def _from_zero(name: str, unit: str, summary: str, maximum: float = math.inf) -> Quantity:
@@ -93,7 +93,7 @@ SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "torque_sensor": _sensor("N m", "scale"),
     "flow_sensor": _sensor("kg/s", "flow meter"),
 }
-"""Values of a preset, all of them required: physics that is off has the value 0 and a reason."""
+"""Values of a preset by section, all required; physics that is off has the value 0 and a reason."""
 
 PATHS: dict[str, Quantity] = {
     f"{section}.{quantity.name}": quantity for section, members in SECTIONS.items() for quantity in members
@@ -101,7 +101,7 @@ PATHS: dict[str, Quantity] = {
 
 
 class PresetValue(StrictTable):
-    """Value of a preset of the simulated bench, with unit and reason."""
+    """Value in a preset file, with unit and reason."""
 
     value: float = Field(description="the number, in the unit beside it")
     unit: str = Field(description="unit of the number, such as 'mm^2'; empty for a plain number")
@@ -110,7 +110,7 @@ class PresetValue(StrictTable):
 
 @functools.cache
 def _layout() -> type[BaseModel]:
-    """Return the layout of a preset file: name, title and notes, and a table for each section of ``SECTIONS``."""
+    """Return the layout of a preset file: name, title, notes, and a table for each section of ``SECTIONS``."""
     fields: dict[str, Any] = {
         "schema_version": (SchemaVersion, ...),
         "name": (str, Field(description="name of the preset")),
@@ -133,7 +133,7 @@ def json_schema() -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """Preset of the rig: values in SI and their reasons, both by dotted path."""
+    """Preset of the simulated bench: values [SI] and their reasons, by dotted path."""
 
     name: str
     title: str
@@ -142,11 +142,11 @@ class Preset:
     reasons: Mapping[str, str]
 
     def section(self, name: str) -> dict[str, float]:
-        """Return the values [SI] of one section, by name."""
+        """Return the values [SI] of a section, by name."""
         return {quantity.name: self.values[f"{name}.{quantity.name}"] for quantity in SECTIONS[name]}
 
     def with_value(self, path: str, value: float, reason: str) -> "Preset":
-        """Return the preset with one value [SI] replaced.
+        """Return a copy of the preset with another value [SI].
 
         Raises ParameterError if the path is unknown or the value is out of range.
         """
@@ -159,12 +159,12 @@ class Preset:
 
 
 def list_presets() -> tuple[str, ...]:
-    """Return the names of the presets in the package."""
+    """Return the names of the bundled presets."""
     return _FILE.names()
 
 
 def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Preset:
-    """Return a preset by its name in the package or by the path of a TOML file.
+    """Load a preset, by bundled name or path of a TOML file.
 
     ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``. Raises ParameterError for an invalid preset or
     override.

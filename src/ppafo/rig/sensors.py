@@ -1,4 +1,4 @@
-"""Sensors of the rig: noise, offset and quantisation of each channel, from a seed.
+"""Sensors of the simulated bench: noise, offset and quantisation by channel, from a random seed.
 
 The bandwidth of sensors is integrated with the rig. Every channel has a separate stream of random numbers, so that an
 additional channel changes no other channel.
@@ -25,43 +25,40 @@ CHANNEL_SENSORS = {
     "friction": "",
     "dorsiflexion_pressure": "pressure_sensor",
 }
-"""Sensor of each channel; ``friction`` has no sensor, but a stream of random numbers.
+"""Sensor by channel; ``friction`` has no sensor, only a random stream.
 
 The order determines the streams: a new channel must come last, so that the other streams do not change.
 """
 
 # By its position, not its name: renaming a channel leaves its noise.
 _STREAMS = {name: number for number, name in enumerate(CHANNEL_SENSORS)}
-"""Number of the stream of random numbers of each channel."""
+"""Index of the random stream of each channel."""
 
 
 @dataclass(frozen=True, slots=True)
 class SimulatedSensor:
-    """Sensor of a run: offset, quantisation step, and noise of every sample."""
+    """Simulated sensor of a run: offset, quantisation step, and noise of every sample [SI]."""
 
     offset: float
     resolution: float
     noise: Floats
 
     def reads(self, true: float, sample: int) -> float:
-        """Return the reading at a sample for a true value, both in SI.
-
-        ``sample`` is the number of the sample, which selects its noise.
-        """
+        """Return the reading [SI] for a true value [SI] at a sample, whose index selects the noise."""
         return quantise(true + self.offset + float(self.noise[sample]), self.resolution)
 
     def readings(self, true: Floats) -> Floats:
-        """Return the readings of true values [SI] at the first samples."""
+        """Return readings of a series of true values [SI], starting at sample 0."""
         return np.array([self.reads(float(value), sample) for sample, value in enumerate(true)])
 
 
 def random_stream(seed: int, channel: str) -> np.random.Generator:
-    """Return the random generator of a channel for a seed."""
+    """Return the random generator of a channel."""
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, _STREAMS[channel]])))
 
 
 def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_range: float = 1.0) -> SimulatedSensor:
-    """Return the simulated sensor of a channel for a number of samples.
+    """Create the simulated sensor of a channel, with noise for a number of samples.
 
     ``fraction_of_range`` [-] scales offset, noise and quantisation step for a sensor of smaller range.
     """

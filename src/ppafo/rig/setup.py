@@ -1,4 +1,4 @@
-"""Setup of an experiment on the rig: its request, the true device and physics behind it, and its result."""
+"""Setup of an experiment on the simulated bench: request, true device and physics, result."""
 
 import math
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ from ppafo.signals.recording import Recording
 
 @dataclass(frozen=True, slots=True)
 class ExperimentRequest:
-    """Request for an experiment on the simulated bench (rig).
+    """Request for an experiment on the simulated bench.
 
     ``preset``: deviations of the rig from the identified model
     ``seed``: random seed of sensor noise and friction scatter
@@ -42,7 +42,7 @@ class ExperimentRequest:
 
 @dataclass(frozen=True, slots=True)
 class ExperimentResult:
-    """Result of an experiment: recording, true device, sensor offsets by channel, and further true values by name.
+    """Result of an experiment: recording, true device, sensor offsets by channel, and other true values by name.
 
     ``replaced`` is a sentence on values of the scenario that replace those of the requested parameter set, else "".
     """
@@ -55,14 +55,14 @@ class ExperimentResult:
 
 
 def steady_bench(request: ExperimentRequest) -> tuple[Device, RigPhysics]:
-    """Return the true device of a request without a scenario, and the physics of the rig."""
+    """Return the true device of a request without scenario, and the physics of the bench."""
     device = load_device(request.parameter_set, overrides=request.overrides, valve=request.valve)
     device = real_device(device, request.preset)
     return device, rig_physics(device, request.preset)
 
 
 def real_device(device: Device, preset: Preset) -> Device:
-    """Return the true device of the rig: the device with valve dynamics and seal leak of the preset.
+    """Return the true device of the bench: the device with valve dynamics and seal leak of the preset.
 
     Raises ParameterError for a device with an active effect, because the rig has its own physics and would ignore the
     effect, and for a device that works on vacuum, because the supplies of the rig are pressure regulators.
@@ -92,7 +92,7 @@ def real_device(device: Device, preset: Preset) -> Device:
 
 
 def rig_physics(device: Device, preset: Preset) -> RigPhysics:
-    """Return the parameters of the rig beyond the plant, in SI; 0 for physics that is switched off.
+    """Return the parameters of the bench beyond the plant [SI]; 0 for physics that is off.
 
     Raises ParameterError for a supply droop without a time constant.
     """
@@ -128,7 +128,7 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
 
 
 def with_line(device: Device, plant: PlantParameters, preset: Preset) -> tuple[PlantParameters, ExactOrifice]:
-    """Return the plant with the line volumes subtracted from the dead volumes, and the orifice of the lines.
+    """Return the plant with line volumes subtracted from the dead volumes, and the orifice of the lines.
 
     Raises ParameterError for a line larger than a dead volume, and for a line without an orifice.
     """

@@ -1,4 +1,4 @@
-"""Solution of one run on the rig, event by event: samples, arriving commands, valve, stick-slip, stops.
+"""Event-by-event solution of a run on the simulated bench: samples, commands, valve, stick-slip, stops.
 
 Friction is Coulomb friction with a static limit and a Stribeck curve, both increasing with pressure. Sticking is a
 separate mode, entered and left at zeros of root functions as in the reference solver. A bristle model would need no
@@ -33,44 +33,44 @@ from ppafo.rig.stretches import Distances, Slopes, solve_stretch
 Floats = NDArray[np.float64]
 
 UNKNOWNS = len(RigState._fields)
-"""Number of unknowns of the rig; the unknowns of the valve follow in every array of unknowns."""
+"""Number of unknowns of ``RigState``; in arrays of unknowns, the unknowns of the valve follow."""
 ANGLE = RigState._fields.index("angle")
 VELOCITY = RigState._fields.index("angular_velocity")
 
 
 @dataclass(frozen=True, slots=True)
 class RigRun:
-    """Run on the rig, in SI units."""
+    """Run on the simulated bench, in SI units."""
 
     device: Device
     """True device, which the sensors and the controller do not know."""
     run: Run
-    """Run on the identified model, without the additional physics of the rig."""
+    """Planned run of the identified model, without the additional physics of the bench."""
     physics: RigPhysics
     line_orifice: ExactOrifice
     initial: RigState
     sensors: dict[str, SimulatedSensor]
-    """Sensors by channel: at least angle, pressure_1 and pressure_2."""
+    """Sensors by channel, at least angle, pressure_1 and pressure_2."""
     sample_times: Floats
     """Sample times of the sensors [s], the first at 0 and the last at the end."""
     control_period: float
-    """Time between two decisions of the controller [s]."""
+    """Sample period of the controller [s]."""
     command_delay: float
-    """Dead time between a decision and the valve [s]."""
+    """Dead time between controller and valve [s]."""
     hysteresis: float
-    """Backlash of the valve's spool with respect to the command [-]."""
+    """Backlash of the valve spool, as a width in command [-]."""
 
 
 @dataclass(slots=True)
 class RigSolution:
-    """True solution of a run, with a row or number for each sample time."""
+    """True solution of a run on the simulated bench, at each sample time."""
 
     states: Floats
     """Unknowns (samples, unknowns of ``RigState``) [SI]."""
     pressures: Floats
     """Pressures of both chambers (samples, 2) [Pa, absolute]."""
     commands: Floats
-    """Commands decided by the controller (samples,) [-]."""
+    """Commands of the controller (samples,) [-]."""
     impacts: list[float] = field(default_factory=list)
     """Times [s] at which the vane hit a stop."""
     breakaways: list[float] = field(default_factory=list)
@@ -78,14 +78,14 @@ class RigSolution:
 
 
 def sensor_signals(physics: RigPhysics, state: Floats, pressures: Floats) -> tuple[float, float, float]:
-    """Return angle [rad] and both pressures [Pa] after the sensors' bandwidth, before noise."""
+    """Return angle [rad] and both pressures [Pa] filtered by the sensor bandwidth, without noise."""
     now, is_slow = RigState._make(state.tolist()), physics.pressure_follow_rate > 0.0
     first, second = (now.sensor_pressure_1, now.sensor_pressure_2) if is_slow else pressures.tolist()
     return now.sensor_angle if physics.angle_follow_rate > 0.0 else now.angle, first, second
 
 
 def solve_rig(rig_run: RigRun) -> RigSolution:
-    """Return the solution of a run.
+    """Solve a run on the simulated bench.
 
     Raises SimulationError if the solver fails, and for a controller written in Python, which the rig cannot run.
     """
@@ -93,7 +93,7 @@ def solve_rig(rig_run: RigRun) -> RigSolution:
 
 
 class _Equations:
-    """Equations of one run: functions of time [s], unknowns (unknowns,) and mode. Calls are independent of each other.
+    """Equations of a run as functions of time [s], unknowns (unknowns,) and mode, without internal state.
 
     The mode is the sliding ``direction`` of the vane: 1, -1, or 0 if the vane is stuck or its angle is prescribed.
     Valve and prescribed vane angle are computed in Python and passed to the compiled equations as numbers. So one
@@ -123,7 +123,7 @@ class _Equations:
         self.initial = np.array([*rig_run.initial, *numbers(valve_state)], dtype=np.float64)
 
     def valve_state(self, unknowns: Floats) -> Any:
-        """NamedTuple of the valve's state, from the last entries of the unknowns."""
+        """Valve state as NamedTuple, from the last entries of the unknowns."""
         state, values = self.run.program.valve.state, unknowns[UNKNOWNS:].tolist()
         return state(*values) if self._has_flat_valve else rebuilt(state, values)
 
@@ -132,7 +132,7 @@ class _Equations:
         return self.run.program.valve.instant(self.run.valve, self.valve_state(unknowns), command)
 
     def valve_slopes(self, unknowns: Floats, command: float) -> list[float]:
-        """Time derivatives of the valve's unknowns at a command [-]."""
+        """Time derivatives of the valve unknowns at a command [-]."""
         return numbers(self.run.program.valve.rates(self.run.valve, self.valve_state(unknowns), command))
 
     def vane(self, time: float, unknowns: Floats) -> VaneInputs:
@@ -170,7 +170,7 @@ class _Equations:
         return Observables._make(self._observed.tolist())
 
     def distances(self, direction: float) -> Distances:
-        """Root functions of a mode: distance to breakaway at rest, or to standstill and to the stop ahead in motion."""
+        """Root functions of a mode: distance to breakaway at rest; to standstill and to the next stop in motion."""
 
         def sliding(_time: float, unknowns: Floats) -> Roots:
             return roots_sliding(self.plant, float(unknowns[ANGLE]), float(unknowns[VELOCITY]), direction)
@@ -182,7 +182,7 @@ class _Equations:
         return resting if direction == 0.0 else sliding
 
     def rest_direction(self, time: float, unknowns: Floats) -> float:
-        """Return the direction in which a vane at rest breaks away, 0 if it sticks."""
+        """Return the direction in which a resting vane breaks away, 0 if it sticks."""
         observed = self.observe(time, unknowns)
         return mode_at_rest(self._gripping(observed), float(unknowns[ANGLE]), observed.torque)
 
@@ -191,7 +191,7 @@ class _Equations:
         return self.plant._replace(static_torque=observed.static_limit)
 
     def with_prescribed_angle(self, time: float, unknowns: Floats) -> Floats:
-        """Return the unknowns of ``RigState`` (unknowns,) with the prescribed angle inserted, if there is one."""
+        """Return the unknowns of ``RigState`` (unknowns,), with the prescribed angle inserted if there is one."""
         state = np.array(unknowns[:UNKNOWNS])
         path = self.run.program.angle
         if path is not None:
@@ -200,7 +200,7 @@ class _Equations:
 
 
 class _Solver:
-    """Solver of a run, with the present time [s], unknowns and mode, from event to event.
+    """Event-driven solver of a run, with its current time [s], unknowns and mode.
 
     ``decided`` is the last command of the controller [-], ``at_valve`` the command after backlash and dead time [-].
     Raises SimulationError for a controller written in Python, which the rig cannot run.
@@ -213,7 +213,7 @@ class _Solver:
         self.controller: ControllerKind = rig_run.run.program.controller
         self.decided = self.at_valve = 0.0
         self.commands_under_way: list[tuple[float, float]] = []
-        """Arrival times [s] at the valve, with the commands [-]."""
+        """Arrival times at the valve [s] and commands [-]."""
         self.time, self.unknowns, self.direction = 0.0, self.equations.initial, 0.0
         samples = rig_run.sample_times.size
         self.solution = RigSolution(
@@ -224,12 +224,12 @@ class _Solver:
             self.direction = self.direction_now()
 
     def direction_now(self) -> float:
-        """Return the direction in which an unconstrained vane slides or breaks away, 0 if it sticks."""
+        """Return the direction in which a free vane slides or breaks away, 0 if it sticks."""
         velocity = float(self.unknowns[VELOCITY])
         return float(np.sign(velocity)) if velocity != 0.0 else self.equations.rest_direction(self.time, self.unknowns)
 
     def solve(self) -> RigSolution:
-        """Integrate to the end of the run, one controller period after another."""
+        """Integrate to the end of the run, controller period by controller period."""
         rig_run, run = self.rig_run, self.rig_run.run
         end, sample = float(rig_run.sample_times[-1]), 0
         spool, state = 0.0, self.controller.initial
@@ -248,7 +248,7 @@ class _Solver:
         return self.solution
 
     def measure(self) -> Measurement:
-        """Return the present measurement for the controller."""
+        """Return the current measurement for the controller."""
         rig_run, observed = self.rig_run, self.equations.observe(self.time, self.unknowns)
         state = self.equations.with_prescribed_angle(self.time, self.unknowns)
         pressures = np.array([observed.pressure_1, observed.pressure_2])
@@ -264,7 +264,7 @@ class _Solver:
         return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
 
     def advance_to(self, end: float) -> None:
-        """Advance to a time [s], stopping at each arrival of a command and each event of the valve."""
+        """Integrate to a time [s], stopping at arrivals of commands and events of the valve."""
         run, valve = self.rig_run.run, self.rig_run.run.program.valve
         while self.time < end - SAME_TIME:
             while self.commands_under_way and self.commands_under_way[0][0] <= self.time + SAME_TIME:
@@ -278,7 +278,7 @@ class _Solver:
             self.integrate(min(end, switches, *arrivals))
 
     def integrate(self, end: float) -> None:
-        """Integrate to a time [s] or to the next event of the vane, and change the mode at the event."""
+        """Integrate to a time [s] or the next vane event, and change the mode at the event."""
         if self.equations.is_free and self.direction == 0.0:
             self.direction = self.equations.rest_direction(self.time, self.unknowns)
             if self.direction != 0.0:
@@ -302,7 +302,7 @@ class _Solver:
             self.time = end
 
     def record(self, unknowns: Floats) -> None:
-        """Store the unknowns of the next sample."""
+        """Store the unknowns at the next sample."""
         sample = self.recorded
         time = float(self.rig_run.sample_times[sample])
         observed = self.equations.observe(time, unknowns)
@@ -312,7 +312,7 @@ class _Solver:
         self.recorded += 1
 
     def change_mode(self) -> None:
-        """Change the mode when the vane breaks away, comes to rest, or hits a stop."""
+        """Change the mode when the vane breaks away, stops, or hits an end stop."""
         if self.direction == 0.0:
             torque = self.equations.observe(self.time, self.unknowns).torque
             self.direction = 1.0 if torque > 0.0 else -1.0

@@ -1,4 +1,4 @@
-"""Steady experiments of the rig: true values turned into sensor readings.
+"""Steady experiments of the simulated bench: true values converted to sensor readings.
 
 Static torque against pressure, flow of the open valve, flow map of the valve, and leak across the vane.
 """
@@ -20,28 +20,28 @@ from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
 from ppafo.simulation.plan import exact_orifice
 
 _STEP, _HIGHEST = 5.0 * PASCALS_PER_PSI, 95.0 * PASCALS_PER_PSI
-"""Step and largest pressure difference [Pa] of the static torque."""
+"""Step and largest pressure difference [Pa] of the static torque experiment."""
 _TURN = 20.0 * PASCALS_PER_PSI
-"""Overshoot of the pressure [Pa] beyond the highest reading before it falls, so that friction reverses before it."""
+"""Overshoot [Pa] beyond the highest reading before the pressure falls, so that friction has reversed by then."""
 _TORQUE_REPETITIONS = 3
-"""Number of times that the pressure goes up and down."""
+"""Number of pressure cycles, up and down."""
 _TORQUE_READING_INTERVAL = 10.0
 """Time between two readings of the scale [s]."""
 _UPSTREAM_GAUGE = tuple(level * PASCALS_PER_PSI for level in (20.0, 35.0, 50.0, 65.0, 80.0))
 _PRESSURE_RATIOS = (0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.98)
-"""Upstream gauge pressures [Pa] of the open valve, and ratios of downstream to upstream pressure [-]."""
+"""Upstream gauge pressures [Pa] at the open valve, and ratios of downstream to upstream pressure [-]."""
 _LEAK_GAUGE = tuple(level * PASCALS_PER_PSI for level in range(5, 85, 5))
-"""Gauge pressures in chamber 1 [Pa] of the steady leak."""
+"""Gauge pressures in chamber 1 [Pa] for the steady leak."""
 _COMMAND_STEPS = 100
 """Number of steps of the command from -1 to 1."""
 _READING_INTERVAL, _REPETITIONS = 2.0, 2
 """Time between two readings of the flow meter [s], and number of readings at each pressure."""
 _SMALL_METER = 0.1
-"""Ratio [-] of the flow range of the leak meter to the range of the other meter."""
+"""Range of the leak flow meter relative to the other flow meter [-]."""
 
 
 def record_static_torque(request: ExperimentRequest) -> ExperimentResult:
-    """Return torque on the scale [N m] over pressure difference, three times up and down in steps of 5 psi.
+    """Record torque on the scale [N m] over pressure difference, three times up and down in steps of 5 psi.
 
     The vane presses on a scale and creeps without slipping, so friction is at the static limit and opposes the
     direction of the pressure change. This is the rig's friction law at zero speed, a play operator without inertia,
@@ -75,7 +75,7 @@ def record_static_torque(request: ExperimentRequest) -> ExperimentResult:
 
 
 def on_scale(before: float, actuator: float, limit: float) -> float:
-    """Return the torque [N m] on a scale, given the previous torque, the actuator torque and the friction limit [N m].
+    """Return the torque on a scale [N m], from previous torque, actuator torque and friction limit [N m].
 
     Friction takes any difference up to the limit; the scale cannot pull.
     """
@@ -83,7 +83,7 @@ def on_scale(before: float, actuator: float, limit: float) -> float:
 
 
 def record_open_valve(request: ExperimentRequest) -> ExperimentResult:
-    """Return the mass flow [kg/s] of the fully open valve at several upstream and downstream pressures."""
+    """Record the mass flow [kg/s] of the fully open valve at several upstream and downstream pressures."""
     device, physics = steady_bench(request)
     ambient = device.supply.atmospheric_pressure
     pairs = []
@@ -105,7 +105,7 @@ def record_open_valve(request: ExperimentRequest) -> ExperimentResult:
 
 
 def record_valve_map(request: ExperimentRequest) -> ExperimentResult:
-    """Return the mass flow [kg/s] of the valve over command, with outlet to the atmosphere; above 0 into chamber 1."""
+    """Record the mass flow [kg/s] of the valve over command, outlet to atmosphere; positive into chamber 1."""
     device, physics = steady_bench(request)
     supply, orifice = device.supply, exact_orifice(device.valve.orifice, device)
     # The openings once nothing moves any more: of the valve with every time and frequency taken out.
@@ -137,7 +137,7 @@ def record_valve_map(request: ExperimentRequest) -> ExperimentResult:
 
 
 def record_steady_leak(request: ExperimentRequest) -> ExperimentResult:
-    """Return the mass flow [kg/s] that maintains the pressure in chamber 1, with chamber 2 open to the atmosphere."""
+    """Record the mass flow [kg/s] that maintains the pressure in chamber 1, with chamber 2 at the atmosphere."""
     device, physics = steady_bench(request)
     ambient = device.supply.atmospheric_pressure
     levels = np.array(_LEAK_GAUGE * _REPETITIONS) + ambient

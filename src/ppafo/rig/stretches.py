@@ -1,4 +1,4 @@
-"""Integration between two events with LSODA, up to the end time or to the first zero of a root function."""
+"""Integration between two events with LSODA, to the end time or to the first zero of a root function."""
 
 from collections.abc import Callable
 
@@ -17,7 +17,7 @@ Distances = Callable[[float, Floats], Roots]
 """Root functions of time [s] and unknowns (unknowns,), positive until the event."""
 
 RELATIVE_TOLERANCE = 1.0e-8
-"""Relative tolerance of a step [-]: five digits below the 1e-3 to which rig and model are compared."""
+"""Relative tolerance of a step [-], five digits below the accuracy of 1e-3 of comparisons with the model."""
 
 ABSOLUTE_TOLERANCES = RigState(
     angle=1e-10,
@@ -42,13 +42,13 @@ ABSOLUTE_TOLERANCES = RigState(
     sensor_pressure_1=1e-2,
     sensor_pressure_2=1e-2,
 )
-"""Absolute tolerances [SI], below a millionth of usual values: 1e-4 kg and 10 J in a chamber, 1e5 Pa of supply."""
+"""Absolute tolerances [SI], below 1e-6 of usual values: 1e-4 kg and 10 J in a chamber, 1e5 Pa of supply."""
 
 VALVE_TOLERANCE = 1e-10
 """Absolute tolerance of each unknown of the valve, for which 1 is fully open [-]."""
 
 MAXIMUM_STEPS = 100_000
-"""Number of solver steps between two events at which the solver is stopped; a few hundred are usual."""
+"""Largest number of solver steps between two events; a few hundred are usual."""
 
 _ROOT_TOLERANCE = 4.0 * float(np.finfo(np.float64).eps)
 """Smallest relative tolerance [-] that ``scipy.optimize.brentq`` accepts."""
@@ -57,11 +57,11 @@ _ROOT_TOLERANCE = 4.0 * float(np.finfo(np.float64).eps)
 def solve_stretch(
     slopes: Slopes, distances: Distances | None, unknowns: Floats, start: float, end: float, wanted: Floats
 ) -> tuple[Floats, Floats]:
-    """Return times [s] and unknowns (times, unknowns) from ``start`` to ``end``, or to the first root of ``distances``.
+    """Integrate from ``start`` to ``end`` [s], or to the first root of ``distances``.
 
-    The unknowns of ``RigState`` come first, then the unknowns of the valve; rows at the ``wanted`` times [s] are
-    included. A root function that is 0 at the start does not end the integration. Raises SimulationError if the solver
-    fails.
+    Returns times [s] and unknowns (times, unknowns). The unknowns of ``RigState`` come first, then the unknowns of the
+    valve; rows at the ``wanted`` times [s] are included. A root function that is 0 at the start does not end the
+    integration. Raises SimulationError if the solver fails.
     """
     from scipy.integrate import LSODA
 
@@ -98,7 +98,7 @@ def solve_stretch(
 
 
 def _root(distances: Distances, number: int, interpolant: Callable[[float], Floats], start: float, end: float) -> float:
-    """Return the time [s] at which one root function is 0, within a solver step from ``start`` to ``end`` [s].
+    """Return the time [s] at which a root function is 0, within a solver step from ``start`` to ``end`` [s].
 
     ``number`` is the index of the root function.
     """

@@ -1,4 +1,4 @@
-"""Transient experiments of the rig, integrated with LSODA: step response, torque task, free decay, leak over time."""
+"""Transient experiments of the simulated bench: step response, torque task, free decay, leak over time."""
 
 import math
 from dataclasses import replace
@@ -24,28 +24,28 @@ from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario
 
 _LEAK_RATE = 20.0
-"""Sample rate [Hz] of a leak experiment that takes half a minute."""
+"""Sample rate [Hz] of a leak experiment of half a minute."""
 
 _SUPPLIES = {"supply_pressure": "supply_drop_1", "dorsiflexion_pressure": "supply_drop_2"}
 """Field of ``RigState`` with the regulator droop, by channel of the supply pressure."""
 _SENSED = ("angle", "pressure_1", "pressure_2")
 _IN_MOTION = (*_SENSED, *_SUPPLIES, "command")
-"""Channels that the sensors of the device read, and channels of a recording of motion."""
+"""Channels of the device's sensors, and channels of a recording of motion."""
 _WHOLE = 1.0e-9
-"""Rounding tolerance at the end of a run, as a fraction of a sample."""
+"""Rounding tolerance at the end of a run, as a fraction of a sample [-]."""
 
 _CLOSED_VALVE = {"kind": "constant", "command": 0, "rate": "1 kHz"}
-"""Controller of a bench on which the valve stays closed."""
+"""Controller that keeps the valve closed."""
 
 
 def record_step_response(request: ExperimentRequest) -> ExperimentResult:
-    """Return the step response of figure 7 of the paper: the valve opens fully and the vane turns from stop to stop."""
+    """Record the step response of figure 7 of the paper: the valve opens fully, the vane turns from stop to stop."""
     scenario = _of_package("step-response", request)
     return _recorded("step-response", scenario, rig_run(scenario, request), (*_IN_MOTION, "torque"))
 
 
 def record_torque_task(request: ExperimentRequest) -> ExperimentResult:
-    """Return the torque task of figure 8 of the paper, with the controller for the type of valve."""
+    """Record the torque task of figure 8 of the paper, with the controller for the type of valve."""
     # Overrides may be of the scenario, which is chosen by the valve first.
     kind = load_device(request.parameter_set, valve=request.valve).valve.kind
     scenario = _of_package(f"torque-task-{kind}", request)
@@ -53,7 +53,7 @@ def record_torque_task(request: ExperimentRequest) -> ExperimentResult:
 
 
 def record_free_decay(request: ExperimentRequest) -> ExperimentResult:
-    """Return the angle after an impulse, with the device on its side and both chambers open to the atmosphere."""
+    """Record the angle after an impulse, with the device on its side and both chambers open to the atmosphere."""
     motion = {"kind": "free", "angle": "25 deg", "angular_velocity": "380 deg/s", "external_torque": "0 N m"}
     scenario = _of_bench("free-decay", request, motion, {}, "2 s")
     bench_run = rig_run(scenario, request)
@@ -64,7 +64,7 @@ def record_free_decay(request: ExperimentRequest) -> ExperimentResult:
 
 
 def record_vane_leak(request: ExperimentRequest) -> ExperimentResult:
-    """Return both pressures after chamber 1 is filled and both ports are plugged, with the vane locked at mid-range."""
+    """Record both pressures after chamber 1 is filled and both ports are plugged, with the vane locked mid-range."""
     sections = {section.partition(".")[0] for section in SECTIONS} | {"valve", "valves"}
     # What belongs to the scenario is no override of a device.
     overrides = [override for override in request.overrides if override.strip().partition(".")[0] in sections]
@@ -78,7 +78,7 @@ def record_vane_leak(request: ExperimentRequest) -> ExperimentResult:
 
 
 def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float = math.inf) -> RigRun:
-    """Return the run of a scenario on the rig of a request, sampled at no more than ``highest_rate`` [Hz].
+    """Return the run of a scenario on the bench of a request, sampled at no more than ``highest_rate`` [Hz].
 
     Raises ScenarioError for a valve that the rig does not have, and for a reference other than a torque.
     """
@@ -125,7 +125,7 @@ def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float 
 
 
 def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str, ...]) -> ExperimentResult:
-    """Return the sensor readings at every sample; the torque is computed from the measured pressures."""
+    """Return sensor readings at every sample; the torque is computed from the measured pressures."""
     solution, plant = solve_rig(bench_run), bench_run.run.plant
     pairs = zip(solution.states, solution.pressures, strict=True)
     signals = np.array([sensor_signals(bench_run.physics, *pair) for pair in pairs])
@@ -150,7 +150,7 @@ def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str
 
 
 def _of_package(name: str, request: ExperimentRequest) -> Scenario:
-    """Return a scenario of the package with the requested device."""
+    """Load a bundled scenario with the requested device."""
     content = load_scenario(name).origin.content
     # As overrides, so that the scenario reports its values that replace values of another set.
     chosen = {"valve": load_parameter_set(request.parameter_set).default_valve, **_device_table(request)}

@@ -1,4 +1,4 @@
-"""Faults of recorded data, detected from the data alone: gaps in time, and saturated sensors."""
+"""Faults of recorded data, detected from the samples: gaps in time, saturated sensors, outliers; noise estimates."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ppafo.signals.recording import Floats
 
 GAP_SAMPLES = 10.0
-"""Shortest gap, in median sampling intervals."""
+"""Shortest gap, in median sampling intervals [-]."""
 
 FEWEST_AT_LIMIT = 20
 """Fewest equal samples that indicate a saturated sensor."""
@@ -19,30 +19,30 @@ MINIMUM_SAMPLES = 10
 """Fewest samples for an estimate of the noise."""
 
 _SPREAD_OF_MEDIAN = 1.4826
-"""Standard deviation of a normal distribution divided by its median absolute deviation, robust to steps [-]."""
+"""Ratio of standard deviation to median absolute deviation of a normal distribution [-]."""
 _KEPT = 3.0
-"""Largest third difference used for the noise, in standard deviations."""
+"""Largest third difference used for the noise, in standard deviations [-]."""
 _SHARE_OF_KEPT = 0.98658
 """Standard deviation of a standard normal distribution truncated at 3 standard deviations [-]."""
 _GAIN_OF_DIFFERENCES = math.sqrt(20.0)
-"""Standard deviation of the third difference of white noise divided by the standard deviation of the noise."""
+"""Ratio of standard deviations of third difference and white noise [-]."""
 _NOISY_FRACTION = 0.2
-"""Fraction of turning points above which a signal is noisy: white noise has 2/3, a smooth curve hardly any."""
+"""Least fraction of turning points in a noisy signal [-]: white noise has 2/3, a smooth curve hardly any."""
 _ABRUPT_FRACTION = 0.3
-"""Slope into a plateau at a limit, as a fraction of the steepest slope of the signal."""
+"""Least slope into a plateau at a sensor limit, relative to the steepest slope of the signal [-]."""
 _BEFORE = 5
-"""Number of samples before a plateau that show the approach to it."""
+"""Number of samples before a plateau over which its approach is measured."""
 _EXCEPTIONAL = 5
-"""Length of a plateau divided by the next longest one, above which it is no converter step [-]."""
+"""Least ratio of a plateau to the next longest [-] for it to be no converter step."""
 _PARTS = 20
-"""Number of parts of a signal whose means show a lasting change."""
+"""Number of parts of a signal, whose means show a lasting change."""
 _SMOOTH = 1.0e-6
-"""Deviation of a value from the line between its neighbours, as a fraction of the range, that counts as rounding."""
+"""Deviation from the line between neighbours, relative to the range [-], that counts as rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Gap after the sample ``index``: time [s] between this sample and the next one."""
+    """Time gap in a recording: index of the sample before it, and duration [s]."""
 
     index: int
     duration: float
@@ -50,7 +50,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class _Plateau:
-    """Longest interval at exactly the largest or smallest value: first and last sample index, value, and ``word``."""
+    """Longest run at exactly the largest or smallest value: first and last sample index, value, and ``word``."""
 
     first: int
     last: int
@@ -75,13 +75,13 @@ def longest_gap(time: Floats) -> Gap | None:
 
 
 def lasting_change(values: Floats) -> float:
-    """Return the range of the means of up to 20 equal parts of a signal."""
+    """Return the range of the means of up to 20 equal parts of a signal [unit of the signal]."""
     parts = np.array_split(values, min(_PARTS, values.size))
     return float(np.ptp([part.mean() for part in parts]))
 
 
 def plateaus(values: Floats) -> tuple[_Plateau, _Plateau]:
-    """Return the longest intervals at exactly the largest and at exactly the smallest value."""
+    """Return the longest runs at exactly the largest and exactly the smallest value."""
     largest, smallest = float(values.max()), float(values.min())
     return (
         _Plateau(*longest_run(values == largest), largest, "largest"),
@@ -90,7 +90,7 @@ def plateaus(values: Floats) -> tuple[_Plateau, _Plateau]:
 
 
 def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return the first and last index of the longest run of True; at least one flag must be True."""
+    """Return first and last index of the longest run of True flags; at least one flag must be True."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
     longest = int(np.argmax(ends - starts))
@@ -98,7 +98,7 @@ def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def is_at_limit(values: Floats, plateau: _Plateau) -> bool:
-    """Tell whether a plateau is a saturated sensor: the noise stops there, or the signal runs into it at speed.
+    """Return whether a plateau is a saturated sensor: noise stops there, or the signal runs into it at speed.
 
     A signal that comes to rest by itself keeps its noise, or slows down before.
     """
@@ -115,12 +115,12 @@ def is_at_limit(values: Floats, plateau: _Plateau) -> bool:
 
 
 def scatters(values: Floats) -> bool:
-    """Tell whether at least half of the values deviate from the line between their neighbours, as with noise."""
+    """Return whether at least half of the values deviate from the line between their neighbours, as noise does."""
     return values.size > 2 and float(np.median(np.abs(np.diff(values, 2)))) > _SMOOTH * float(np.ptp(values))
 
 
 def stands_out(values: Floats, plateau: _Plateau) -> bool:
-    """Tell whether a plateau is far longer than any other, so that it is no step of a coarse converter."""
+    """Return whether a plateau is far longer than any other, hence no step of a coarse converter."""
     if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
         return False
     # A coarse converter has such plateaus everywhere: they are compared with the longest of the others.
@@ -131,7 +131,7 @@ def stands_out(values: Floats, plateau: _Plateau) -> bool:
 
 
 def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
-    """Mark isolated outliers, which differ from the four samples around them; ``noise`` is a standard deviation.
+    """Mark isolated outliers among four regular neighbours; ``noise`` is a standard deviation.
 
     Their distance from the median of five is more than 6 times the noise and more than 3 times the range of the four
     other samples.
@@ -154,24 +154,24 @@ def outlying_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
 
 
 def off_neighbours(values: Floats) -> Floats:
-    """Return the distance of each value from the median of five: the value and two neighbours on each side."""
+    """Return the distance of each value from the median of five values around it."""
     return np.asarray(np.abs(values - np.median(_five_around(values), axis=1)))
 
 
 def _five_around(values: Floats) -> Floats:
-    """Return each value with the two values before and after (values, 5)."""
+    """Return each value with two values before and two after it (values, 5)."""
     # Mirrored at the ends, where an outlier would else be three of its own five neighbours.
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
 
 
 _ROUNDING = 1.0e-9
-"""Step, as a fraction of the range [-], below which it is rounding of a file and not of a converter."""
+"""Smallest difference of values, relative to their range [-], that is a converter step and not file rounding."""
 _SHARE_THAT_DIFFERS = 0.5
-"""Largest fraction of distinct values in a signal with a visible converter step."""
+"""Largest fraction of distinct values [-] in a signal with a visible converter step."""
 
 
 def resolution_of(values: Floats) -> float:
-    """Return the resolution of the converter [unit of the values], from the smallest difference; 0 if none is visible.
+    """Return the converter resolution [unit of the values], the smallest difference; 0 if none is visible.
 
     A resolution is visible if most values occur repeatedly, which neither noise nor motion causes.
     """
@@ -181,7 +181,7 @@ def resolution_of(values: Floats) -> float:
 
 
 def rounding_of(values: Floats, resolution: float) -> Floats:
-    """Return the standard deviation of each value due to rounding by the converter [unit of the values].
+    """Return the standard deviation of each value due to converter rounding [unit of the values].
 
     It is the resolution divided by sqrt(12) (GUM, JCGM 100:2008, F.2.2.1). A sensor at rest repeats one value with the
     same error, so that a run of n equal values has the weight of one: each has sqrt(n) times the standard deviation.
@@ -211,13 +211,13 @@ def _third_differences(values: Floats, lag: int) -> Floats:
 
 
 _SHARE_OF_LAGS = 0.1
-"""Largest correlation time of noise, as a fraction of a recording: slower residuals are model error."""
+"""Largest correlation time of noise, relative to the recording length [-]; slower residuals are model error."""
 
 _BY_CHANCE = 8.0
-"""Four standard errors of the quartile of overlapping differences, times the square root of their number."""
+"""Significance of correlated noise: four standard errors of the quartile of differences, times root of count."""
 
 _QUARTER = 0.31864
-"""Lower quartile of the absolute value of a standard normal deviate."""
+"""Lower quartile of the absolute value of a standard normal variable [-]."""
 
 
 def correlated_noise_of(values: Floats) -> float:

@@ -1,4 +1,4 @@
-"""Samples of a run in sequence, for metrics that need no recording.
+"""Meters: running evaluation of the samples of a run, for metrics without a recording.
 
 A meter is a state of a few floats, updated once per sample of a run. Its functions are pure and scalar, so that the
 engine can compile them into its loop.
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 WALK, STEADY, REQUESTED, LED_SHANK = "walk", "steady strides", "requested torque", "shank of a gait"
-"""Requirements of a metric besides channels: walk, equal strides, requested torque of a walk, shank led by a gait."""
+"""Requirements of metrics besides channels: walk, equal strides, requested torque, shank led by a gait."""
 
 
 class FootSample(NamedTuple):
@@ -43,7 +43,7 @@ class StrideSample(NamedTuple):
 
 
 class GasSample(NamedTuple):
-    """Gas at a sample [kg]: totals since the start of the run, and true masses in the chambers."""
+    """Gas at a sample [kg]: totals since the start of the run, and masses in the chambers."""
 
     supplied_mass: float
     vented_mass: float
@@ -64,15 +64,15 @@ class EnergySample(NamedTuple):
 
 NO_GAS = GasSample(**dict.fromkeys(GasSample._fields, 0.0))
 NO_ENERGY = EnergySample(**dict.fromkeys(EnergySample._fields, 0.0))
-"""Initial energies, also of a gas without an energy balance."""
+"""Energies at the start of a run [J], and of a gas without energy balance."""
 
 
 class Sample(NamedTuple):
-    """Sample of a run: its number from 0, channels in SI units, and records of gas, energy, foot and stride.
+    """Sample of a run: its number from 0, channels [SI], and records of gas, energy, foot and stride.
 
     ``value`` is the controlled quantity and ``reference`` its reference, in the same unit; in a walk the reference is
-    the torque requested by the controller. Values that a run lacks are 0: the reference, temperatures and ``energy`` of
-    gas without an energy balance, ``foot`` unless on the shank of a gait, ``stride`` except in a walk.
+    the torque requested by the controller. Values absent from a run are 0: the reference, temperatures and ``energy``
+    of gas without an energy balance, ``foot`` unless on the shank of a gait, ``stride`` except in a walk.
     """
 
     number: float
@@ -93,7 +93,7 @@ class Sample(NamedTuple):
 
 
 class ReferenceSummary(NamedTuple):
-    """Summary of the whole reference, in its unit, and the start of its hold.
+    """Summary of a whole reference, in its unit, with the start of its final hold.
 
     ``last`` is the last value. ``largest`` is the largest distance over all samples from 0 for a torque, otherwise from
     the initial value of the controlled quantity. ``tolerance`` is the difference from the last value up to which the
@@ -109,16 +109,16 @@ class ReferenceSummary(NamedTuple):
 
 
 SAME_LEVEL = 1.0e-9
-"""Difference between equal levels of a reference, as a fraction of its largest value."""
+"""Largest difference of equal levels of a reference, relative to its largest value [-]."""
 
 
 def is_away(reference: float, last: float, tolerance: float) -> bool:
-    """Tell whether a reference differs from its last value by more than ``tolerance``; all in its unit."""
+    """Return whether a reference differs from its last value by more than ``tolerance``."""
     return abs(reference - last) > tolerance
 
 
 def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary:
-    """Return the summary of a monotone reference, with the start of the final hold updated by a new sample."""
+    """Update the start of the final hold in the summary of a monotone reference, with a new sample."""
     # Sample by sample, because a run is not kept; the last value and the largest are known from the profile before.
     away = is_away(sample.reference, course.last, course.tolerance)
     return ReferenceSummary(
@@ -132,7 +132,7 @@ def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary
 
 @dataclass(frozen=True, slots=True)
 class MeterKind:
-    """Meter: a running evaluation of samples; ``state`` is a NamedTuple class of floats, which may be nested.
+    """Meter in the catalogue: running evaluation of samples, with a ``state`` of floats (NamedTuple class).
 
     ``start(course, sample)`` creates the state at the first sample, ``update(state, course, sample)`` updates it at
     each later one. The start of the hold in ``course`` is valid up to this sample. A meter without ``needs_course``

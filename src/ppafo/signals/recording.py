@@ -1,6 +1,6 @@
-"""Recording: time and named channels with units, and the channels that the package knows by name.
+"""Recording: time and named channels with units, and the catalogue of known channels.
 
-Measured and simulated data are processed in the same way from here on.
+Measured and simulated data have the same form.
 """
 
 import re
@@ -26,13 +26,13 @@ TIME_UNIT = "s"
 PLAIN_NUMBER = "-"
 
 Between = Literal["hold", "linear"]
-"""Interpolation of a channel between two samples: previous value, or linear."""
+"""Interpolation of a channel between samples: previous value, or linear."""
 BETWEEN: tuple[Between, ...] = get_args(Between)
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelKind:
-    """Known channel; ``is_held`` for zero-order hold between samples, otherwise linear interpolation.
+    """Known channel: SI unit and meaning; ``is_held`` for zero-order hold between samples, else linear.
 
     A recording may declare another interpolation for its channel.
     """
@@ -139,7 +139,7 @@ OF_SECOND_CHAMBER = frozenset(
         "dorsiflexion_pressure",
     }
 )
-"""Channels that are missing in runs of an actuator with one chamber."""
+"""Channels absent from runs of an actuator with one chamber."""
 
 
 Floats = NDArray[np.float64]
@@ -153,10 +153,10 @@ _KINDS: tuple[RecordingKind, ...] = get_args(RecordingKind)
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Channel:
-    """Values of one quantity, read-only, and their unit as SI text: ``rad``, ``Pa`` (absolute), ``N m``, ``-``.
+    """Values of a channel, read-only, with the SI unit as text: ``rad``, ``Pa`` (absolute), ``N m``, ``-``.
 
-    ``between`` is the interpolation between two samples, ``hold`` or ``linear``; None is the default for the channel's
-    name: ``hold`` for a command. ``stated`` is the unit in the source file, which messages about the file use.
+    ``between`` is the interpolation between two samples, ``hold`` or ``linear``; None means the default by name, such
+    as ``hold`` for a command. ``stated`` is the unit in the source file, which messages about the file use.
     """
 
     values: Floats
@@ -186,13 +186,13 @@ class Channel:
         return f"Channel of {len(self.values)} values in {self.unit}"
 
     def __reduce__(self) -> tuple[Callable[..., "Channel"], tuple[Any, ...]]:
-        """Copy and unpickle through the constructor, so that the values stay read-only."""
+        """Reduce to a constructor call for copy and pickle, so that values stay read-only."""
         return Channel, (self.values, self.unit, self.between, self.stated)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Recording:
-    """Channels over a common, strictly increasing time [s]; all values are finite.
+    """Recording: channels over a common, strictly increasing time [s]; all values are finite.
 
     ``label`` names the recording; ``kind`` is its origin (measured, simulated, synthetic), which figures and files
     state for data that are not measured.
@@ -244,11 +244,11 @@ class Recording:
         return f"Recording '{self.label}', {self.kind}, {samples} {span}\n  channels: {channels or 'none'}"
 
     def __reduce__(self) -> tuple[Callable[..., "Recording"], tuple[Any, ...]]:
-        """Copy and unpickle through the constructor: a read-only mapping cannot be pickled."""
+        """Reduce to a constructor call for copy and pickle, because a read-only mapping cannot be pickled."""
         return Recording, (self.label, self.time, dict(self.channels), self.kind)
 
     def __getitem__(self, name: str) -> Floats:
-        """Return the values of a channel, read-only, in its SI unit."""
+        """Return the values of a channel in its SI unit, read-only."""
         return self._channel(name).values
 
     def in_unit(self, name: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> Floats:
@@ -267,7 +267,7 @@ class Recording:
         return converted
 
     def values_of(self, channel: str | tuple[str, str], atmosphere: float = STANDARD_ATMOSPHERE) -> Floats:
-        """Return a channel's values, in SI (``"torque"``) or in a given unit (``("pressure_1", "psi_g")``).
+        """Return the values of a channel, in SI (``"torque"``) or in a given unit (``("pressure_1", "psi_g")``).
 
         ``"time"`` are the times of the samples [s]. Gauge pressures are relative to ``atmosphere`` [Pa absolute].
         Raises DataError for an unknown channel, and UnitError for a unit that does not fit the channel.
@@ -277,7 +277,7 @@ class Recording:
         return self[channel] if isinstance(channel, str) else self.in_unit(*channel, atmosphere)
 
     def _ipython_key_completions_(self) -> list[str]:
-        """Return the channel names, which a notebook offers as completions between brackets."""
+        """Return the channel names, for completion between brackets in notebooks."""
         return list(self.names)
 
     def __contains__(self, name: object) -> bool:
@@ -289,7 +289,7 @@ class Recording:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the channels, in the given order."""
+        """Names of the channels, in order."""
         return tuple(self.channels)
 
     @property
@@ -302,18 +302,18 @@ class Recording:
         return self._channel(name).unit
 
     def is_held(self, name: str) -> bool:
-        """Tell whether a channel keeps its value until the next sample; otherwise it is interpolated linearly."""
+        """Return whether a channel keeps its value until the next sample (zero-order hold)."""
         between = self._channel(name).between
         return (name in CHANNELS and CHANNELS[name].is_held) if between is None else between == "hold"
 
     def with_channel(self, name: str, values: ArrayLike, unit: str) -> "Recording":
-        """Return the recording with a channel added or replaced; a replaced one keeps its interpolation."""
+        """Return a copy with a channel added or replaced; a replaced channel keeps its interpolation."""
         between = self.channels[name].between if name in self.channels else None
         channel = Channel(np.asarray(values, dtype=np.float64), unit, between)
         return Recording(self.label, self.time, {**self.channels, name: channel}, self.kind)
 
     def between(self, start: float, end: float) -> "Recording":
-        """Return the samples with ``start`` <= time <= ``end`` [s]; times are not shifted."""
+        """Return a copy with the samples from ``start`` to ``end`` [s]; times are not shifted."""
         # Times stay: where a recording is cut must not move what happens in it.
         inside = (self.time >= start) & (self.time <= end)
         if not inside.any():
@@ -325,7 +325,7 @@ class Recording:
         return Recording(self.label, self.time[inside], kept, self.kind)
 
     def resample(self, times: ArrayLike) -> "Recording":
-        """Return the recording at other times [s] within its span, each channel by zero-order hold or linearly."""
+        """Return a copy at other times [s] within the time span; each channel is held or linear as declared."""
         wanted = np.asarray(times, dtype=np.float64)
         if wanted.size and (wanted.min() < self.time[0] or wanted.max() > self.time[-1]):
             raise DataError(
@@ -357,7 +357,7 @@ class Recording:
         return frame
 
     def plot(self, units: Mapping[str, str] | None = None) -> "Figure":
-        """Return a figure with a panel for each channel over time [s], in units as in ``to_dataframe``."""
+        """Draw a panel for each channel over time [s], in units as in ``to_dataframe``."""
         from matplotlib.figure import Figure
 
         if not self.channels:
@@ -380,7 +380,7 @@ class Recording:
 
 
 def recording_kind(name: str) -> RecordingKind:
-    """Return the kind of recording with this name."""
+    """Check the name of a recording kind and return it. Raises DataError for an unknown name."""
     for kind in _KINDS:
         if kind == name:
             return kind

@@ -1,4 +1,4 @@
-"""Reading and writing of files: recordings as NetCDF and CSV, and result folders. All writes are atomic."""
+"""Reading and atomic writing of files: recordings as NetCDF and CSV, and result folders."""
 
 from ppafo.storage.comma_separated import read_csv, write_csv
 from ppafo.storage.netcdf import dataset_of, write_netcdf

@@ -23,25 +23,25 @@ _TIME = re.compile(
     r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\b\.?)?(?:\s*(?P<zone>Z\b|[+-]\d{2}:?(?:\d{2})?|[A-Z]{2,5}\b(?:[+-]\d{1,2})?))?"
     r"(?:\[[\w/]+\])?"
 )
-"""Time of day: hours, minutes and seconds, or two of them; optional fraction, am or pm, and time zone."""
+"""Pattern of a time of day: hours, minutes and seconds, or two of them; optional fraction, am or pm, time zone."""
 _COMPACT = re.compile(r"(?P<date>\d{8})T(?P<hour>\d{2})(?P<minute>\d{2})(?P<second>\d{2})(?P<rest>.*)")
-"""Date and time in digits alone, ``20260321T080010``."""
+"""Pattern of date and time in digits only, ``20260321T080010``."""
 _OFFSET = re.compile(r"([+-])(\d{1,2}):?(\d{2})?$")
-"""Offset from UTC at the end of a time zone."""
+"""Pattern of an offset from UTC at the end of a time zone."""
 _YEAR_FIRST = re.compile(r"(\d{4})[-/.]?(\d{2})[-/.]?(\d{2})|(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})")
 _DOTTED = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{2,4})")
 _SLASHED = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-](\d{2,4})")
 _MONTHS = ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt", "nov", "dec dez")
 _MONTH = {name: number for number, names in enumerate(_MONTHS, start=1) for name in names.split()}
-"""Number of a month by the first three letters of its name, in English and German."""
+"""Month number by the first three letters of its name, in English and German."""
 _PERIODS = (2.0**32 * 1.0e-6, 2.0**32 * 1.0e-3)
 """Periods [s] after which a 32-bit counter of microseconds or milliseconds wraps around."""
 _LARGEST_STEP = 10.0
-"""Largest step across a counter overflow, in usual intervals [-]; a longer step means that the clock was set back."""
+"""Largest step across a counter overflow, in usual intervals [-]; a longer step means a clock set back."""
 
 
 class _Stamp(NamedTuple):
-    """Time of day [s], its time zone, and the text beside it, which may be a date; texts are empty if absent.
+    """Time of day [s], time zone, and other text of the cell, which may be a date; texts are empty if absent.
 
     The time is in UTC if the time zone states its offset.
     """
@@ -64,7 +64,7 @@ def clock_seconds(
     order: DateOrder | None = None,
     form: ClockForm | None = None,
 ) -> Floats:
-    """Return the times of day in ``cells`` as seconds since the first; ``rows`` are the row labels for messages.
+    """Convert times of day in ``cells`` to seconds since the first; ``rows`` are the row labels for messages.
 
     ``dates`` are the cells of a separate date column. Otherwise a date may stand in the cell itself; without any date,
     a decrease by more than half a day is taken as midnight. ``order`` is the order of day and month in a date, ``form``
@@ -74,7 +74,7 @@ def clock_seconds(
     stamps = [_stamp(cell, form, row) for cell, row in zip(cells, rows, strict=True)]
     zones = dict.fromkeys(re.sub(r"[+-].*", "", stamp.zone) for stamp in stamps)
     if len(zones) > 1:
-        raise DataError(f"the clock changes its time zone ({', '.join(zones)}): give times of one zone, or numbers")
+        raise DataError(f"the times are in several time zones ({', '.join(zones)}): use one time zone, or numbers")
     seconds = np.array([stamp.seconds for stamp in stamps])
     days_in_words = [stamp.date for stamp in stamps] if dates is None else [cell.strip() for cell in dates]
     if any(days_in_words):
@@ -85,7 +85,7 @@ def clock_seconds(
 
 
 def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
-    """Return the time of day in a cell. Raises DataError, with ``row`` first, if there is none or it is ambiguous."""
+    """Parse the time of day in a cell. Raises DataError, with ``row`` first, if it is absent or ambiguous."""
     text = one_line(cell.strip())
     compact = _COMPACT.fullmatch(text)
     if compact is not None:
@@ -122,7 +122,7 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
 
 
 def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: DateOrder | None) -> Floats:
-    """Return the day number of each date. Raises DataError if the order of day and month is ambiguous."""
+    """Convert dates to day numbers. Raises DataError if the order of day and month is ambiguous."""
     orders: tuple[DateOrder, ...] = ("day month", "month day") if order is None else (order,)
     readings: list[Floats] = []
     unread_row = 0
@@ -144,14 +144,14 @@ def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: Dat
     since_first = [days - days[0] for days in growing]
     if len(since_first) > 1 and not np.array_equal(since_first[0], since_first[1]):
         raise DataError(
-            f"{rows[0]}: the date {words[0][:LONGEST_SHOWN]!r} may begin with the day or with the month; give "
+            f"{rows[0]}: the date {words[0][:LONGEST_SHOWN]!r} is ambiguous; give "
             'date_order = "day month" or date_order = "month day"'
         )
     return growing[0]
 
 
 def _ordinal(word: str, order: DateOrder) -> int | None:
-    """Return a date as ordinal day number, None if the text is no date; names of weekdays are ignored."""
+    """Convert a date to its ordinal day number, None if the text is no date; names of weekdays are ignored."""
     text = word.strip(" ,")
     if match := _YEAR_FIRST.fullmatch(text):
         year, month, day = (int(part) for part in match.groups() if part is not None)
@@ -176,7 +176,7 @@ def _ordinal(word: str, order: DateOrder) -> int | None:
 
 
 def counted_on(time: Floats) -> Floats:
-    """Return a time [s] without the overflows of a 32-bit counter, ``micros()`` or ``millis()``; others unchanged."""
+    """Remove overflows of a 32-bit counter (``micros()``, ``millis()``) from a time [s]; other times are unchanged."""
     steps = np.diff(time)
     falls = steps < 0.0
     if not falls.any() or not (steps > 0.0).any():

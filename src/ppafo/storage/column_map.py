@@ -25,7 +25,7 @@ Thousands = Literal["point", "comma", "apostrophe", "blank"]
 
 
 class MappedChannel(StrictTable):
-    """Source of one channel: a column, or a constant. The value is sign * (factor * number + offset) in unit."""
+    """Source of a channel: column or constant. Value in ``unit`` = sign * (factor * number + offset)."""
 
     column: Annotated[
         Annotated[int, Field(ge=1)] | Text | None, Field(description="number of the column from 1, or its name")
@@ -71,7 +71,7 @@ class MappedChannel(StrictTable):
 
 
 class MappedDirection(StrictTable):
-    """Direction of motion from the rate of a channel: 1, -1, or 0 if too slow; sweeps are numbered as repetitions."""
+    """Direction of motion from the rate of a channel: 1, -1, or 0 if too slow; the sweeps are numbered."""
 
     of: Annotated[Text, Field(description="channel whose rate of change gives the direction")]
     threshold: Annotated[Text, Field(description="smallest rate that counts as motion, such as '2 mm/s'")]
@@ -83,7 +83,7 @@ Trials = Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(strict=False, 
 
 
 class ColumnMap(StrictTable):
-    """Format of a foreign table, and channels of its columns."""
+    """Column map: format of a foreign table, and the channels in its columns."""
 
     delimiter: Annotated[Literal["comma", "semicolon", "tab", "whitespace"], Field(description="column delimiter")] = (
         "comma"
@@ -115,7 +115,7 @@ _FILE = TomlKind("file of column maps", "columns", resources.files("ppafo.storag
 
 
 def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
-    """Return the column map with this name from a TOML file, or the only one in the file if no name is given.
+    """Load a column map by name from a TOML file; without a name, the only map in the file.
 
     Raises DataError if there is no such map, or if there are several and no name is given.
     """
@@ -135,7 +135,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def column_map_of(columns: ColumnMap | str | Path) -> tuple[ColumnMap, str]:
-    """Return a column map and its name in messages: ``logger.toml:bench`` for a map from a file, empty for an object.
+    """Return a column map and its label in messages: ``logger.toml:bench`` from a file, empty for an object.
 
     Raises DataError if the file has no such map.
     """
@@ -147,7 +147,7 @@ def column_map_of(columns: ColumnMap | str | Path) -> tuple[ColumnMap, str]:
 
 
 def in_map(map_name: str) -> AbstractContextManager[None]:
-    """Return a context manager that prepends the name of the map, if any, to each DataError raised within."""
+    """Return a context manager that prepends the name of a map, if any, to each DataError raised within."""
     return refused_as(DataError, f"column map {one_line(map_name)}", DataError) if map_name else nullcontext()
 
 
@@ -155,20 +155,20 @@ _KEYS_OF_TIME = ("rate", "date", "date_order", "clock")
 
 
 def check_sources(columns: ColumnMap) -> None:
-    """Raise DataError, naming the key, for a missing time, a channel without exactly one source, or a misplaced key."""
+    """Raise DataError for a missing time, a channel without exactly one source, or a misplaced key."""
     if TIME not in columns.channels:
-        raise DataError(f'has no channels.{TIME}; give a column, or {TIME} = {{ rate = "100 Hz" }}')
+        raise DataError(f'channels.{TIME} is missing; add it with a column, or as {TIME} = {{ rate = "100 Hz" }}')
     for name, mapped in columns.channels.items():
         for key in () if name == TIME else _KEYS_OF_TIME:
             if getattr(mapped, key) is not None:
-                raise DataError(f"channels.{name}.{key} belongs to channels.{TIME}; omit it here")
+                raise DataError(f"channels.{name}.{key} is allowed only in channels.{TIME}; remove the key")
         sources = [key for key in ("column", "constant", "rate") if getattr(mapped, key) is not None]
         if not sources:
             allowed = "column, constant or rate" if name == TIME else "column or constant"
-            raise DataError(f"channels.{name} gives no {allowed}; give one of them")
+            raise DataError(f"channels.{name} needs a {allowed}")
         if len(sources) > 1:
             several = "both" if len(sources) == 2 else "all of"
-            raise DataError(f"channels.{name} gives {several} a {' and a '.join(sources)}; give one of them")
+            raise DataError(f"channels.{name} has {several} a {' and a '.join(sources)}; keep one of them")
 
 
 class MappedTable(NamedTuple):
@@ -193,6 +193,6 @@ _MOST_SHOWN = 20
 
 
 def shown_names(names: Collection[str]) -> str:
-    """Return names as a list for a message: at most twenty, each shortened to one line."""
+    """Format names as a list for a message: at most twenty, each shortened to one line."""
     shown = ", ".join(one_line(name)[:LONGEST_SHOWN] for name in islice(names, _MOST_SHOWN))
     return f"{shown}, ..." if len(names) > _MOST_SHOWN else shown

@@ -1,4 +1,4 @@
-"""Recordings as CSV: one header line ``time [s],angle [rad],...``, then one line per sample, exact to the last bit.
+"""Recordings as CSV: a header line ``time [s],angle [rad],...`` and a line for each sample, without loss of bits.
 
 A channel with an unusual interpolation between samples states it in its header, ``supply_pressure [Pa] hold`` or
 ``linear``.
@@ -34,12 +34,12 @@ _OTHERS = (
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
 _ONLY_SIMULATED = "supplied_mass"
-_NO_TIMES = f'for a table without times the map has {TIME} = {{ rate = "100 Hz" }}, the rate of its rows'
+_NO_TIMES = f'for a table without a time column, give the sample rate in the map: {TIME} = {{ rate = "100 Hz" }}'
 
 
 @dataclass(frozen=True, slots=True)
 class HeaderColumn:
-    """Column as declared in a header: channel name (or time), unit of the numbers, interpolation between samples."""
+    """Column of a CSV header: channel name (or time), unit of the numbers, interpolation between samples."""
 
     name: str
     unit: str
@@ -54,12 +54,12 @@ class HeaderColumn:
 
 
 def parse_header(cells: list[str]) -> list[HeaderColumn]:
-    """Return the columns of a header such as ``time [s]``, ``pressure_1 [psi_g]``; time comes first.
+    """Parse a header such as ``time [s]``, ``pressure_1 [psi_g]`` into columns, time first.
 
     Raises DataError for an invalid header.
     """
     if not cells:
-        raise DataError("the header must come first, line 1 is empty")
+        raise DataError("line 1 is empty; it must contain the header")
     columns = []
     if is_of_frame(cells):
         cells = [f"{name} [{CHANNELS[name].unit if name in CHANNELS else TIME_UNIT}]" for name in map(str.strip, cells)]
@@ -69,13 +69,13 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
             bare, shown = cell.strip(), cell if len(cell) <= 40 else f"{cell[:36]} ..."
             others = next((f"; {one} need a column map with {key}" for mark, one, key in _OTHERS if mark in cell), "")
             if bare in CHANNELS:
-                remedy = f": write '{bare} [{CHANNELS[bare].unit}]'"
+                remedy = f"; write '{bare} [{CHANNELS[bare].unit}]'"
             elif others or not bare:
                 remedy = others or "; does the line end with a comma?"
             else:
                 remedy = _column_map_remedy()
             raise DataError(
-                f"the header must name columns as 'name [unit]', separated by commas; '{one_line(shown)}' is not one"
+                f"the header must name columns as 'name [unit]', separated by commas, not as '{one_line(shown)}'"
                 f"{remedy}"
             )
         name, unit, word = match[1], match[2], match[3]
@@ -83,30 +83,30 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
         between = next((known for known in BETWEEN if word == known and name != TIME), None)
         if word and between is None:
             hint = nearest_name(word, BETWEEN)
-            raise DataError(f"column '{name}': behind its unit may stand {' or '.join(BETWEEN)}, not '{word}'{hint}")
+            raise DataError(f"column '{name}': '{word}' after the unit must be {' or '.join(BETWEEN)}{hint}")
         columns.append(HeaderColumn(name, unit, between))
     names = [column.name for column in columns]
     if names[0] != TIME:
         raise DataError(
-            f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'{_column_map_remedy()}; {_NO_TIMES}"
+            f"the first column must be '{TIME} [{TIME_UNIT}]', not '{names[0]}'{_column_map_remedy()}; {_NO_TIMES}"
         )
     twice = first_twice(names)
     if twice is not None:
-        raise DataError(f"there are two columns '{twice}'")
+        raise DataError(f"the column '{twice}' occurs twice; rename or remove one of them")
     return columns
 
 
 def _column_map_remedy() -> str:
-    """Return the end of a message on columns of other names: a column map reads them."""
+    """Return the remedy, appended to messages, to read columns with other names through a column map."""
     named = argument_text("columns", "FILE.toml:NAME")
     return (
-        f"; other columns are read through a column map: validate {named}, or columns = 'NAME' in a problem file of "
+        f"; for other column names use a column map: {named} of validate, or columns = 'NAME' in a problem file of "
         "identify"
     )
 
 
 def is_of_frame(cells: Sequence[str]) -> bool:
-    """Return whether a header was written by ``to_dataframe().to_csv()`` of a result: bare channel names, in SI units.
+    """Return whether a header was written by ``to_dataframe().to_csv()`` of a result: bare channel names, in SI.
 
     Bare names alone are not enough: a logger may call a column in degrees ``angle``.
     """
@@ -115,7 +115,7 @@ def is_of_frame(cells: Sequence[str]) -> bool:
 
 
 def check_clock(time: Floats, lines: Sequence[int], noun: str = "line", may_have_trials: bool = True) -> None:
-    """Raise DataError for times [s] that do not increase; ``lines`` are the line numbers of the rows in the file.
+    """Raise DataError unless times [s] increase; ``lines`` are the line numbers of the rows in the file.
 
     The message names the line, or the row in units of ``noun``. If the clock restarts, the message suggests a column
     map for several trials, provided that the format ``may_have_trials``.
@@ -128,7 +128,7 @@ def check_clock(time: Floats, lines: Sequence[int], noun: str = "line", may_have
         # Each trial of a file begins about where the first one does.
         are_trials = may_have_trials and falls.size > 0 and bool((time[falls] < time[1]).all())
         trials = (
-            f", or take one of {falls.size + 1} trials with trial = 1, or 'all', in a column map" if are_trials else ""
+            f"; to read its {falls.size + 1} trials, give trial = 1, or 'all', in a column map" if are_trials else ""
         )
         raise DataError(
             f"{noun} {lines[index]}, column '{TIME}': the clock {word}: {time[index]:.9g} s follows "
@@ -137,7 +137,7 @@ def check_clock(time: Floats, lines: Sequence[int], noun: str = "line", may_have
 
 
 def in_si(column: HeaderColumn, values: Floats, atmosphere: float) -> Floats:
-    """Return values converted to the unit of the recording; gauge pressure is relative to ``atmosphere`` [Pa absolute].
+    """Convert values to the unit of the recording; gauge pressure is relative to ``atmosphere`` [Pa absolute].
 
     Raises UnitError for a unit that does not fit.
     """
@@ -152,7 +152,7 @@ def in_si(column: HeaderColumn, values: Floats, atmosphere: float) -> Floats:
 
 
 _SPELT = {"Pa": _LEVEL, PLAIN_NUMBER: ""}
-"""Unit names for ``ppafo.units``, which needs the kind of a pressure and no unit for a plain number."""
+"""Unit names as ``ppafo.units`` requires: pressure with its kind, no unit for a plain number."""
 _MARKS: dict[RecordingKind, str] = {
     "simulated": "# simulated: a model's own output, not measured",
     "synthetic": "# synthetic: made by a model to stand for a measurement",
@@ -163,13 +163,13 @@ _MARK = re.compile(r"#\s*(\w+):.*")
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 SPLIT_NUMBERS = (
-    "commas seem to separate columns and decimals alike: write the file with decimal points, or with another delimiter "
+    "commas seem to be both delimiter and decimal mark: write the file with decimal points, or with another delimiter "
     'and read it through a column map with decimal = "comma"'
 )
 """Message for rows with twice as many cells as columns."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _SIMILAR = 0.8
-"""Similarity [-] above which a word is a misspelt kind; a comment such as 'measurement: run 3' stays below."""
+"""Similarity [-] above which a word counts as a misspelt kind; 'measurement: run 3' in a comment stays below."""
 
 
 def write_csv(path: str | Path, recording: Recording) -> Path:
@@ -178,7 +178,7 @@ def write_csv(path: str | Path, recording: Recording) -> Path:
 
 
 def marked_csv_bytes(recording: Recording) -> bytes:
-    """Return the CSV table of a recording for use as a separate file, with its kind in a comment unless measured."""
+    """Return the CSV table of a recording as a separate file, with a comment line on its kind unless measured."""
     return mark_of(recording.kind).encode() + csv_bytes(recording)
 
 
@@ -211,18 +211,18 @@ def read_csv(
     atmosphere: float = STANDARD_ATMOSPHERE,
     row_time: float | None = None,
 ) -> Recording:
-    """Return the recording in a CSV file, in SI units, labelled with the file name by default.
+    """Read a recording from a CSV file, in SI units, labelled with the file name by default.
 
     Gauge pressure is relative to ``atmosphere`` [Pa absolute]. ``row_time`` [s] is the time between the rows of a table
     without a time column; None requires the column. Raises DataError for an invalid file.
     """
     content = read_bytes(path)
     try:
-        text = text_of(content, remedy='; a column map with encoding = "latin-1" reads that')
+        text = text_of(content, remedy='; read a Latin-1 file through a column map with encoding = "latin-1"')
         # Whoever writes a table ends its last line: one without an end is a file that was cut off in a number.
         if not text.endswith(("\n", "\r")):
             raise DataError(
-                "the last line has no line break: the file may be cut off in a number; add one if it is whole"
+                "the last line has no line break, so its last number may be cut off; add one if the file is complete"
             )
         lines = text.splitlines()
         first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
@@ -249,7 +249,7 @@ def read_csv(
             )
         values = _table(header, rows, first)
         if is_counted and not np.array_equal(values[:, 0], np.arange(len(values))):
-            raise DataError("the first column has no name, and does not count the rows from 0; name it, or remove it")
+            raise DataError("the first column has no name and is not a row number from 0; name or remove the column")
         kind = "simulated" if is_of_frame(header) else kind_of_comments(lines[:first])
         line_numbers = range(first + 2, first + 2 + len(values))
         series = list(values[:, is_counted:].T)
@@ -271,7 +271,7 @@ def recording_of_columns(
     atmosphere: float,
     noun: str = "line",
 ) -> Recording:
-    """Return the recording of columns in the units of their headers, time first; ``rows`` are row numbers in the file.
+    """Return a recording from columns in the units of their headers, time first; ``rows`` are row numbers in the file.
 
     Raises DataError for a unit that does not fit, and for times that do not increase, naming the row in units of
     ``noun``.
@@ -284,8 +284,8 @@ def recording_of_columns(
     for column, numbers in zip(columns, values, strict=True):
         if column.si_unit == PLAIN_NUMBER and column.unit.removeprefix("m") in ("V", "A"):
             raise DataError(
-                f"column '{column.name} [{column.unit}]': '{column.name}' is a plain number; scale it by factor in a "
-                "column map (0.1 per V where 10 V is 1)"
+                f"column '{column.name} [{column.unit}]': '{column.name}' is dimensionless; give factor in a column "
+                f"map (0.1 if 10 {column.unit} corresponds to 1)"
             )
         with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
             series.append(in_si(column, numbers, atmosphere))
@@ -311,12 +311,14 @@ def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
             raise DataError(f"the comment '# {match[1]}:' names no kind of recording, did you mean '{near[0]}'?")
         named += [kind for kind in _MARKS if kind == match[1]]
     if len(set(named)) > 1:
-        raise DataError(f"the comments name two kinds of recording: {' and '.join(named)}")
+        raise DataError(
+            f"the comments name two kinds of recording, {' and '.join(dict.fromkeys(named))}; keep one of them"
+        )
     return named[0] if named else "measured"
 
 
 def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats:
-    """Return the numbers below the header, parsed row by row, since all cells as text would need far more memory."""
+    """Parse the numbers below the header row by row, which needs far less memory than all cells as text."""
     # Blank lines may only follow the last row: one between rows is a sample that was lost.
     numbers, blank = array("d"), None
     for line, row in enumerate(rows, start=skipped + 2):
@@ -324,7 +326,7 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
             blank = blank or line
             continue
         if blank is not None:
-            raise DataError(f"line {blank} has 0 values for {len(header)} columns")
+            raise DataError(f"line {blank} is blank, and rows follow; remove the line, or add its {len(header)} values")
         if len(row) != len(header):
             remedy = f"; {SPLIT_NUMBERS}" if len(row) == 2 * len(header) else ""
             raise DataError(f"line {line} has {len(row)} values for {len(header)} columns{remedy}")
@@ -340,8 +342,8 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
             name, cell = header[is_number.index(False)].strip(), one_line(row[is_number.index(False)])[:LONGEST_SHOWN]
             is_comma = _DECIMAL_COMMA.fullmatch(cell)
             remedy = '; decimal commas need a column map with decimal = "comma"' if is_comma else ""
-            remedy = remedy if cell.strip() else "; remove the line, a sample that was lost, or the column"
-            raise DataError(f"line {line}, column '{name}': {cell!r} is not a number, or not a finite one{remedy}")
+            remedy = remedy if cell.strip() else "; remove the line or the column"
+            raise DataError(f"line {line}, column '{name}': {cell!r} is not a finite number{remedy}")
         numbers.extend(values)
     return np.array(numbers).reshape(-1, len(header))
 

@@ -1,4 +1,4 @@
-"""Atomic reading and writing of files: a file or folder is written completely beside its target, then renamed."""
+"""Atomic reading and writing of files: each is written completely under a temporary name, then renamed."""
 
 import contextlib
 import errno
@@ -16,10 +16,10 @@ from ppafo.errors import DataError
 from ppafo.wording import reason
 
 LEFT_ASIDE = ".writing-"
-"""Part of the name of a file being written; such a file remains only if the process was killed."""
+"""Part of the temporary name of a file; such a file remains only from a killed process."""
 
 _CURRENT_FOLDER, _EXCHANGE = -100, 2
-"""``AT_FDCWD`` and ``RENAME_EXCHANGE`` of Linux."""
+"""Constants ``AT_FDCWD`` and ``RENAME_EXCHANGE`` of Linux."""
 
 MAXIMUM_BYTES_RECORDED = 2_000_000_000
 """Largest size of a recording file [bytes]; an hour at 1 kHz with twenty channels is smaller, even as text."""
@@ -37,7 +37,7 @@ def read_bytes(path: str | Path, maximum: int = MAXIMUM_BYTES_RECORDED) -> bytes
 
 
 def text_of(content: bytes, encoding: str = "utf-8", remedy: str = "") -> str:
-    """Return the content of a file as text. Raises DataError, ending in ``remedy``, if it is not in this encoding."""
+    """Decode the content of a file as text. Raises DataError, ending in ``remedy``, if the encoding is wrong."""
     try:
         text = decoded(content) if encoding == "utf-8" else content.decode(encoding)
     except UnicodeDecodeError as error:
@@ -52,7 +52,7 @@ def text_of(content: bytes, encoding: str = "utf-8", remedy: str = "") -> str:
 
 
 def is_address(path: str | Path) -> bool:
-    """Return whether a path is an address of another computer, such as ``s3://bucket``."""
+    """Return whether a path is the address of remote storage, such as ``s3://bucket``."""
     return re.match(r"[a-z][a-z0-9+]+:/", str(path)) is not None
 
 
@@ -70,7 +70,7 @@ def write_file(path: str | Path, content: bytes) -> Path:
 
 
 def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing files with the same names; all are written aside first, then renamed."""
+    """Write files into a folder, replacing files of equal names; all are written before the first is renamed."""
     with _write_errors(folder), _make_folder(folder):
         _check_no_folder(folder, contents)
         aside = _sibling(folder / "files", "writing")
@@ -85,7 +85,7 @@ def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def temporary_folder(purpose: str, contents: Mapping[str, bytes] | None = None) -> "tempfile.TemporaryDirectory[str]":
-    """Return a temporary folder, named for its ``purpose``, with the given files by path.
+    """Create a temporary folder with the given files by path; ``purpose`` is part of its name.
 
     The folder is removed at the end of a ``with`` block, or with the last reference to it. Raises DataError, leaving
     nothing behind, if the folder or a file cannot be written.
@@ -101,13 +101,13 @@ def temporary_folder(purpose: str, contents: Mapping[str, bytes] | None = None) 
             made.cleanup()
             raise
     except OSError as error:
-        remedy = "make room there, or set TMPDIR to another folder"
+        remedy = "free disk space, or set TMPDIR to another folder"
         raise DataError(f"temporary files cannot be written: {reason(error)}; {remedy}") from error
     return made
 
 
 def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Replace ``folder`` by one with exactly these files, by path; the old one stays until the new one is complete."""
+    """Replace ``folder`` by these files, by path; the old folder stays until the new folder is complete."""
     target = _real(folder)
     with _write_errors(folder), _make_folder(target.parent):
         aside = _sibling(target, "writing")
@@ -149,7 +149,7 @@ def _try_folder(trial: Path) -> None:
 
 
 def _try_renaming(folder: Path, trial: Path) -> None:
-    """Raise OSError if a folder cannot be renamed: mount point, another user's in a sticky folder, or in a lower layer.
+    """Raise OSError if a folder cannot be renamed, as a mount point, another user's sticky folder, or a lower layer.
 
     The trial target contains a file, so that nothing is renamed; other obstacles are reported first.
     """
@@ -159,7 +159,7 @@ def _try_renaming(folder: Path, trial: Path) -> None:
         folder.rename(trial)
     except OSError as error:
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
-            why = f"the folder itself cannot be replaced ({reason(error)}); choose a new folder in it"
+            why = f"the folder itself cannot be replaced ({reason(error)}); choose a new subfolder"
             raise OSError(None, why) from error
     else:
         trial.rename(folder)
@@ -168,7 +168,7 @@ def _try_renaming(folder: Path, trial: Path) -> None:
 
 
 def _real(folder: Path) -> Path:
-    """Return the path with links resolved; for circular links ``Path.resolve`` raises an error that is no OSError."""
+    """Resolve links in a path; for circular links ``Path.resolve`` raises an error that is no OSError."""
     try:
         return Path(os.path.realpath(folder))
     except ValueError as error:
@@ -177,11 +177,11 @@ def _real(folder: Path) -> Path:
 
 @contextlib.contextmanager
 def _make_folder(folder: Path) -> Iterator[None]:
-    """Create a folder and its parents for a ``with`` block; at the end, new folders that are empty are removed."""
+    """Create a folder and its parents for a ``with`` block; at the end, empty new folders are removed."""
     new = [ancestor for ancestor in (folder, *folder.parents) if not ancestor.exists()]
     nearest = folder if folder.exists() else new[-1].parent
     if not nearest.is_dir():
-        raise NotADirectoryError(None, f"there is a file '{nearest}' in the place of a folder")
+        raise NotADirectoryError(None, f"'{nearest}' is a file, not a folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         yield
@@ -195,7 +195,7 @@ def _check_no_folder(folder: Path, names: Iterable[str]) -> None:
     """Raise IsADirectoryError if a folder has the name of a file to be written, before any file is written."""
     for name in names:
         if (folder / name).is_dir():
-            raise IsADirectoryError(None, f"there is a folder '{name}' in it, in the place of a file")
+            raise IsADirectoryError(None, f"'{name}' in it must be a file, and is a folder")
 
 
 def _swap(new: Path, target: Path) -> None:
@@ -230,7 +230,7 @@ def _exchange(one: Path, other: Path) -> bool:
 
 
 def _sibling(target: Path, purpose: str) -> Path:
-    """Return an unused path in the same folder as ``target``, and so on the same disk."""
+    """Return an unused path next to ``target``, on the same disk."""
     # Beside it, as a rename is one step on one disk only; with a random part, as two commands may write at once.
     return target.with_name(f".{target.name}.{purpose}-{secrets.token_hex(4)}")
 

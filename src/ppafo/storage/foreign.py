@@ -1,4 +1,4 @@
-"""Foreign tables, with their own columns, units and signs, read as recordings through a column map.
+"""Foreign tables, with other columns, units and signs, read as recordings through a column map.
 
 Error messages name file, line and column of an invalid cell, and the key of an error in the map.
 """
@@ -29,7 +29,7 @@ from ppafo.storage.matlab import MATLAB_SUFFIX, read_mapped_matlab, read_matlab
 from ppafo.wording import one_line
 
 _SHORTEST = 1e-12
-"""Least time [s] between two means of samples for their slope; a shorter time is rounding."""
+"""Least time [s] between the two means of samples that give a slope; a shorter time is rounding."""
 _MASS_FLOW = "kg/s"
 
 
@@ -41,7 +41,7 @@ def read_foreign(
     map_name: str = "",
     gas: str = "",
 ) -> Recording:
-    """Return the recording in a table, read through a column map, in SI units; arguments and errors as ``read_trials``.
+    """Read a single recording from a table through a column map, in SI units; arguments and errors as ``read_trials``.
 
     Gauge pressure is relative to ``atmosphere`` [Pa absolute]. Raises DataError if the map selects several trials.
     """
@@ -49,8 +49,8 @@ def read_foreign(
     if len(recordings) > 1:
         with refused_as(DataError, path, DataError), in_map(map_name):
             raise DataError(
-                f"trial: the file has {len(recordings)} recordings; name one, or use all in a procedure of 'ppafo "
-                "identify'"
+                f"trial selects {len(recordings)} recordings; give the number of one trial (only a procedure of 'ppafo "
+                "identify' reads several)"
             )
     return recordings[0]
 
@@ -63,7 +63,7 @@ def read_trials(
     map_name: str = "",
     gas: str = "",
 ) -> tuple[Recording, ...]:
-    """Return the recordings in a table, read through a column map: one, or one for each trial that the map selects.
+    """Read all recordings from a table through a column map: one, or one for each trial that the map selects.
 
     ``gas`` is the gas of volume flows if the map states none. Raises DataError with file and column or, for an error in
     the map, with the key and the name of the map.
@@ -73,7 +73,7 @@ def read_trials(
     content = read_matlab(path) if suffix == MATLAB_SUFFIX else read_bytes(path)
     with refused_as(DataError, path, DataError):
         if remedy_for(path):
-            raise DataError(f"is no table of text{remedy_for(path)}")
+            raise DataError(f"is not a text table{remedy_for(path)}")
         if suffix == ".nc":
             raise DataError("is a NetCDF file, which names its own channels and units: read it without a column map")
         with in_map(map_name):
@@ -105,7 +105,7 @@ def read_trials(
 
 
 def _rows_of_trials(time: Floats, wanted: str | int | tuple[int, ...]) -> dict[str, slice]:
-    """Return the rows of each selected trial, by the suffix of its label; a trial starts where the time [s] falls."""
+    """Return the rows of each selected trial by label suffix; a trial starts where the time [s] falls."""
     starts = [0, *(np.flatnonzero(np.diff(time) < 0.0) + 1).tolist(), time.size]
     count = len(starts) - 1
     numbers = range(1, count + 1) if isinstance(wanted, str) else np.atleast_1d(wanted).tolist()
@@ -119,7 +119,7 @@ def _rows_of_trials(time: Floats, wanted: str | int | tuple[int, ...]) -> dict[s
 
 
 def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: float, gas: str = "") -> Channel:
-    """Return a channel in SI units, from a column or a constant; a multiplier ``times`` contributes its own unit.
+    """Return a channel in SI units, from a column or a constant; a factor ``times`` contributes its own unit.
 
     ``atmosphere`` [Pa absolute] and ``gas`` (empty if unknown) complete gauge pressures and volume flows.
     """
@@ -145,19 +145,19 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
 
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
-    """Return the unit of a channel; a volume flow in place of a mass flow gets its reference condition and gas."""
+    """Return the unit of a channel; a volume flow measured as mass flow gets its reference condition and gas."""
     from ppafo.units import is_volume_flow, with_condition
 
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
         if mapped.at is not None or mapped.gas is not None:
-            raise UnitError("at and gas apply only to a volume flow, such as 'L/min'")
+            raise UnitError("'at' and 'gas' are allowed only for a volume flow, such as 'L/min'")
         return unit
     return with_condition(unit, mapped.at, mapped.gas or gas) if mapped.at else unit
 
 
 def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Floats:
-    """Return the time [s] of the rows: from a rate and row numbers, from times of day, or from numbers with a unit."""
+    """Return the time [s] of the rows: from a rate, from times of day, or from numbers with a unit."""
     if mapped.rate is not None:
         from ppafo.units import parse_quantity
 
@@ -175,14 +175,14 @@ def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Float
     if table.size > 2 and (steps == 0.0).any() and time[-1] > 0.0 and (steps >= 0.0).all():
         mean_rate = float(f"{(table.size - 1) / time[-1]:.3g}")
         raise DataError(
-            f"channels.{TIME}: several rows have the same time of day; give the rate of the rows in place of the "
-            f'column, such as {TIME} = {{ rate = "{mean_rate:g} Hz" }}, which is the mean of this file'
+            f"channels.{TIME}: several rows have the same time of day; give the sample rate instead of the column: "
+            f'{TIME} = {{ rate = "{mean_rate:g} Hz" }} (mean of this file)'
         )
     return time
 
 
 def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
-    """Return a recording with the channel ``direction``: 1 up, -1 down, 0 for slower than the threshold.
+    """Add the channel ``direction`` to a recording: 1 up, -1 down, 0 for slower than the threshold.
 
     Unless the recording has a channel ``repetition``, one is added that numbers the sweeps from 1; it is 0 where the
     motion is too slow. Raises DataError for a channel that is absent or never moves, and for an invalid threshold or
@@ -209,7 +209,9 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
     direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
     moving = np.flatnonzero(direction)
     if moving.size == 0:
-        raise DataError(f"direction.threshold: '{wanted.of}' never moves faster than {wanted.threshold}")
+        raise DataError(
+            f"direction.threshold = {wanted.threshold!r}: '{wanted.of}' never changes faster; give a lower threshold"
+        )
     directed = recording.with_channel("direction", direction, PLAIN_NUMBER)
     if "repetition" in recording:
         return directed

@@ -24,7 +24,7 @@ PANDAS_READERS = {
     **dict.fromkeys((".h5", ".hdf5"), "read_hdf({path!r})"),
     ".pkl": "read_pickle({path!r})",
 }
-"""Call of pandas that reads a table, by file suffix."""
+"""Pandas call that reads a table, by file suffix."""
 OTHER_READERS = {
     ".npz": "DataFrame(dict(numpy.load({path!r})))",
     ".tdms": "DataFrame(nptdms.TdmsFile({path!r}).as_dataframe())",
@@ -33,14 +33,14 @@ OTHER_READERS = {
 
 
 def remedy_for(path: str | Path) -> str:
-    """Return advice to read a table of another format with pandas, appended to messages; empty for unknown suffixes."""
+    """Return the remedy, appended to messages, to read another format with pandas; empty for unknown suffixes."""
     advice = written_as_csv(path)
     # The same advice, behind the one to do without a file.
-    return f"; in Python give the table itself, {_call_of_pandas(path)}, or{advice[1:]}" if advice else ""
+    return f"; in Python pass the table itself, {_call_of_pandas(path)}, or{advice[1:]}" if advice else ""
 
 
 def written_as_csv(path: str | Path) -> str:
-    """Return advice to convert a table of another format to CSV with pandas; empty for an unknown suffix."""
+    """Return the remedy, appended to messages, to convert another format to CSV; empty for unknown suffixes."""
     table = _call_of_pandas(path)
     return f"; write it as CSV: {table}.to_csv({f'{path}.csv'!r}, index=False)" if table else ""
 
@@ -53,7 +53,7 @@ def _call_of_pandas(path: str | Path) -> str:
 def recording_of_frame(
     frame: Any, label: str = "", kind: RecordingKind = "measured", atmosphere: float = STANDARD_ATMOSPHERE
 ) -> Recording:
-    """Recording in a pandas DataFrame or an xarray Dataset, in SI units.
+    """Return the recording in a pandas DataFrame or an xarray Dataset, in SI units.
 
     Arguments:
         frame: table with time as a column, as the index, or as the coordinate of a Dataset
@@ -87,7 +87,7 @@ def recording_of_frame(
 
 
 def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
-    """Recording in a Parquet file whose columns are ``name [unit]``, or have their unit among their metadata.
+    """Read a recording from a Parquet file with columns ``name [unit]``, or with units in the column metadata.
 
     Raises DataError, naming the file, if it cannot be used.
     """
@@ -101,7 +101,7 @@ def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> R
         try:
             table = pq.read_table(pa.BufferReader(content))
         except (pa.ArrowException, OSError, ValueError) as error:
-            raise DataError(f"is not a Parquet file that can be read: {one_line(error)}") from error
+            raise DataError(f"is not a readable Parquet file: {one_line(error)}") from error
         units = {
             field.name: (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace") for field in table.schema
         }
@@ -123,7 +123,7 @@ def _is_time(name: str) -> bool:
 def _recording(
     names: Sequence[str], values: Sequence[Any], units: Mapping[str, str], label: str, kind: str, atmosphere: float
 ) -> Recording:
-    """Return the recording of columns in any order, with units in their names or in ``units``."""
+    """Return a recording from columns in any order, with units in their names or in ``units``."""
     pairs = sorted(zip(names, values, strict=True), key=lambda pair: not _is_time(pair[0]))
     heads, columns = [], []
     for name, column in pairs:
@@ -138,7 +138,7 @@ def _recording(
         try:
             numbers = column.astype(np.float64)
         except (TypeError, ValueError) as error:
-            raise DataError(f"column '{one_line(name)}' is not of numbers") from error
+            raise DataError(f"column '{one_line(name)}' is not numeric") from error
         wrong = np.flatnonzero(~np.isfinite(numbers))
         if wrong.size:
             raise DataError(f"column '{one_line(name)}': row {wrong[0]} is {numbers[wrong[0]]}, not a finite number")

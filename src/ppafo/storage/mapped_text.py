@@ -1,4 +1,4 @@
-"""Application of a column map to a text table: cells become numbers in the units of the file, row by row.
+"""Column map applied to a text table: cells become numbers in the units of the file, row by row.
 
 Error messages name line and column of the file, or the key of the map, and a remedy.
 """
@@ -23,21 +23,21 @@ from ppafo.wording import LONGEST_SHOWN, nearest_name, one_line
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t"}
 _MARKS = {"point": ".", "comma": ",", "apostrophe": "'", "blank": " "}
-"""Decimal marks, and marks between groups of digits, by their name in a map."""
+"""Decimal marks and thousands separators, by name in a column map."""
 _COMMENT = "#"
 _GROUPED = {
     name: re.compile(rf"[+-]?\d{{1,3}}(?:{re.escape(mark)}\d{{3}})+(?![\d{mark}])", re.ASCII)
     for name, mark in _MARKS.items()
 }
-"""Regular expression for the integer part of a number with digit groups, by name of the separator."""
+"""Pattern of the integer part of a number with digit groups, by name of the separator."""
 
 _SERIAL_MONITOR = re.compile(r"(\d{1,2}:\d{2}:\d{2}[.,]\d{3}) -> ")
-"""Time stamp at the start of each line, written by the serial monitor of the Arduino IDE."""
+"""Pattern of the time stamp at the start of each line from the serial monitor of the Arduino IDE."""
 _STAMP = "timestamp"
-"""Name of the column of time stamps of the serial monitor."""
+"""Column name of the time stamps of the serial monitor."""
 _STAMP_OF_HEADER = re.compile(r"^\d{1,2}:\d{2}:\d{2}\.\d{3}")
 _HEADER_WITHIN = 200
-"""Number of lines searched for a header that is not where the map expects it."""
+"""Number of lines searched for a header that is not at its expected line."""
 
 _DIRECTION = "direction"
 _UPWARDS = (
@@ -53,19 +53,19 @@ _WORDS_OF_DIRECTION = {
     **dict.fromkeys(_DOWNWARDS, -1.0),
     **dict.fromkeys(("none", "hold", "0"), 0.0),
 }
-"""Words for directions; ``-`` alone and ``+`` too."""
+"""Values of direction words, including ``+`` and ``-`` alone."""
 
 Rows = Iterator[tuple[int, list[str]]]
-"""Iterator over rows: line number in the file and cells."""
+"""Rows of a text table: line number in the file and cells."""
 
 
 def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> MappedTable:
-    """Return the columns of a text table that a map selects, in the units of the file.
+    """Read the columns of a text table that a map selects, in the units of the file.
 
     Raises DataError with line and column of an invalid cell or, for an error in the map, with the key and, if it has
     one, the name of the map.
     """
-    lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" if it is that').splitlines()
+    lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" for a Latin-1 file').splitlines()
     if any(map(_SERIAL_MONITOR.match, lines)):
         lines = _with_stamps_as_column(lines, columns)
     with in_map(map_name):
@@ -114,7 +114,7 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
 
 
 def _with_stamps_as_column(lines: list[str], columns: ColumnMap) -> list[str]:
-    """Return the lines of a serial monitor with the time stamps as a first column named ``timestamp``."""
+    """Return the lines of a serial monitor with the time stamps as first column, named ``timestamp``."""
     delimiter = _DELIMITERS.get(columns.delimiter, " ")
     # A time that has a comma must not be two cells.
     stamped = [_SERIAL_MONITOR.sub(lambda match: f"{match[1].replace(',', '.')}{delimiter}", line) for line in lines]
@@ -128,7 +128,7 @@ def _with_stamps_as_column(lines: list[str], columns: ColumnMap) -> list[str]:
 
 
 class _StartedTable(NamedTuple):
-    """Table opened for reading: column names (empty without header), first row of numbers, iterator over all rows."""
+    """Text table at its first row: column names (empty without header), first row of numbers, all rows."""
 
     names: list[str]
     first_row: list[str]
@@ -140,17 +140,17 @@ class _StartedTable(NamedTuple):
 
 
 def _begin(lines: list[str], columns: ColumnMap) -> _StartedTable:
-    """Return the table in the lines of a file, opened for reading. Raises DataError if there is no header or no row."""
+    """Read the header and first row of a table. Raises DataError if there is no header or no row."""
     rows = _split(lines, columns)
     head = next(rows, None)
     if head is None:
-        skipped = f"after the {columns.skip_lines} of skip_lines = {columns.skip_lines}" if columns.skip_lines else ""
+        skipped = f"after skip_lines = {columns.skip_lines}" if columns.skip_lines else ""
         raise DataError(f"has no rows {skipped}".rstrip())
     names = [name.strip() for name in head[1]] if columns.header else []
     rows = islice(rows if columns.header else chain([head], rows), columns.skip_rows, None)
     first = next(rows, None)
     if first is None:
-        remedy = ": header = false, if the first line is one of numbers" if columns.header else ""
+        remedy = "; give header = false if the first line contains numbers" if columns.header else ""
         raise DataError(f"has no rows of numbers{remedy}")
     return _StartedTable(names, first[1], chain([first], rows))
 
@@ -170,7 +170,7 @@ def _split(lines: list[str], columns: ColumnMap) -> Rows:
 
 
 def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str]) -> int:
-    """Return the index, from 0, of the column that the map gives at ``key`` as a number from 1 or as a name."""
+    """Return the index (from 0) of the column that the map gives at ``key``, by name or number from 1."""
     names = table.names
     if isinstance(column, int):
         count = len(names or table.first_row)
@@ -179,7 +179,9 @@ def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str
             raise DataError(f"{key} = {column}: the file has {count} columns{remedy}")
         return column - 1
     if not names:
-        raise DataError(f"{key} = {column!r} names a column, but the file has no header; give its number")
+        raise DataError(
+            f"{key} = {column!r}: a file without header (header = false) has no column names; give the column number"
+        )
     numbers = [number for number, name in enumerate(names, start=1) if name == column]
     if not numbers:
         head = enumerate(lines[:_HEADER_WITHIN])
@@ -189,22 +191,22 @@ def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str
             split = ((number, name, line.split(mark)) for number, line in head for name, mark in _DELIMITERS.items())
             remedy = next(
                 (
-                    f'; line {number + 1} has it: give skip_lines = {number} and delimiter = "{name}"'
+                    f'; line {number + 1} contains this name: give skip_lines = {number} and delimiter = "{name}"'
                     for number, name, cells in split
                     if column in (stripped := [cell.strip() for cell in cells]) and stripped != names
                 ),
                 "",
             )
         hint = "" if remedy else nearest_name(column, names)
-        raise DataError(f"{key} = {column!r}: there is no such column{hint}; the file has {shown_names(names)}{remedy}")
+        raise DataError(f"{key} = {column!r}: the file has no such column{hint}; it has {shown_names(names)}{remedy}")
     if len(numbers) > 1:
         shown = " and ".join(map(str, numbers))
-        raise DataError(f"{key}: columns {shown} are both called {column!r}; give the number of one")
+        raise DataError(f"{key} = {column!r}: columns {shown} have this name; give the number of one of them")
     return numbers[0] - 1
 
 
 def _other_delimiter(cells: list[str], is_there: Callable[[list[str]], bool]) -> str:
-    """Return the advice to use another delimiter if ``is_there`` accepts the cells split by it, else an empty text."""
+    """Return the remedy to use another delimiter if ``is_there`` accepts the cells split by it, else ""."""
     for name, mark in _DELIMITERS.items():
         split_again = [part.strip() for cell in cells for part in cell.split(mark)]
         if split_again != cells and is_there(split_again):
@@ -224,13 +226,13 @@ def _check_width(row: list[str], line: int, table: _StartedTable, last_index: in
     is_split = columns.delimiter == "comma" and width == 2 * expected
     remedy = f"; {SPLIT_NUMBERS}" if is_split else ""
     if line <= columns.skip_lines + 2 and not is_split:
-        remedy = "; where the table begins further down, give skip_lines"
+        remedy = "; if the table begins on a later line, give skip_lines"
     raise DataError(f"line {line} has {len(row)} values for {expected} columns{remedy}")
 
 
 @dataclass(frozen=True, slots=True)
 class _Numbers:
-    """Column of numbers while it is read.
+    """Column of numbers while a text table is read.
 
     ``channel``: name of the channel. ``index``: index of the column. ``title``: its name in messages. ``decimal`` and
     ``thousands``: marks in its numbers. ``words``: numbers for words. ``values``: numbers read so far.
@@ -245,7 +247,7 @@ class _Numbers:
     values: "array[float]" = field(default_factory=lambda: array("d"))
 
     def number_in(self, cell: str, line: int) -> float:
-        """Return the number in a cell, or the number for a known word. Raises DataError for any other text."""
+        """Parse the number, or a known word, in a cell. Raises DataError for any other text."""
         text = cell.strip()
         for word, value in self.words.items():
             if word.lower() == text.lower():
@@ -266,11 +268,11 @@ class _Numbers:
             return number
         remedy = ""
         if self.words:
-            remedy = f"; known words: {shown_names(self.words)}; others in channels.{self.channel}.words"
+            remedy = f"; known words: {shown_names(self.words)}; add others in channels.{self.channel}.words"
         elif self.decimal == "point" and "," in cell and finite_number(cell.strip().replace(",", ".")) is not None:
             remedy = '; give decimal = "comma"'
         elif is_clock(cell) and self.channel != TIME:
-            remedy = "; it is a time of day"
+            remedy = f"; a time of day is allowed only in channels.{TIME}"
         raise DataError(f"{at}: {_shown(cell)} is not a finite number {key}{remedy}")
 
 

@@ -1,4 +1,4 @@
-"""Variables of MATLAB files (4 to 7 by SciPy, 7.3 by h5py), and those that a column map selects. No code is run.
+"""MATLAB files (4 to 7 by SciPy, 7.3 by h5py): variables, and columns selected by a map. No code is run.
 
 A field of a structure is named ``a.b``, a field in an array of structures ``a(2).b``, a column of a matrix ``M(:,3)``
 and a row ``M(3,:)``. In a structure with ``data`` and ``colheaders``, as made by ``importdata``, each column is also
@@ -25,13 +25,13 @@ from ppafo.wording import nearest_name, one_line
 MATLAB_SUFFIX = ".mat"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512
-"""Offset of the HDF5 content [bytes], after the header of MATLAB."""
+"""Byte offset of the HDF5 content, after the header of MATLAB."""
 _MOST_COLUMNS = 300
-"""Largest number of columns, or of rows, of a matrix that are named one by one."""
+"""Largest number of columns, or of rows, of a matrix that become variables of their own."""
 _DEEPEST = 8
-"""Largest nesting depth of structures that is searched."""
+"""Largest nesting depth of structures read."""
 _MOST_ELEMENTS = 300
-"""Largest number of elements of an array of structures or cell array that are read."""
+"""Largest number of elements read from an array of structures or a cell array."""
 _OF_DAMAGE = (
     OSError,
     ValueError,
@@ -43,7 +43,7 @@ _OF_DAMAGE = (
     NameError,
     EOFError,
 )
-"""Exceptions that the libraries raise for damaged files."""
+"""Exceptions from the libraries for damaged files."""
 _LABELS = ("colheaders", "labels", "names")
 """Fields of a structure that may contain the column names of its field ``data``."""
 
@@ -62,13 +62,12 @@ class _MatlabFile:
     objects: list[tuple[str, str]] = field(default_factory=list)
 
     def advice_on_objects(self) -> str:
-        """Return advice on saving the objects of the file as arrays, to append to a message; empty without objects."""
+        """Return the remedy, appended to messages, to save objects as arrays; empty without objects."""
         advice = ""
         for name, kind in self.objects:
-            save = "its numbers are saved as arrays of their own, such as t = ts.Time; y = ts.Data; save plain.mat t y"
-            if kind in _PLAIN:
-                save = f"it is saved as plain arrays by {_PLAIN[kind].format(name=name)}"
-            advice += f"; {name}{f' ({kind})' * bool(kind)} is an object that only MATLAB reads, where {save}"
+            save = _PLAIN.get(kind, "t = ts.Time; y = ts.Data; save plain.mat t y").format(name=name)
+            title = f"{name}{f' ({kind})' * bool(kind)}"
+            advice += f"; {title} is an object that only MATLAB reads; in MATLAB, save plain arrays, such as {save}"
         return advice
 
 
@@ -80,11 +79,11 @@ _PLAIN = {
     "datetime": "t = seconds({name} - {name}(1)); save('plain.mat', 't')",
     "duration": "t = seconds({name}); save('plain.mat', 't')",
 }
-"""MATLAB code, by class of an object, that saves its numbers as plain arrays and its times in seconds."""
+"""MATLAB code by class of an object, which saves its numbers as plain arrays and its times in seconds."""
 
 
 def read_matlab(path: str | Path) -> _MatlabFile:
-    """Return the variables of a ``.mat`` file of any version. Raises DataError for an invalid file."""
+    """Read the variables of a ``.mat`` file of any version. Raises DataError for an invalid file."""
     is_hdf5 = read_bytes(path)[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5
     # A damaged file can end a library of C code; another process tries it first.
     check_can_be_read(Path(path), open_matlab, "h5py" if is_hdf5 else "scipy.io")
@@ -92,7 +91,7 @@ def read_matlab(path: str | Path) -> _MatlabFile:
 
 
 def open_matlab(path: str | Path) -> _MatlabFile:
-    """Return the variables of a ``.mat`` file without a trial in another process; a damaged file may crash this one."""
+    """Read the variables of a ``.mat`` file without a trial process; a damaged file may crash this process."""
     content = read_bytes(path)
     contents = _MatlabFile()
     try:
@@ -108,7 +107,7 @@ def open_matlab(path: str | Path) -> _MatlabFile:
     except _OF_DAMAGE as error:
         raise DataError(f"{path}: cannot be read as a .mat file: {one_line(error)}") from error
     if not contents.columns and not contents.texts:
-        raise DataError(f"{path}: has no variable of numbers{contents.advice_on_objects()}")
+        raise DataError(f"{path}: has no numeric variable{contents.advice_on_objects()}")
     return contents
 
 
@@ -151,7 +150,7 @@ def _read_older(path: str | Path, contents: _MatlabFile) -> None:
 
 
 def _tree_of(value: Any) -> Tree:
-    """Return a variable read by SciPy as plain data."""
+    """Convert a variable read by SciPy to plain data."""
     from scipy.io.matlab import mat_struct
 
     if isinstance(value, mat_struct):
@@ -175,15 +174,17 @@ def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
 
     for name in group:
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise ValueError(f"'{one_line(name)}' is a link; save its numbers in the file itself")
+            raise ValueError(f"'{one_line(name)}' is an HDF5 link; save its numbers in the file itself")
         node = group[name]
         if isinstance(node, h5py.Dataset) and (node.is_virtual or node.external):
-            raise ValueError(f"the numbers of '{one_line(name)}' are in another file; save them in the file itself")
+            raise ValueError(
+                f"the numbers of '{one_line(name)}' are stored in another file; save them in the file itself"
+            )
         yield name, node
 
 
 def _tree_of_hdf5(node: Any, file: Any, depth: int) -> Tree:
-    """Return a variable read by h5py as plain data; arrays are transposed with respect to HDF5."""
+    """Convert a variable read by h5py to plain data; arrays are transposed with respect to HDF5."""
     import h5py
 
     stated = node.attrs.get("MATLAB_class", b"")
@@ -212,7 +213,7 @@ def _tree_of_hdf5(node: Any, file: Any, depth: int) -> Tree:
 
 
 def _add(name: str, tree: Tree, depth: int, contents: _MatlabFile) -> None:
-    """Add a variable and everything nested in it to ``contents``, with dotted names."""
+    """Add a variable and its nested variables, with dotted names, to ``contents``."""
     if depth > _DEEPEST:
         return
     if isinstance(tree, dict):
@@ -240,7 +241,7 @@ def _add(name: str, tree: Tree, depth: int, contents: _MatlabFile) -> None:
 
 
 def _add_numbers(name: str, array: NDArray[Any], contents: _MatlabFile) -> None:
-    """Add a vector, or the columns and rows of a matrix unless there are too many, to ``contents``."""
+    """Add a vector, or the columns and rows of a matrix up to a limit, to ``contents``."""
     if array.dtype.kind not in "iufb" or array.size == 0:
         return
     numbers = np.squeeze(np.asarray(array, dtype=np.float64))
@@ -253,7 +254,7 @@ def _add_numbers(name: str, array: NDArray[Any], contents: _MatlabFile) -> None:
 
 
 def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> MappedTable:
-    """Return the columns of a MATLAB file that a map selects, in the units of the file.
+    """Read the columns of a MATLAB file that a map selects, in the units of the file.
 
     Raises DataError with the key of a channel whose variable is absent or unusable, and with the map if it has a name.
     """
@@ -277,7 +278,7 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
             lengths[TIME] = len(clock)
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
-            raise DataError(f"all columns must have the same number of samples: {listed or 'there is no column'}")
+            raise DataError(f"all columns must have the same number of samples: {listed or 'no channel has a column'}")
         size = next(iter(lengths.values()))
         for name, values in numbers.items():
             gaps = np.flatnonzero(~np.isfinite(values))
@@ -294,13 +295,15 @@ def _variable(key: str, column: int | str, file: _MatlabFile) -> str:
     if isinstance(column, int):
         matrices = sorted({name.partition("(")[0] for name in file.columns if "(:," in name and "." not in name})
         if len(matrices) != 1:
-            raise DataError(f"{key} = {column}: columns of a .mat file have names; it has {shown_names(file.columns)}")
+            raise DataError(
+                f"{key} = {column}: give the name of a variable instead; the file has {shown_names(file.columns)}"
+            )
         column = f"{matrices[0]}(:,{column})"
     name = re.sub(r"\s+", "", column) if "(" in column else column
     if name not in file.columns and name not in file.texts:
         known = (*file.columns, *file.texts)
         raise DataError(
-            f"{key} = {column!r}: the file has no such column{nearest_name(name, known)}; it has {shown_names(known)}"
+            f"{key} = {column!r}: the file has no such variable{nearest_name(name, known)}; it has {shown_names(known)}"
             f"{file.advice_on_objects()}"
         )
     return name

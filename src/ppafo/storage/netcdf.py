@@ -1,6 +1,6 @@
-"""Recordings written as NetCDF files, and the equivalent xarray Dataset.
+"""Recordings as NetCDF files and as xarray Datasets.
 
-The two are made independently, because loading xarray takes longer than a simulation.
+NetCDF files are written without xarray, whose import takes longer than a simulation.
 """
 
 import io
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     import xarray
 
 PLAIN_NUMBER_IN_NETCDF = "1"
-"""Unit of a plain number, as the NetCDF conventions write it."""
+"""Unit of a plain number in the NetCDF conventions."""
 BETWEEN = "between_samples"
-"""Attribute of a channel with an unusual interpolation between its samples."""
+"""Channel attribute for an unusual interpolation between samples."""
 _TIME_ATTRIBUTES = {"units": TIME_UNIT, "long_name": "time"}
 
 
@@ -31,7 +31,7 @@ def dataset_of(
     units: Mapping[str, str] | None = None,
     atmosphere: float = STANDARD_ATMOSPHERE,
 ) -> "xarray.Dataset":
-    """Return the recording as a Dataset over time [s], with ``scenario`` as a JSON attribute.
+    """Return a recording as a Dataset over time [s], with ``scenario`` as a JSON attribute.
 
     ``units`` maps channels to units other than SI; gauge pressures in them are relative to ``atmosphere`` [Pa
     absolute]. Raises DataError for an unknown channel, UnitError for a unit that does not fit.
@@ -56,7 +56,7 @@ def global_attributes(recording: Recording, scenario: Mapping[str, Any] | None) 
 
 
 def joint_of(scenario: Mapping[str, Any] | None) -> JointNames:
-    """Return the joint that the device of a scenario document acts on, the ankle by default."""
+    """Return the joint names of a scenario document, by default of the ankle."""
     device = (scenario or {}).get("device")
     joint = device.get("joint") if isinstance(device, Mapping) else None
     return JointNames(**joint) if isinstance(joint, Mapping) else ANKLE

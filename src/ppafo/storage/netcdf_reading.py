@@ -1,4 +1,4 @@
-"""Recordings read from NetCDF files, as HDF5, with protection against damaged and malicious files.
+"""Recordings read from NetCDF files by h5py, with protection against damaged and malicious files.
 
 With h5netcdf a damaged file would print a traceback. Before any number is decompressed, all data must be inside the
 file, in a common format, and need no more memory than is plausible for the file.
@@ -18,7 +18,7 @@ from ppafo.signals import Channel, Recording, recording_kind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import read_bytes
 from ppafo.storage.netcdf import BETWEEN, PLAIN_NUMBER_IN_NETCDF
-from ppafo.wording import one_line
+from ppafo.wording import count_of, one_line
 
 _DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowError, MemoryError)
 """Exceptions that h5py raises for a truncated or damaged file."""
@@ -31,22 +31,22 @@ _SUPPORTED_FILTERS = frozenset({_GZIP, _SHUFFLE, _FLETCHER})
 _BYTES_OF_A_FLOAT = 8
 """Bytes per number in a recording, independent of the type in the file."""
 _ALWAYS_ALLOWED = 32_000_000
-"""Memory [bytes] that any file may need."""
+"""Memory that reading may take for a file of any size [bytes]."""
 _MAXIMUM_GROWTH = 100
-"""Largest ratio of memory needed to file size for larger files [-]."""
+"""Largest ratio of memory for reading to file size [-], for larger files."""
 _CHECKSUM_BYTES = 64
-"""Bytes by which a chunk may exceed its numbers; a Fletcher checksum takes four."""
+"""Largest excess of a chunk over its numbers [bytes]; a Fletcher checksum takes four."""
 
 _PACKING = ("scale_factor", "add_offset")
-"""NetCDF attributes of packed variables, whose stored numbers are not the recorded values."""
+"""NetCDF attributes of packed variables, in which stored numbers differ from the values."""
 _GAPS = ("_FillValue", "missing_value")
-"""NetCDF attributes that state the number used for missing values."""
+"""NetCDF attributes with the fill value of missing samples."""
 _LIMITS = {"valid_range": 2, "valid_min": 1, "valid_max": 1}
-"""NetCDF attributes of the valid range, each with its number of limits; values outside are missing."""
+"""NetCDF attributes of the valid range, with their number of limits; values outside are missing."""
 
 
 def read_netcdf(path: str | Path) -> Recording:
-    """Return the recording in a NetCDF file.
+    """Read a recording from a NetCDF file.
 
     Raises DataError for a file that is damaged, refers to other files, or decompresses to far more than its size, and
     for numbers that are packed, have gaps or are outside the stated valid range.
@@ -62,39 +62,39 @@ def read_netcdf(path: str | Path) -> Recording:
             required = sum(chunks) + sum(_BYTES_OF_A_FLOAT * item.size for item in variables.values())
             if required > max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * len(content)):
                 raise DataError(
-                    f"requires {required / 1e6:,.0f} MB of memory, the file has {len(content) / 1e6:.2g} MB; "
-                    f"a recording requires at most {_MAXIMUM_GROWTH} times its file"
+                    f"requires {required / 1e6:,.0f} MB of memory, but the file has {len(content) / 1e6:.2g} MB; "
+                    f"at most {_MAXIMUM_GROWTH} times the file size is allowed"
                 )
             for name, variable in variables.items():
                 _check_is_whole(name, variable)
             time = _channel(TIME, variables.pop(TIME))
             if time.unit != TIME_UNIT:
-                raise DataError(f"'{TIME}' is in '{time.unit}', it must be in '{TIME_UNIT}'")
+                raise DataError(f"'{TIME}' must be in '{TIME_UNIT}', not in '{time.unit}'")
             channels = {name: _channel(name, variable) for name, variable in variables.items()}
             kind = recording_kind(_attribute(file, "kind") or "measured")
             return Recording(_attribute(file, "title") or one_line(Path(path).stem), time.values, channels, kind)
     except _DAMAGED as error:
-        raise DataError(f"{path}: is no complete NetCDF file of a recording: {one_line(error)}") from error
+        raise DataError(f"{path}: is not a complete NetCDF recording: {one_line(error)}") from error
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
 
 
 def _own_variables(file: Any) -> dict[str, Any]:
-    """Return the variables by name. Raises DataError for links and external data, before they are opened."""
+    """Return the variables of a file by name. Raises DataError for links and external data before they are opened."""
     import h5py
 
     names = [str(name) for name in file]
     if TIME not in names:
-        raise DataError(f"there is no variable '{TIME}'")
+        raise DataError(f"has no variable '{TIME}'")
     for name in names:
         if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-            raise DataError(f"'{name}' is a link; save its numbers in the file itself")
+            raise DataError(f"'{name}' is an HDF5 link; save its numbers in the file itself")
     variables = {name: file[name] for name in names}
     for name, variable in variables.items():
         if len(getattr(variable, "shape", None) or ()) != 1 or variable.dtype.kind not in _KINDS_OF_NUMBERS:
             raise DataError(f"'{name}' must be numeric and one-dimensional over '{TIME}'")
         if variable.is_virtual or variable.external:
-            raise DataError(f"the numbers of '{name}' are in another file; save them in the file itself")
+            raise DataError(f"the numbers of '{name}' are stored in another file; save them in the file itself")
     for name, variable in variables.items():
         if variable.size != variables[TIME].size:
             raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
@@ -108,15 +108,15 @@ def _own_variables(file: Any) -> dict[str, Any]:
 
 
 def _check_is_whole(name: str, variable: Any) -> None:
-    """Raise DataError for values that were never written, and for chunks that decompress to more than they state."""
+    """Raise DataError for values never written, and for chunks that decompress to more than stated."""
     size, chunks = variable.size, variable.chunks
     if chunks is None:
         if variable.id.get_storage_size() < size * variable.dtype.itemsize:
-            raise DataError(f"'{name}' has {size} values, and the file does not contain them")
+            raise DataError(f"'{name}' has {size} values, but the file contains none of them")
         return
     chunk_count = variable.id.get_num_chunks()
     if chunk_count < math.ceil(size / chunks[0]):
-        raise DataError(f"'{name}' has {size} values, and the file does not contain all of them")
+        raise DataError(f"'{name}' has {size} values, but the file contains only some of them")
     allowed_bytes = chunks[0] * variable.dtype.itemsize + _CHECKSUM_BYTES
     for number in range(chunk_count):
         chunk = variable.id.get_chunk_info(number)
@@ -132,19 +132,21 @@ def _check_is_whole(name: str, variable: Any) -> None:
 
 
 def _channel(name: str, variable: Any) -> Channel:
-    """Return a variable as a channel. Raises DataError if its attributes mark numbers as missing or packed."""
+    """Convert a variable to a channel. Raises DataError if its attributes mark numbers as missing or packed."""
     for key in _PACKING:
         if key in variable.attrs:
-            raise DataError(f"'{name}' is packed by its attribute '{key}'; save it as plain numbers")
+            raise DataError(f"'{name}' is packed (attribute '{key}'); save unpacked numbers")
     values = np.asarray(variable[:], dtype=np.float64)
     for key in _GAPS:
         if key in variable.attrs and np.isin(values, np.asarray(variable.attrs[key], dtype=np.float64)).any():
-            raise DataError(f"'{name}' has gaps ('{key}'); fill them or cut the file there")
+            raise DataError(f"'{name}' has missing values (attribute '{key}'); fill the gaps or cut the file there")
     for key, wanted in _LIMITS.items():
         if key in variable.attrs:
             limits = np.atleast_1d(np.asarray(variable.attrs[key], dtype=np.float64))
             if limits.size != wanted:
-                raise DataError(f"'{name}': its attribute '{key}' has {limits.size} numbers, it must have {wanted}")
+                raise DataError(
+                    f"'{name}': attribute '{key}' must have {count_of(wanted, 'number')}, not {limits.size}"
+                )
             is_outside = np.zeros(values.size, dtype=bool)
             if key != "valid_max":
                 is_outside |= values < limits[0]
@@ -154,8 +156,8 @@ def _channel(name: str, variable: Any) -> Channel:
             if rows.size:
                 first = int(rows[0])
                 raise DataError(
-                    f"'{name}' has {rows.size} values that are not valid ('{key}'), the first {values[first]:g} at row "
-                    f"{first + 1}; correct them, cut the file there, or correct the attribute"
+                    f"'{name}' has {count_of(rows.size, 'value')} outside its '{key}', the first {values[first]:g} at "
+                    f"row {first + 1}; correct the numbers, cut the file there, or correct the attribute"
                 )
     # The channel itself refuses a word that it does not know.
     between: Any = _attribute(variable, BETWEEN) or None

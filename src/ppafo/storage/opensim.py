@@ -25,17 +25,17 @@ _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)",
 _DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
 _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
 _KIND = "kind="
-"""Header word for a recording that was not measured, in a file written by this package."""
+"""Header key for the kind of a recording that was not measured, in files of this package."""
 _MOST_DIGITS = 11
-"""Largest number of digits of a count in a header."""
+"""Largest number of digits in a header count."""
 GAPS = ("nan",)
-"""Cells that mean a gap in a table."""
+"""Cell texts of a gap in a table."""
 _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _OpenSimTable:
-    """OpenSim table.
+    """Content of an OpenSim table.
 
     ``time``: times [s]. ``columns``: values by label. ``in_degrees``: None if the header does not state the unit of
     angles. ``is_old``: the header is in the older style of SIMM, with angles in degrees. ``kind``: kind of the
@@ -54,7 +54,7 @@ class _OpenSimTable:
 
 
 class _Header(NamedTuple):
-    """Header of a table; the counts of rows and columns are None if not stated.
+    """Header of an OpenSim table; counts of rows and columns are None if not stated.
 
     ``end`` is the index, from 0, of the last header line.
     """
@@ -69,7 +69,7 @@ class _Header(NamedTuple):
 
 
 def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
-    """Return the table in a ``.mot`` or ``.sto`` file. Raises DataError with file, line and column of an error.
+    """Read a ``.mot`` or ``.sto`` file. Raises DataError with file, line and column of an error.
 
     A column count in the header that contradicts all rows, and last rows that repeat a time, are repaired with a
     remark. A cell with one of the texts in ``gaps`` becomes NaN; without ``gaps`` such a cell is an error.
@@ -88,8 +88,8 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
             raise DataError("has labels but no rows")
         if header.row_count is not None and header.row_count != len(row_lines):
             raise DataError(
-                f"has {len(row_lines)} rows, its header states {header.row_count}: the file is cut off or was edited; "
-                "get it again, or correct the header"
+                f"has {len(row_lines)} rows, but the header states {header.row_count}: the file is cut off or was "
+                "edited; export it again, or correct the header"
             )
         table = _numbers(lines, row_lines, labels, gaps)
         # Some tools repeat the last time.
@@ -105,8 +105,8 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
     remarks = []
     if header.column_count not in (None, len(labels)):
         remarks.append(
-            f"the header states {header.column_count} columns, labels and every row have {len(labels)}, which were "
-            "taken"
+            f"the header states {header.column_count} columns, but labels and rows have {len(labels)}: "
+            f"{len(labels)} columns were read"
         )
     if dropped := len(table) - count:
         rows, verb = ("the last row repeats", "was") if dropped == 1 else (f"the last {dropped} rows repeat", "were")
@@ -124,7 +124,7 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
 
 
 def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequence[str]) -> Floats:
-    """Return the numbers of all rows (rows, columns), time first."""
+    """Parse the numbers of all rows (rows, columns), time first."""
     table = np.empty((len(row_lines), len(labels)))
     for row, number in enumerate(row_lines):
         cells = lines[number - 1].split()
@@ -137,10 +137,10 @@ def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequen
 
 
 def _header(lines: list[str]) -> _Header:
-    """Return the header, up to ``endheader``. Raises DataError with the line of an error."""
+    """Parse the header, up to ``endheader``. Raises DataError with the line of an error."""
     end = next((index for index, line in enumerate(lines) if line.strip().lower() == _END), None)
     if end is None:
-        raise DataError(f"has no line '{_END}': it is cut off in its header, or is no .mot or .sto file")
+        raise DataError(f"has no line '{_END}': the header is cut off, or this is not a .mot or .sto file")
     counts: dict[str, int] = {}
     in_degrees: bool | None = None
     kind: RecordingKind | None = None
@@ -153,12 +153,14 @@ def _header(lines: list[str]) -> _Header:
             counts[count[1].lower()] = int(text)
         key = _DEGREES.match(line)
         if key is not None and key[1].lower() not in ("yes", "no"):
-            raise DataError(f"line {number}: inDegrees is {one_line(key[1])[:LONGEST_SHOWN]!r}; it is 'yes' or 'no'")
+            raise DataError(
+                f"line {number}: inDegrees is {one_line(key[1])[:LONGEST_SHOWN]!r}; it must be 'yes' or 'no'"
+            )
         stated = key or _SENTENCE.search(line)
         if stated is not None:
             says_degrees = stated[1].lower() in ("yes", "degrees")
             if in_degrees is not None and says_degrees != in_degrees:
-                raise DataError(f"line {number}: the header states degrees and radians; correct the one that is wrong")
+                raise DataError(f"line {number}: the header states both degrees and radians; remove the wrong unit")
             in_degrees = says_degrees
         if kind is None and line.startswith(_KIND):
             kind = next((known for known in _KINDS if line == f"{_KIND}{known}"), None)
@@ -175,7 +177,7 @@ def _header(lines: list[str]) -> _Header:
 
 
 def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
-    """Return the line number of the labels (from 1) and the labels."""
+    """Return the column labels and their line number (from 1), number first."""
     for number in range(header.end + 2, len(lines) + 1):
         if lines[number - 1].strip():
             # Labels may hold blanks where tabs separate them.
@@ -183,7 +185,7 @@ def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
             labels = [cell.strip() for cell in line.strip().split("\t")] if "\t" in line else line.split()
             if labels[0].lower() != TIME:
                 first = one_line(labels[0])[:LONGEST_SHOWN]
-                raise DataError(f"line {number}: the first column must be '{TIME}', it is {first!r}")
+                raise DataError(f"line {number}: the first column must be '{TIME}', not {first!r}")
             if "" in labels:
                 raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
             return number, labels
@@ -197,11 +199,11 @@ _SIGNS = {
     r"ankle_angle_[rl]_device(_moment)?": "is what the device gives the wearer, above 0 in dorsiflexion",
     r"ground_force_[rl]_vy": "is above 0 upward",
 }
-"""Sign conventions stated in the header, for the columns in OpenSim's names."""
+"""Sign conventions for the header, by column name of OpenSim."""
 
 
 def opensim_bytes(recording: Recording) -> bytes:
-    """Return a recording as a ``.sto`` file: SI units, angles in radians, labels ``time`` and channel names.
+    """Return the ``.sto`` file of a recording: SI units, angles in radians, labels ``time`` and channel names.
 
     The header states units and signs as text, which OpenSim preserves, and the kind of a recording that was not
     measured.

@@ -1,4 +1,4 @@
-"""Conversion of a walking recording to the names, zeros and signs of OpenSim.
+"""Conversion of a walking recording to names, zeros and signs of OpenSim.
 
 ``ankle_angle_r`` [rad] is 0 with the foot at a right angle to the shank, positive in dorsiflexion.
 ``ankle_angle_r_moment`` is the ankle moment in this direction [N m], negative in push-off;
@@ -13,11 +13,11 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.signals import Channel, Recording
 
 _ANGLES = {"ankle_angle": "{}", "angle": "{}", "healthy_angle": "healthy_{}"}
-"""Pattern of the OpenSim name by angle channel [rad]; in OpenSim 0 is the foot at a right angle to the shank."""
+"""OpenSim name pattern by angle channel [rad]; in OpenSim 0 is the foot at a right angle to the shank."""
 _REVERSED = {"angular_velocity": "{}_speed", "ankle_moment": "{}_moment", "external_torque": "{}_device_moment"}
-"""Pattern of the OpenSim name by channel whose sign is reversed: positive in dorsiflexion instead of plantarflexion."""
+"""OpenSim name pattern by channel of reversed sign: positive in dorsiflexion instead of plantarflexion."""
 _OF_A_SIDE = ("shank_angle",)
-"""Channels whose name only gets the letter of the side."""
+"""Channels renamed only by the letter of the side."""
 _PER_MASS = ("ankle_moment", "vertical_force")
 """Channels that may be normalised by body mass [N m/kg], [N/kg] or by body weight [-]."""
 
@@ -25,7 +25,7 @@ _PER_MASS = ("ankle_moment", "vertical_force")
 def opensim_recording(
     recording: Recording, side: str = "right", body_mass: float | None = None
 ) -> tuple[Recording, tuple[str, ...]]:
-    """Return a walking recording in OpenSim's names, zeros and signs, and the channels omitted for lack of a body mass.
+    """Convert a walking recording to names, zeros and signs of OpenSim; also return channels omitted without body mass.
 
     Moment and force per mass are multiplied by ``body_mass`` [kg]; without a body mass they are omitted and named.
     """

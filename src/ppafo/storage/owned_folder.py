@@ -1,4 +1,4 @@
-"""Output folders of commands: marked by their contents, and replaced only while they are as they were written.
+"""Output folders of commands, marked by a file of hashes, and replaced only while their files are unchanged.
 
 A command only replaces a folder that is absent, empty or an earlier result of its own; the folder then has exactly the
 new files, and stays unchanged until all of these are written. The mark of a folder states the hash of each file, and
@@ -20,12 +20,12 @@ from ppafo.storage.files import check_folder_can_be_replaced, is_address, read_b
 from ppafo.wording import one_line, reason
 
 MARK = "ppafo.json"
-"""Mark of an output folder of a command that writes no document of its own kind."""
+"""Mark file in the output folder of a command without a document of its own."""
 MARK_FORMAT = "ppafo files"
 HASHES = "sha256"
-"""Key of the hashes of all other files in a mark."""
+"""Key of the file hashes in a mark."""
 _MAXIMUM_BYTES_WRITTEN = 16_000_000
-"""Largest size of a JSON document of this package [bytes], far above any that is written.
+"""Largest size of a JSON document of this package [bytes], far above any written.
 
 A document repeats the content of a scenario file, at most 1 MB, less than sixteen times.
 """
@@ -36,7 +36,7 @@ _NOTHING_KEPT: Mapping[str, bytes] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class FolderKind:
-    """Kind of output folder: ``noun`` is its name in messages, ``mark`` the file by which it is recognised.
+    """Kind of output folder: ``noun`` is its name in messages, ``mark`` the file that identifies it.
 
     ``document_of(folder)`` reads the mark, which states the hashes of all other files by name; it raises DataError for
     a foreign mark.
@@ -48,7 +48,7 @@ class FolderKind:
 
 
 def marked_folder(command: str) -> FolderKind:
-    """Return the folder kind of a command that marks its folders by ``MARK``."""
+    """Return the kind of output folder that a command marks with ``MARK``."""
 
     def document_of(folder: Path) -> Any:
         if marking_command(folder) != command:
@@ -59,7 +59,7 @@ def marked_folder(command: str) -> FolderKind:
 
 
 def marking_command(folder: Path) -> str:
-    """Return the command named by ``MARK`` in a folder, empty if this package did not write it."""
+    """Return the command in the ``MARK`` of a folder, empty if not written by this package."""
     document = read_json(folder / MARK)
     is_from_ppafo = isinstance(document, dict) and document.get("format") == MARK_FORMAT
     return str(document.get("command", "")) if is_from_ppafo else ""
@@ -71,7 +71,7 @@ def hashes_of(contents: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: str) -> None:
-    """Write a folder with exactly these files and ``MARK`` if it is absent, empty or the command's own."""
+    """Write a folder with exactly these files and ``MARK``, if absent, empty or an earlier output of the command."""
     mark = {
         "format": MARK_FORMAT,
         "schema_version": 1,
@@ -90,12 +90,12 @@ def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: Folder
 
 
 def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes] = _NOTHING_KEPT) -> None:
-    """Raise DataError for a folder that contains foreign or changed files, or that cannot be written.
+    """Raise DataError for a folder with foreign or changed files, or without permission to write.
 
     Files in ``kept``, such as one that grows from run to run, may have been changed if they have the given content.
     """
     if is_address(folder):
-        raise DataError(f"{folder}: is an address; a {kind.noun} is written into a folder of this computer")
+        raise DataError(f"{folder}: is a remote address; a {kind.noun} needs a local folder")
     is_folder = os.path.isdir(folder)  # noqa: PTH112  # Path.is_dir raises where no file can have the name
     # A link to nowhere is there too, and would be replaced by a folder.
     if not is_folder and os.path.lexists(folder):
@@ -107,13 +107,13 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
 
 
 def _check_earlier_result(folder: Path, kind: FolderKind, present: Collection[str], kept: Mapping[str, bytes]) -> None:
-    """Raise DataError unless a folder is exactly as an earlier result of this kind left it."""
+    """Raise DataError unless a folder is unchanged since an earlier result of this kind."""
     if kind.mark not in present:
         raise DataError(f"{folder}: is not empty and not a {kind.noun} (it has no {kind.mark}); choose another folder")
     hashes = kind.document_of(folder).get(HASHES)
     if not isinstance(hashes, dict):
         raise DataError(
-            f"{folder / kind.mark}: has no hashes of its files, because an earlier version of ppafo wrote it; "
+            f"{folder / kind.mark}: has no file hashes (written by an earlier version of ppafo); "
             "remove the folder, or choose another one"
         )
     # Before hashes are compared: a file of somebody else's is the likelier and the clearer reason.
@@ -140,7 +140,7 @@ def _check_earlier_result(folder: Path, kind: FolderKind, present: Collection[st
 
 
 def _foreign_names(folder: Path, expected: Collection[str], prefix: str = "") -> Iterator[str]:
-    """Yield the names of entries in a folder that are not among the ``expected`` files; names begin with ``prefix``."""
+    """Yield names of folder entries, with ``prefix``, that are not among the ``expected`` files."""
     for entry in _entries(folder):
         name = f"{prefix}{entry.name}"
         is_expected_folder = any(file.startswith(f"{name}/") for file in expected)

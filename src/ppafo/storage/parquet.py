@@ -1,4 +1,4 @@
-"""Tables as Parquet files: columns with unit and description, reproducible bytes, and detection of damage."""
+"""Tables as Parquet files: unit and description of each column, reproducible bytes, detection of damage."""
 
 import contextlib
 import io
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     import pyarrow.parquet as pq
 
 _COMPRESSION_LEVEL = 1
-"""Compression level of zstd, the fastest."""
+"""Compression level of zstd, its fastest."""
 _MAXIMUM_VALUES = 200_000_000
-"""Largest number of values of a table to read; a chunk with channels over time has some millions."""
+"""Largest number of values read from a table; a chunk of channels over time has some millions."""
 _FLOATING_TYPES = ("double", "float")
 """Arrow names of floating-point types."""
 _LONGEST_SHOWN = 120
-"""Largest number of characters of a library's error message that are repeated in a message."""
+"""Largest number of characters quoted from an error message of a library."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class TableColumn:
 
 
 def table_of(columns: Mapping[str, TableColumn], described: Mapping[str, str]) -> "pa.Table":
-    """Return a table with units and descriptions of columns as metadata; ``described`` is the metadata of the table."""
+    """Return a table with units and descriptions of its columns; ``described`` is metadata of the table."""
     import pyarrow as pa
 
     arrays = [
@@ -73,7 +73,7 @@ def parquet_bytes(table: "pa.Table") -> bytes:
 
 
 def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | None = None) -> "pa.Table":
-    """Return a table, or some of its columns, and close the file; ``name`` is the name of the file in messages.
+    """Read a table, or some of its columns, and close the file; ``name`` is the file name in messages.
 
     Raises DataError for a damaged file (checksums included), for far too many values, and for a missing column.
     """
@@ -82,7 +82,7 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
         groups = (parquet.metadata.row_group(number) for number in range(parquet.metadata.num_row_groups))
         value_count = sum(group.column(column).num_values for group in groups for column in range(group.num_columns))
         if value_count > _MAXIMUM_VALUES:
-            raise DataError(f"{name}: has {value_count:,} values, more than any table of a study")
+            raise DataError(f"{name}: has {value_count:,} values; a table of a study has at most {_MAXIMUM_VALUES:,}")
         missing = [column for column in columns or () if column not in parquet.schema_arrow.names]
         if missing:
             raise DataError(f"{name}: has no column '{one_line(missing[0])}'")
@@ -90,7 +90,7 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
 
 
 def column_names(file: io.BufferedIOBase, name: str) -> list[str]:
-    """Return the column names of a file and close the file; ``name`` is the name of the file in messages.
+    """Read the column names of a file and close the file; ``name`` is the file name in messages.
 
     Raises DataError for a damaged file.
     """
@@ -108,11 +108,11 @@ def _opened(file: io.BufferedIOBase, name: str) -> "Iterator[pq.ParquetFile]":
         with file, pq.ParquetFile(file, page_checksum_verification=True) as parquet:
             yield parquet
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:_LONGEST_SHOWN]}") from error
+        raise DataError(f"{name}: is not a complete Parquet file: {one_line(error)[:_LONGEST_SHOWN]}") from error
 
 
 def matrix_of(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
-    """Return a column of lists of equal length as a matrix, one row per list."""
+    """Convert a column of lists of equal length to a matrix, a row for each list."""
     values = column.combine_chunks().flatten().to_numpy(zero_copy_only=False)
     return np.asarray(values.reshape(len(column), -1))
 
@@ -123,14 +123,14 @@ def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:
 
 
 def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":
-    """Return a dictionary-encoded column of texts: ``codes`` are indices, from 0, in ``texts``, at most 128 of them."""
+    """Return a dictionary-encoded text column: ``codes`` are indices into ``texts``, at most 128 of them."""
     import pyarrow as pa
 
     return pa.DictionaryArray.from_arrays(pa.array(codes, type=pa.int8()), pa.array(list(texts), type=pa.string()))
 
 
 def texts_of_some(texts: Mapping[int, str], length: int) -> "pa.Array":
-    """Return a column of ``length`` texts, empty except for the rows (index from 0) given in ``texts``."""
+    """Return a column of ``length`` texts, empty except for the rows in ``texts`` (index from 0)."""
     import pyarrow as pa
 
     column: list[str | None] = [None] * length
@@ -140,7 +140,7 @@ def texts_of_some(texts: Mapping[int, str], length: int) -> "pa.Array":
 
 
 def lists_of(values: "np.ndarray[Any, Any]") -> "pa.ListArray":
-    """Return a column of lists, one list per row of a matrix (rows, values)."""
+    """Return a list column, with a list for each row of a matrix (rows, values)."""
     import pyarrow as pa
 
     offsets = np.arange(values.shape[0] + 1, dtype=np.int32) * values.shape[1]

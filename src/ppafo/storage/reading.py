@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from ppafo.storage.column_map import ColumnMap
 
 ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
-"""Column map, or the name of one: file, and the name of the map if the file has several."""
+"""Column map, or text ``FILE.toml[:NAME]`` that selects a map of a file."""
 
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
-"""Suffixes of text tables."""
+"""File-name suffixes of text tables."""
 
 
 @checked
@@ -32,7 +32,7 @@ def read_recording(
     atmosphere: Pressure = STANDARD_ATMOSPHERE,
     columns: ColumnsLike | None = None,
 ) -> Recording:
-    """Return the recording in a ``.nc`` or ``.parquet`` file, a table of text such as ``.csv``, or a result folder.
+    """Read a recording from a ``.nc`` or ``.parquet`` file, a text table such as ``.csv``, or a result folder.
 
     A pandas DataFrame or an xarray Dataset is taken as well: columns ``name [unit]``, or units in its ``attrs``.
 
@@ -92,7 +92,7 @@ def read_recording(
         return read_parquet(file, atmosphere)
     if file.suffix.lower() == ".mat":
         raise DataError(
-            f"{file}: is a .mat file, whose variables have no units: name them in a column map, "
+            f"{file}: the variables of a .mat file have no units: give names and units in a column map, "
             f"{argument_text('columns', 'FILE.toml:NAME')}"
         )
     if not file.exists():
@@ -100,8 +100,8 @@ def read_recording(
     from ppafo.storage.frames import remedy_for
 
     named = argument_text("columns", "FILE.toml:NAME")
-    other = f"; a table of text of another suffix is read through a column map, {named}"
+    other = f"; read a text table with another suffix through a column map, {named}"
     raise DataError(
-        f"{file}: is no .nc, .parquet or {', '.join(TEXT_SUFFIXES)} file and no result folder"
-        f"{remedy_for(file) or other}"
+        f"{file}: must be a result folder or a .nc, .parquet, {', '.join(TEXT_SUFFIXES[:-1])} or "
+        f"{TEXT_SUFFIXES[-1]} file{remedy_for(file) or other}"
     )

@@ -39,7 +39,7 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True, slots=True, repr=False)
 class StoredResult:
-    """Content of a result folder: the recording, the metrics by name, and ``run.json`` as plain data.
+    """Content of a result folder: recording, metrics by name, and ``run.json`` as plain data.
 
     ``stored["torque"]`` and ``stored["pressure_1", "psi_g"]`` are the values of a channel, as of a ``Result``.
     ``atmosphere`` [Pa absolute] is the reference of gauge pressures, ``drawn_by`` draws the figure at a width.
@@ -56,15 +56,15 @@ class StoredResult:
         return f"StoredResult in {self.folder}: {', '.join(self.document)}\n{self.recording!r}"
 
     def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
-        """Return a channel's values, in SI or in a given unit; ``time`` are the times of the samples [s]."""
+        """Return the values of a channel, in SI or in a given unit; ``time`` gives the sample times [s]."""
         return self.recording.values_of(channel, self.atmosphere)
 
     def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
-        """Return the channels as columns indexed by time [s]: ``Recording.to_dataframe``."""
+        """Return the channels as columns indexed by time [s], like ``Recording.to_dataframe``."""
         return self.recording.to_dataframe(units, self.atmosphere)
 
     def plot(self, width: float | str | None = None) -> "Figure":
-        """Return the same figure as ``Result.plot``; ``.savefig(...)`` writes it to a file."""
+        """Draw the same figure as ``Result.plot``; ``.savefig(...)`` writes it to a file."""
         assert self.drawn_by is not None, "read by ppafo.read_result"
         return self.drawn_by(self, width)
 
@@ -96,12 +96,12 @@ def write_result(
 
 
 def check_result_folder(folder: str | Path) -> None:
-    """Raise DataError for a folder that contains anything but an earlier result, or that cannot be written."""
+    """Raise DataError for a folder that is not writable or contains anything but an earlier result."""
     check_owned_folder(Path(folder), _RESULT)
 
 
 def read_stored(folder: str | Path) -> StoredResult:
-    """Return the content of a result folder, without a function to draw it. Raises DataError for any other folder."""
+    """Read a result folder, without a function to draw it. Raises DataError for any other folder."""
     from ppafo.storage.netcdf_reading import read_netcdf
 
     folder_path = Path(folder)
@@ -110,8 +110,8 @@ def read_stored(folder: str | Path) -> StoredResult:
     if not (folder_path / RUN_FILE).is_file() and (folder_path / MARK).is_file():
         command = marking_command(folder_path)
         raise DataError(
-            f"{folder}: is a result of 'ppafo {command}', not of a run; 'ppafo export figure' draws what has a figure, "
-            "read_recording reads a file of it, and its JSON file has the numbers"
+            f"{folder}: is a result of 'ppafo {command}', not of a run; use its JSON file for numbers, read_recording "
+            "for a recording in it, and 'ppafo export figure' for its figures"
         )
     document = read_document(folder_path)
     if sha256(read_bytes(folder_path / NETCDF_FILE)).hexdigest() != document["recording"].get("sha256"):
@@ -123,11 +123,11 @@ def read_stored(folder: str | Path) -> StoredResult:
 
 
 def read_document(folder: str | Path) -> dict[str, Any]:
-    """Return ``run.json`` of a result folder as plain data. Raises DataError if it is not a document of a result."""
+    """Read ``run.json`` of a result folder. Raises DataError if it is not a result document."""
     path = Path(folder) / RUN_FILE
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{path}: is not of a ppafo result (its 'format' is not '{FORMAT}')")
+        raise DataError(f"{path}: does not belong to a ppafo result ('format' is not '{FORMAT}')")
     if document.get("schema_version") is True or document.get("schema_version") != SCHEMA_VERSION:
         version = document.get("schema_version")
         raise DataError(
@@ -135,7 +135,7 @@ def read_document(folder: str | Path) -> dict[str, Any]:
             f"make the result again with this version"
         )
     if not isinstance(document.get("recording"), dict) or not isinstance(document.get("files"), list):
-        raise DataError(f"{path}: does not state what its recording and its files are")
+        raise DataError(f"{path}: 'recording' must be an object and 'files' a list; make the result again")
     return document
 
 
@@ -143,7 +143,7 @@ _RESULT = FolderKind("ppafo result", RUN_FILE, read_document)
 
 
 def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing files with the same names, and add them to the mark of the folder."""
+    """Write files into a folder, replacing files with the same names, and add them to its mark."""
     marks = {}
     for name in (MARK, RUN_FILE):
         document = read_json(folder / name) if (folder / name).is_file() else None
@@ -154,7 +154,9 @@ def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
                 or not isinstance(stated, list)
                 or not all(type(name) is str for name in stated)
             ):
-                raise DataError(f"{folder / name}: does not state what its files are")
+                raise DataError(
+                    f"{folder / name}: 'files' must be a list of names and '{HASHES}' an object; make the result again"
+                )
             document[HASHES] = dict(sorted({**hashes, **hashes_of(contents)}.items()))
             document["files"] = sorted({*stated, *contents})
             marks[name] = f"{json_text(document)}\n".encode()

@@ -1,4 +1,4 @@
-"""Reading of tables of motion analysis (``.mot``, ``.sto``, ``.trc``): lines, numbers, duplicated names."""
+"""Text tables of motion analysis (``.mot``, ``.sto``, ``.trc``): lines, numbers, duplicated names."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -13,13 +13,13 @@ from ppafo.storage.files import read_bytes, text_of
 from ppafo.wording import LONGEST_SHOWN, one_line
 
 _MOST_SAID = 3
-"""Largest number of duplicated names with a remark of their own."""
+"""Largest number of duplicated names with a separate remark."""
 
 
 def text_lines(path: str | Path) -> list[str]:
-    """Return the lines of a text file, with any line ends. Raises DataError for a file that is not text.
+    """Read the lines of a text file, with any line ends. Raises DataError for a file that is not text.
 
-    If a spreadsheet replaced the tabs of a table by commas and padded all lines to equal width, the tabs are restored.
+    If a spreadsheet replaced the tabs of a table by commas and padded all lines to equal width, tabs are restored.
     """
     lines = text_of(read_bytes(path)).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     last = next((line.strip() for line in reversed(lines) if line.strip()), "")
@@ -29,7 +29,7 @@ def text_lines(path: str | Path) -> list[str]:
 
 
 def number_in(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> float:
-    """Return the number in a cell, NaN for a text in ``gaps``. Raises DataError, with line and column, for others."""
+    """Parse the number in a cell, NaN for a text in ``gaps``. Raises DataError, with line and column, otherwise."""
     if cell.lower() in gaps:
         return float("nan")
     value = finite_number(cell)
@@ -42,7 +42,7 @@ def number_in(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> flo
 
 
 def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[str]:
-    """Return unique column names: duplicates are replaced by their descriptions, or numbered ``NAME#2``.
+    """Return unique column names: duplicates get their descriptions as names, or numbers ``NAME#2``.
 
     Descriptions are used only if all columns of a name have one and none equals another name.
     """
@@ -58,7 +58,7 @@ def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[s
 
 
 def doubled(names: Sequence[str], apart: Sequence[str]) -> dict[str, list[str]]:
-    """Return the unique replacements of each duplicated name; ``apart`` are the unique names from ``told_apart``."""
+    """Return the unique replacements of each duplicated name; ``apart`` are the names from ``told_apart``."""
     twins: dict[str, list[str]] = {}
     for name, own in zip(names, apart, strict=True):
         if name != own:
@@ -67,7 +67,7 @@ def doubled(names: Sequence[str], apart: Sequence[str]) -> dict[str, list[str]]:
 
 
 def without_copies(columns: Mapping[str, Floats], twins: Mapping[str, Sequence[str]]) -> dict[str, Floats]:
-    """Return columns without copies: columns of a duplicated name with equal values become one, under that name."""
+    """Merge columns of a duplicated name with equal values into a single column of that name."""
     same = {
         name: own
         for name, own in twins.items()
@@ -79,11 +79,18 @@ def without_copies(columns: Mapping[str, Floats], twins: Mapping[str, Sequence[s
 
 
 def said_of_doubled(twins: Mapping[str, Sequence[str]], left: Mapping[str, object], noun: str) -> list[str]:
-    """Return a remark on each duplicated name whose columns all remain in ``left``; beyond a few, only their number."""
+    """Return a remark on each duplicated name whose columns all remain in ``left``; above a limit, only a count."""
     said = [
-        f"{noun} of one name, {one_line(name)[:LONGEST_SHOWN]!r}: they are {', '.join(map(repr, own))} here"
+        f"several {noun} are named {one_line(name)[:LONGEST_SHOWN]!r}: they were renamed {', '.join(map(repr, own))}"
         for name, own in twins.items()
         if all(other in left for other in own)
     ]
     more = len(said) - _MOST_SAID
-    return said if more <= 0 else [*said[:_MOST_SAID], f"so are {noun} of {more} more names"]
+    return (
+        said
+        if more <= 0
+        else [
+            *said[:_MOST_SAID],
+            f"{noun} of {more} more repeated {'name' if more == 1 else 'names'} were renamed likewise",
+        ]
+    )

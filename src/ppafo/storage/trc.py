@@ -22,12 +22,12 @@ _HEAD_LINES = 5
 """Number of lines before the first row."""
 _UNITS = ("mm", "cm", "m")
 _UNSEEN = ("", "nan")
-"""Cell texts of an unseen marker."""
+"""Cell texts for a marker that was not seen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _MarkerTable:
-    """Marker positions over time [s]: coordinates (3, frames) by name, in ``unit``; NaN if a marker was not seen.
+    """Marker positions over time [s]: coordinates (3, frames) by name, in ``unit``; NaN for a marker not seen.
 
     ``remarks`` name markers that were renamed because of duplicated names.
     """
@@ -39,12 +39,12 @@ class _MarkerTable:
 
 
 def read_trc(path: str | Path) -> _MarkerTable:
-    """Return the markers in a ``.trc`` file. Raises DataError with file, line and error."""
+    """Read the markers of a ``.trc`` file. Raises DataError with file, line and error."""
     try:
         lines = text_lines(path)
         if not lines[0].startswith(_FIRST_WORD) or len(lines) <= _HEAD_LINES:
             raise DataError(
-                f"is not a .trc file: its first line begins with '{_FIRST_WORD}', and five lines come before rows"
+                f"is not a .trc file: line 1 must begin with '{_FIRST_WORD}', and rows must follow line {_HEAD_LINES}"
             )
         unit = dict(zip(lines[1].split(), lines[2].split(), strict=False)).get("Units", "")
         if unit not in _UNITS:
@@ -55,7 +55,7 @@ def read_trc(path: str | Path) -> _MarkerTable:
             raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, separated by tabs")
         written = [name for name in head[2:] if name]
         if not written:
-            raise DataError("line 4: names no marker; every marker needs a name of its own")
+            raise DataError("line 4: has no marker names")
         names = told_apart(written)
         time, coordinates = _rows(lines, names)
     except DataError as error:
@@ -66,7 +66,7 @@ def read_trc(path: str | Path) -> _MarkerTable:
 
 
 def _rows(lines: list[str], names: list[str]) -> tuple[Floats, list[Floats]]:
-    """Return the times of the frames [s], and the coordinates (3, frames) of each marker in the unit of the file."""
+    """Parse the frame times [s], and the coordinates (3, frames) of each marker in the unit of the file."""
     labels = [f"{axis} of {name}" for name in names for axis in "XYZ"]
     width = 2 + len(labels)
     numbers = [number for number, line in enumerate(lines, 1) if number > _HEAD_LINES and line.strip()]

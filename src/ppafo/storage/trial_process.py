@@ -13,15 +13,15 @@ from pathlib import Path
 from ppafo.errors import DataError
 
 REFUSED, OUT_OF_MEMORY = 76, 77
-"""Exit codes: the file is invalid, with one line of explanation on the output; or reading needs too much memory."""
+"""Exit codes: invalid file, with one line of explanation on the output; and excessive memory."""
 _ALWAYS_ALLOWED = 400_000_000
-"""Memory [bytes] that reading any file may take."""
+"""Memory that reading may take for a file of any size [bytes]."""
 _MAXIMUM_GROWTH = 100
-"""Largest ratio of memory for reading to file size for larger files [-]."""
+"""Largest ratio of memory for reading to file size [-], for larger files."""
 
 
 def read_on_trial(reader: str, library: str, path: str) -> int:
-    """Return the exit code of a trial reading: 0, ``REFUSED`` with the reason on the output, or ``OUT_OF_MEMORY``."""
+    """Read a file on trial. Returns the exit code: 0, ``REFUSED`` with a reason on the output, or ``OUT_OF_MEMORY``."""
     # What the libraries take themselves does not count.
     import_module(library)
     read = pkgutil.resolve_name(reader)

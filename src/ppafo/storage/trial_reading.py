@@ -1,4 +1,4 @@
-"""Trial reading of files in a separate process: a C library may crash or hang on a damaged file, or exhaust memory."""
+"""Trial reading of files in a separate process, because a C library may crash or hang on a damaged file."""
 
 import os
 import subprocess
@@ -11,16 +11,16 @@ from ppafo.storage import trial_process
 from ppafo.storage.trial_process import OUT_OF_MEMORY, REFUSED
 
 TRIAL = ("-P", "-m", trial_process.__name__)
-"""Arguments of Python for the separate process; ``-P`` prevents imports from the working folder."""
+"""Python arguments for the separate process; ``-P`` prevents imports from the working folder."""
 
 _MAXIMUM_SECONDS = 30.0
-"""Time [s] that reading any file may take, including the start of a process on a busy computer."""
+"""Time limit for reading a file [s], including the start of a process on a busy computer."""
 _BYTES_PER_SECOND = 5e6
-"""Reading rate of a slow disk [bytes/s], by which large files get more time."""
+"""Reading rate of a slow disk [bytes/s], which extends the time limit of large files."""
 
 
 def check_can_be_read(path: Path, read: Callable[[str], object], library: str) -> None:
-    """Raise DataError for a file on which ``read`` fails, crashes, hangs or takes far more memory than the file has.
+    """Raise DataError for a file on which ``read`` fails, crashes, hangs or takes excessive memory.
 
     ``read`` is a public function of a module, called in a separate process with the path alone. ``library`` is the C
     extension module that it uses, loaded before memory is limited (if the system can limit memory).

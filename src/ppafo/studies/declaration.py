@@ -12,15 +12,15 @@ from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make
 from ppafo.documents.problems import LABEL, NAME
 
 MAXIMUM_RUNS = 2**32
-"""Largest number of draws: a Sobol sequence of 32 bits then repeats; no other method needs a lower limit."""
+"""Largest number of draws: the period of a 32-bit Sobol sequence; no other method needs a lower limit."""
 MAXIMUM_RUNS_OF_CHUNK = 1_000_000
-"""Largest number of rows kept in memory until written to disk: about 100 MB for ten columns."""
+"""Largest number of runs of a chunk, whose rows stay in memory until written: about 100 MB for ten columns."""
 LARGEST_SEED = 2**32 - 1
-"""Largest seed: 32 bits, so that it is exact in a column of floats."""
+"""Largest random seed (32 bits), exactly representable in a column of floats."""
 DEFAULT_SEED = 1
-"""Default seed of the draws."""
+"""Default random seed of the draws of a study."""
 MAXIMUM_GRID_VALUES = 1_000_000
-"""Largest number of values of one axis, which are computed before the first run."""
+"""Largest number of values of a grid axis; all of them are computed before the first run."""
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Default quantiles: the central 90 % of the runs, the central 50 %, and the median."""
 
@@ -31,7 +31,7 @@ _Only = Annotated[Texts, Field(description="names of the configurations in which
 
 
 class ConfigurationSection(StrictTable):
-    """Base scenario of a study; all configurations get the same draws."""
+    """Section of a study file for one configuration: scenario and overrides; all configurations get the same draws."""
 
     name: Annotated[str, Field(pattern=LABEL, max_length=100, description="label in tables and figures")]
     scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
@@ -39,7 +39,7 @@ class ConfigurationSection(StrictTable):
 
 
 class Grid(StrictTable):
-    """Equally spaced values, ends included."""
+    """Grid of values of a path, equally spaced on a linear or logarithmic scale, ends included."""
 
     path: _Path
     kind: Literal["grid"]
@@ -51,7 +51,7 @@ class Grid(StrictTable):
 
 
 class Listed(StrictTable):
-    """Explicit list of values; combined with every value of all other lists and grids."""
+    """Explicit list of values of a path; combined with every value of all other lists and grids."""
 
     path: _Path
     kind: Literal["list"]
@@ -60,7 +60,7 @@ class Listed(StrictTable):
 
 
 class Uniform(StrictTable):
-    """Uniform distribution between two bounds."""
+    """Uniform distribution of a varied path between two bounds."""
 
     path: _Path
     kind: Literal["uniform"]
@@ -80,7 +80,7 @@ class LogUniform(StrictTable):
 
 
 class Normal(StrictTable):
-    """Normal distribution."""
+    """Normal distribution of a varied path, given by mean and standard deviation."""
 
     path: _Path
     kind: Literal["normal"]
@@ -90,7 +90,7 @@ class Normal(StrictTable):
 
 
 class TruncatedNormal(StrictTable):
-    """Normal distribution truncated to two bounds; mean and standard deviation are of the untruncated one."""
+    """Normal distribution truncated to two bounds; mean and standard deviation are the values before truncation."""
 
     path: _Path
     kind: Literal["truncated_normal"]
@@ -102,7 +102,7 @@ class TruncatedNormal(StrictTable):
 
 
 class LogNormal(StrictTable):
-    """Log-normal distribution: median, and the factor that corresponds to one standard deviation."""
+    """Log-normal distribution given by its median and its geometric standard deviation."""
 
     path: _Path
     kind: Literal["log_normal"]
@@ -133,7 +133,7 @@ class Choice(StrictTable):
 
 
 class WholeNumbers(StrictTable):
-    """Discrete uniform distribution of integers, bounds included; for the seed of the noise."""
+    """Discrete uniform distribution of integers, bounds included; used for random seeds of sensor noise."""
 
     path: _Path
     kind: Literal["whole_numbers"]
@@ -143,7 +143,7 @@ class WholeNumbers(StrictTable):
 
 
 class Stated(StrictTable):
-    """Normal distribution as stated by the parameter set; a 95 % half width is 1.96 standard deviations."""
+    """Normal distribution from the parameter set's uncertainty; a 95 % half width is 1.96 standard deviations."""
 
     path: _Path
     kind: Literal["stated"]
@@ -151,7 +151,7 @@ class Stated(StrictTable):
 
 
 class SameAs(StrictTable):
-    """Same value as another varied path in the same run."""
+    """Varied path that takes the value of another varied path in every run."""
 
     path: _Path
     kind: Annotated[Literal["same_as"], Field(description="optional")] = "same_as"
@@ -167,7 +167,7 @@ class Correlation(StrictTable):
 
 
 class SamplingSection(StrictTable):
-    """Sampling: number and method of the draws; every point of the grid gets the whole sample."""
+    """Section of a study file for random draws: method, number and seed; every grid point gets the whole sample."""
 
     method: Literal["random", "latin_hypercube", "sobol"]
     runs: Annotated[int, Field(ge=1, le=MAXIMUM_RUNS, description="draws; each is run in every configuration")]
@@ -175,7 +175,7 @@ class SamplingSection(StrictTable):
 
 
 class OutputsSection(StrictTable):
-    """Section of a study file: metrics, traces and bands to keep of every run."""
+    """Section of a study file for outputs: metrics, traces and quantile bands to keep."""
 
     metrics: Annotated[Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
     trajectories: Annotated[Texts, Field(description="channels kept for every run")] = ()
@@ -210,7 +210,7 @@ NOT_RANDOM = (SameAs, Grid, Listed)
 
 
 class StudyFile(StrictTable):
-    """Layout of a study file."""
+    """Study file: configurations, varied paths, correlations, sampling and outputs."""
 
     schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]

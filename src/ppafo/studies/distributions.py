@@ -61,7 +61,7 @@ class NormalAround:
 
 @dataclass(frozen=True, slots=True)
 class NormalBetween:
-    """Normal distribution, truncated to two bounds; mean and standard deviation are of the untruncated one."""
+    """Normal distribution truncated to two bounds [SI]; mean and standard deviation are values before truncation."""
 
     mean: float
     standard_deviation: float
@@ -84,7 +84,7 @@ class NormalBetween:
 
 @dataclass(frozen=True, slots=True)
 class LogNormalAround:
-    """Log-normal distribution: median, and the factor that corresponds to one standard deviation."""
+    """Log-normal distribution given by its median [SI] and its geometric standard deviation."""
 
     median: float
     factor: float
@@ -127,7 +127,7 @@ class TriangularBetween:
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """Discrete distribution; ``cumulated`` are the cumulative weights, of which the last is 1."""
+    """Discrete distribution over ``choices`` [SI]; ``cumulated`` are the cumulative weights, ending at 1."""
 
     choices: tuple[float, ...]
     cumulated: tuple[float, ...]

@@ -16,7 +16,7 @@ from ppafo.studies.study import Configuration, RandomValue, SamplingPlan, Study,
 from ppafo.wording import nearest_name
 
 FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
-"""Smallest number of draws, two per replicate, and largest number, for which Sobol replicates are balanced."""
+"""Limits of the number of draws: two per replicate, and the largest number with balanced Sobol replicates."""
 # Few enough that each keeps the evenness of a Sobol sequence, enough for Student's interval (2.13 for 95 %).
 REPLICATES = 16
 """Number of independent scrambles of the Sobol sequence to which draws are assigned in turn."""
@@ -25,7 +25,7 @@ Columns = dict[str, Floats]
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """Distributions of some paths, and Cholesky factor of the correlation of their normal scores (None: uncorrelated).
+    """Distributions of varied paths, and the Cholesky factor of their correlated normal scores (None: uncorrelated).
 
     ``same`` maps a path to the path whose draws it shares. Paths in ``gauge`` hold gauge pressures relative to the
     atmosphere of each run.
@@ -38,7 +38,7 @@ class Uncertainty:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Paths with a distribution."""
+        """Varied paths that have a distribution."""
         return tuple(drawn.path for drawn in self.drawn)
 
     def columns(self, uniform: Floats) -> Columns:
@@ -70,13 +70,13 @@ class Uncertainty:
         return self.columns(uniform)
 
     def with_noise_of(self, scenarios: Iterable[Scenario]) -> "Uncertainty":
-        """Return the uncertainty with an additional noise stream for each draw, if any of the scenarios has noise."""
+        """Return the distributions with an independent noise seed for each draw, if any of the scenarios has noise."""
         drawn, scores = with_noise(self.drawn, self.scores, scenarios, self.paths)
         return replace(self, drawn=drawn, scores=scores)
 
     @property
     def has_noise(self) -> bool:
-        """Tell whether each draw has a noise stream of its own."""
+        """True if each draw has its own seed of the sensor noise."""
         return NOISE in self.paths
 
 
@@ -86,7 +86,7 @@ def replicate_seed(seed: int, replicate: int) -> int:
 
 
 def seeds_of_noise(scenarios: Iterable[Scenario], paths: Sequence[str], first: int, count: int, seed: int) -> Floats:
-    """Return the seeds of ``count`` noise streams (streams,), from number ``first`` on, of the sequence of ``seed``.
+    """Return seeds of ``count`` noise streams (streams,), from stream ``first`` of the sequence given by ``seed``.
 
     The array is empty if no controller of the scenarios receives noise, or if the noise is among the varied ``paths``.
     """
@@ -100,7 +100,7 @@ def study_of(
     draws: int | None = None,
     seed: int | None = None,
 ) -> Study:
-    """Return a loaded study unchanged, else load a name, file or data; StudyError for changes of a loaded one."""
+    """Load a study by name, file or data; return a loaded study unchanged, with StudyError for changes to it."""
     if not isinstance(study, Study):
         return load_study(study, overrides, draws=draws, seed=seed)
     if tuple(overrides) or draws is not None or seed is not None:

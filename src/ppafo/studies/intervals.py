@@ -30,10 +30,10 @@ def replicates_interval(values: Floats, replicates: int, confidence: float) -> C
 
 
 def floored_interval(values: Floats, replicates: int, confidence: float) -> ConfidenceInterval:
-    """Return the mean with the wider of two intervals: from the spread between replicates, and for independent draws.
+    """Return the mean with the wider confidence interval: between replicates (Student), or of independent draws.
 
-    Evenly spaced draws make replicates agree in the values that all of them miss: if rare values dominate, the spread
-    between replicates is smaller than the error, and it is not known beforehand that none dominates.
+    If rare values dominate the mean, evenly spaced draws may miss them in every replicate, and the spread between
+    replicates is smaller than the error.
     """
     from scipy.special import ndtri
 
@@ -48,10 +48,10 @@ def floored_interval(values: Floats, replicates: int, confidence: float) -> Conf
 
 
 def jackknife_reach(left_out: Floats, confidence: float) -> Floats:
-    """Return the half width of the interval of an estimate from independent replicates (Student's distribution).
+    """Return the half width of the confidence interval of an estimate from independent replicates (Student).
 
-    ``left_out`` (replicates, ...) is the estimate without each replicate in turn (Tukey's jackknife), so that an
-    estimate may be a ratio or a quantile of all replicates together.
+    ``left_out`` (replicates, ...) is the estimate without each replicate in turn (Tukey's jackknife); the estimate may
+    be a ratio or a quantile of all replicates together.
     """
     from scipy.special import stdtrit
 
@@ -153,5 +153,5 @@ def quantile_interval(values: Floats, share: float, confidence: float) -> Confid
 
 
 def fraction_text(fraction: ConfidenceInterval) -> str:
-    """Return a fraction with its confidence interval in percent."""
+    """Format a fraction with its confidence interval, in percent."""
     return f"{100.0 * fraction.value:.3g} % [{100.0 * fraction.low:.3g}, {100.0 * fraction.high:.3g}]"

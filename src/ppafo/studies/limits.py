@@ -32,7 +32,7 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
 
 
 def check_fraction(value: float, name: str, least: float = 0.0) -> None:
-    """Raise StudyError for a number below ``least``, or not below 1."""
+    """Raise StudyError for a fraction below ``least`` or not below 1; ``name`` is its name in the message."""
     if not least <= value < 1.0:
         raise StudyError(f"{name} = {value!r}: must be at least {least:g} and less than 1")
 
@@ -47,7 +47,7 @@ def atmosphere_of(scenario: Scenario, varied: Collection[str]) -> float | None:
 
 
 def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> float:
-    """Return a value of a metric in SI; gauge pressures are relative to ``atmosphere`` [Pa absolute].
+    """Convert a level of a metric from text to SI; gauge pressures are relative to ``atmosphere`` [Pa absolute].
 
     Raises StudyError, prefixed with ``what``, for a wrong unit, and for a gauge pressure if ``atmosphere`` is None
     because it varies between the runs.
@@ -66,7 +66,7 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
 
 
 def difference_of(text: str, metric: str, what: str) -> float:
-    """Return a difference of two values of a metric in SI; StudyError as in ``level_of``."""
+    """Convert a difference of two metric values from text to SI; StudyError, prefixed with ``what``, if it fails."""
     unit = METRICS[metric].unit
     return _number(text, _DIFFERENCES.get(unit, unit), what, 0.0)
 
@@ -91,5 +91,5 @@ class MetricLimit:
 
     @property
     def words(self) -> str:
-        """Limit as written, after 'at most' or 'at least'."""
+        """Text of the limit, such as 'at most 5 N m'."""
         return f"at {'most' if self.is_most else 'least'} {self.text}"

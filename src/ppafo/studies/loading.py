@@ -1,4 +1,4 @@
-"""Loading of a study in SI units by name, file or plain data; each mistake gives a one-line error."""
+"""Loading of a study by name, file or plain data into SI units, with a one-line error for each mistake."""
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
@@ -94,7 +94,7 @@ def load_study(
 def load_configuration(
     study: str | Path | Mapping[str, Any], configuration: Configuration, changes: Overrides
 ) -> Study:
-    """Return a study with a single configuration, which alone has to accept the changes.
+    """Load a study with a single one of its configurations, to which the changes are applied.
 
     Paths, correlations and metrics that the configuration does not have are left out. Raises StudyError for changes
     that the configuration refuses.
@@ -123,7 +123,7 @@ def _load(
     draws: int | None = None,
     seed: int | None = None,
 ) -> Study:
-    """Return the study of a document, with changes, draws and seed from the command line written into the document."""
+    """Build a study from a document, into which changes, draws and seed from the command line are written."""
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():
         if isinstance(table, dict) and "same_as" in table:
@@ -157,7 +157,7 @@ class _StudySource:
 
 
 def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], _StudySource]:
-    """Return a document that may be modified, and its source: a file of a kind, by name or path, or data."""
+    """Read a TOML file of a ``kind``, by name or path, or plain data; returns a modifiable document and its source."""
     if isinstance(named, Mapping):
         kind.check_depth(named, kind.noun)
         return copy.deepcopy(dict(named)), _StudySource(kind.noun, Path(), b"")
@@ -166,7 +166,7 @@ def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[
 
 
 def _build(parsed: declared.StudyFile, document: dict[str, Any], source: _StudySource) -> Study:
-    """Return the study of a file, with everything in SI units; StudyError for a study that cannot be run.
+    """Build the study of a parsed study file in SI units; StudyError for a study that cannot be run.
 
     ``document`` is the file as plain data, which the study keeps.
     """
@@ -229,7 +229,7 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: _StudyS
 
 
 def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration]) -> None:
-    """Raise an error for a value that is set in a configuration in which the value (in any form) also varies."""
+    """Raise StudyError for a path that is both set and varied in a configuration, in any form (area or conductance)."""
     for section, configuration in zip(parsed.configurations, configurations, strict=True):
         overrides = read_overrides(section.overrides, StudyError)
         set_values = override_set(overrides, StudyError, valve=configuration.scenario.device.valve_name)
@@ -250,7 +250,7 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
 
 
 def _configuration(entry: declared.ConfigurationSection, folder: Path) -> Configuration:
-    """Return a configuration as its section gives it."""
+    """Load the scenario of a configuration section, with its overrides."""
     with refused_as(StudyError, f"configuration '{entry.name}'", ScenarioError, ParameterError, DataError):
         return Configuration(entry.name, load_scenario(placed(entry.scenario, folder), entry.overrides))
 
@@ -258,7 +258,7 @@ def _configuration(entry: declared.ConfigurationSection, folder: Path) -> Config
 def _common_path(
     entry: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile
 ) -> VariedPath:
-    """Return a varied path with its declaration, which must be the same in all its configurations."""
+    """Return a varied path with its unit, limits and atmosphere; StudyError if these differ between configurations."""
     names = [configuration.name for configuration in configurations]
     for name in entry.only:
         if name not in names:
@@ -302,7 +302,7 @@ def _axis_or_drawn(
 
 
 def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, VariedPath]) -> dict[str, str]:
-    """Return the followed path for each path that shares draws; error if it does not vary or has another unit."""
+    """Map each 'same_as' path to the path whose draws it shares; StudyError for a fixed path or another unit."""
     independent = [entry.path for entry in parsed.vary if not isinstance(entry, declared.SameAs)]
     followed: dict[str, str] = {}
     for entry in parsed.vary:

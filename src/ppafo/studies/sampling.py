@@ -1,4 +1,4 @@
-"""Uniform numbers of the draws from ``first`` on: draw number j is the same in any order of requests.
+"""Uniform random numbers for draws; draw number j is the same in any order of requests.
 
 Random numbers come from Philox, a generator that can start anywhere (Salmon et al., SC 2011). SciPy's Sobol sequence
 can only be advanced forward, so its engines and their positions are cached. SciPy's Latin hypercube stores all draws in
@@ -8,8 +8,8 @@ walking; Black and Rogaway, CT-RSA 2002). Words are mixed as in SplitMix64 (Stee
 
 Correlations apply to normal scores: a Gaussian copula, which leaves each distribution unchanged.
 
-A scenario has one seed, so that a single run can be repeated. A statement about a device must not depend on that one
-noise realisation: with noisy sensors, every draw gets a noise stream of its own.
+A scenario has a fixed seed, so that a single run can be repeated. A result about a device must not depend on a single
+noise realisation: with noisy sensors, every draw gets its own noise stream.
 """
 
 import threading
@@ -44,16 +44,16 @@ _MAXIMUM_ENGINES = 64
 _LEAST_SPREAD = 1.0e-6
 """Smallest conditional standard deviation of a normal score, given the others, for a positive definite correlation."""
 NOISE = "sensors.seed"
-"""Path of the seed of a run's noise."""
+"""Path of the noise seed of a run."""
 _NOISE_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise", "sensors.force_noise")
 _KEY = 1
-"""Seed of the permutation from which other noise seeds follow."""
+"""Seed of the permutation that maps a noise seed to the seed of another noise stream."""
 NOISE_DRAWS = 512
-"""Largest number of draws repeated with other noise: enough for the noise fraction of the variance to some percent."""
+"""Largest number of draws repeated with another noise seed, for the noise fraction of the variance to a few percent."""
 
 
 def uniform_numbers(sample: SamplingPlan, dimensions: int, first: int, count: int) -> Floats:
-    """Return numbers in (0, 1), shape (count, dimensions), for the draws from ``first`` on."""
+    """Return uniform random numbers in (0, 1), shape (count, dimensions), for the draws from ``first`` on."""
     if sample.method == "sobol":
         from scipy.stats import qmc
 
@@ -88,7 +88,7 @@ def uniform_numbers(sample: SamplingPlan, dimensions: int, first: int, count: in
 
 
 def permute(numbers: Words, size: int, seed: int, stream: int) -> Words:
-    """Return the images of numbers below ``size`` under a permutation, determined by seed and stream."""
+    """Return the images of numbers below ``size`` under a pseudo-random permutation given by seed and stream."""
     half = np.uint64(max(1, -(-(size - 1).bit_length() // 2)))
     keys = _mix(np.arange(1, _ROUNDS + 1, dtype=np.uint64) + np.uint64((seed << 24) + (stream << 8)))
     mask = (np.uint64(1) << half) - np.uint64(1)

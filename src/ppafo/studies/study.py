@@ -23,7 +23,7 @@ from ppafo.wording import first_twice, nearest_name, override_text
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Outputs of a study.
+    """Outputs of a study that are kept of every run.
 
     ``metrics`` are the names of metrics, ``trajectories`` the channels kept for every run, ``bands`` the channels kept
     as quantile bands; ``every`` is the time between two samples [s], ``quantiles`` are from 0 to 1. ``errors`` is true
@@ -39,12 +39,12 @@ class Outputs:
 
     @property
     def traces(self) -> tuple[str, ...]:
-        """Every channel needed over time, each once."""
+        """Channels needed over time, for trajectories or bands, without duplicates."""
         return tuple(dict.fromkeys((*self.trajectories, *self.bands)))
 
 
 def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario]) -> Outputs:
-    """Return the outputs in SI units; StudyError for a name that does not exist."""
+    """Check the outputs of a study and convert them to SI; StudyError for an unknown metric or channel."""
     metrics = tuple(METRICS) if outputs.metrics == "all" else tuple(outputs.metrics)
     _check_names(
         "metrics", metrics, METRICS, dict.fromkeys(name for scenario in scenarios for name in offered(scenario))
@@ -100,7 +100,7 @@ SamplingMethod = Literal["random", "latin_hypercube", "sobol"]
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """Base scenario with its name in tables and figures."""
+    """Configuration of a study: base scenario, and its name in tables and figures."""
 
     name: str
     scenario: Scenario
@@ -108,7 +108,7 @@ class Configuration:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Values of a grid or list [SI], in the order of the study file."""
+    """Varied path with the values of its grid or list [SI], in the order of the study file."""
 
     path: str
     values: tuple[float, ...]
@@ -116,7 +116,7 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class RandomValue:
-    """Path, and distribution of its values [SI]."""
+    """Varied path with the distribution of its values [SI]."""
 
     path: str
     distribution: Distribution
@@ -124,7 +124,7 @@ class RandomValue:
 
 @dataclass(frozen=True, slots=True)
 class SamplingPlan:
-    """Method, number of draws and seed; one draw, without a method, for a study without distributions."""
+    """Sampling plan: method, number of draws and seed; one draw without a method if there are no distributions."""
 
     method: SamplingMethod | None
     runs: int
@@ -132,12 +132,12 @@ class SamplingPlan:
 
 
 NO_SAMPLE = "'sample' is missing: distributions need [sample] with method and runs"
-"""Message for a study that is to be drawn but has no number of draws."""
+"""Error message for a study with distributions but without a number of draws."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Study:
-    """Configurations, each run at every grid point with every draw.
+    """Study: configurations, each of them run at every grid point with every draw.
 
     ``axes`` are grids and lists, ``drawn`` the paths with distributions, ``sample`` the sampling plan. ``same`` maps a
     path to the path whose values it shares. ``scores`` is the lower Cholesky factor of the correlation of the normal
@@ -182,24 +182,24 @@ class Study:
 
     @property
     def runs(self) -> int:
-        """Number of all runs."""
+        """Number of runs of all configurations."""
         return len(self.configurations) * self.runs_of_configuration
 
     def shown_for(self, scenario: Scenario) -> dict[str, str]:
-        """Return the display unit for each SI unit, for runs of a scenario: as given, else of the device."""
+        """Return the display unit by SI unit for a scenario: the units given in the study, else the device's units."""
         return {**scenario.device.shown, **chosen_units(f"0 {unit}" for unit in self.given.values())}
 
     def same_in(self, configuration: str) -> dict[str, str]:
-        """Return, for a configuration, the paths that share the values of another path, mapped to the latter."""
+        """Map each path that shares the values of another path to this other path, for one configuration."""
         return {path: other for path, other in self.same.items() if self.varies(path, configuration)}
 
     def varies(self, path: str, configuration: str) -> bool:
-        """Tell whether a path is varied in a configuration."""
+        """Return True if a path is varied in a configuration."""
         return path not in self.only or configuration in self.only[path]
 
 
 def with_followers(columns: Mapping[str, Any], same: Mapping[str, str]) -> dict[str, Any]:
-    """Return the columns, with an additional column for each path that follows one of them."""
+    """Return the columns, with a copy for each path that shares the values of another path."""
     return {**columns, **{path: columns[other] for path, other in same.items() if other in columns}}
 
 
@@ -240,7 +240,7 @@ def choose_configurations(
 
 
 def configurations_with(configurations: Sequence[Configuration], overrides: Iterable[str]) -> tuple[Configuration, ...]:
-    """Return configurations with overrides of all, or addressed to one as ``NAME:PATH=VALUE``.
+    """Apply overrides to all configurations, or to a single configuration if addressed as ``NAME:PATH=VALUE``.
 
     Raises StudyError for an address that no configuration has, and for an override that a configuration refuses.
     """
@@ -272,7 +272,7 @@ def configurations_with(configurations: Sequence[Configuration], overrides: Iter
 
 
 def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
-    """Return a scenario with overrides; StudyError if the scenario was changed in Python, which would be lost.
+    """Apply overrides to a scenario; StudyError if the scenario was changed in Python, which reloading would undo.
 
     A Python object that controls the scenario is kept.
     """

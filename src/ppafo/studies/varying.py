@@ -42,12 +42,12 @@ DEVIATIONS_IN_HALF_WIDTH = 1.959963984540054
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
 _STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "K"}
 _SMALLEST_SHOWN, _LARGEST_SHOWN = 1.0e-3, 1.0e7
-"""Range of numbers that are displayed in the unit in which they were given."""
+"""Range of magnitudes that are displayed in the unit in which they were given."""
 
 
 @dataclass(frozen=True, slots=True)
 class VariedPath:
-    """Varied path with its declaration, and the atmospheric pressure [Pa absolute] for its gauge pressures.
+    """Varied path with its declared quantity, and the atmospheric pressure [Pa absolute] for its gauge pressures.
 
     With ``is_gauge`` the values are gauge pressures relative to the varying atmosphere of each run, else absolute.
     ``given`` is the unit in which values were given, "" if unknown.
@@ -60,7 +60,7 @@ class VariedPath:
     given: str = ""
 
     def level(self, value: str | float) -> float:
-        """Return a value of the path in SI; UnitError for a wrong unit or a value out of range."""
+        """Convert a value of the path to SI; UnitError for a wrong unit or a value out of range."""
         number = self._in_si(value, self.quantity)
         if not is_within(number, self.quantity):
             given = split_quantity(value)[1] if isinstance(value, str) else ""
@@ -68,7 +68,7 @@ class VariedPath:
         return _parse(str(value), self.quantity, 0.0) if self.is_gauge else number
 
     def distance(self, value: str | float) -> float:
-        """Return a difference of two values of the path in SI, such as a standard deviation."""
+        """Convert a difference of two values of the path to SI, such as a standard deviation."""
         # A difference of pressures counts from nothing; in degC it would get the offset of the scale.
         unit = _UNIT_OF_DIFFERENCE.get(self.quantity.unit, self.quantity.unit)
         if isinstance(value, str) and split_quantity(value)[1] in _OFFSET_UNITS:
@@ -76,7 +76,7 @@ class VariedPath:
         return self._in_si(value, replace(self.quantity, unit=unit))
 
     def quote(self, value: float) -> str:
-        """Return a value of the path for messages, with six digits, in the unit in which it was given."""
+        """Format a value [SI] of the path for messages: six digits, in the unit in which it was given."""
         unit = self.given or shown_unit(self.quantity.unit)
         unit, zero = (f"{split_pressure_kind(unit)[0]}_g", 0.0) if self.is_gauge else (unit, self.atmosphere)
         return f"{shown_value(value, self.quantity.unit, unit, zero):.6g} {unit}".rstrip()
@@ -90,7 +90,7 @@ class VariedPath:
 
 
 def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
-    """Return the SI value of a text in any of the units that a parameter set may use too."""
+    """Convert a text to SI; accepts every unit that a parameter set may use for the quantity."""
     refused: UnitError | None = None  # the first refusal: it names the unit that the declaration prefers
     for unit in alternatives(quantity):
         try:
@@ -101,7 +101,7 @@ def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
 
 
 def varied_path(path: str, scenario: Scenario) -> VariedPath:
-    """Return a path of a scenario; ScenarioError with the nearest name for an unknown path."""
+    """Look up a path in a scenario; ScenarioError with the nearest name for an unknown path."""
     find_effects([path])
     known = declared_numbers(scenario)
     if path not in known:
@@ -129,7 +129,7 @@ def value_at(path: str, scenario: Scenario) -> float | None:
 
 
 def given_in(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
-    """Return a path with the unit of the first text that has one as display unit.
+    """Set the display unit of a path to the first unit found in ``texts``.
 
     A unit in which the number needs a power of ten, such as 1.451e-5 m^3, is not used for display.
     """
@@ -139,7 +139,7 @@ def given_in(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
 
 
 def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
-    """Return a path for values that vary together with the atmosphere, given as texts with units such as ``50 psi_g``.
+    """Mark a path as gauge if the atmosphere varies and ``texts`` are gauge pressures such as ``50 psi_g``.
 
     Gauge pressures are then relative to the atmosphere of each run. Raises UnitError for a mix of gauge and absolute
     pressures.
@@ -157,13 +157,13 @@ def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
 
 
 def texts_of(entry: declared.Varied) -> list[object]:
-    """Return the values of a table in the order of its keys, except differences and fractions."""
+    """Return the values of a ``[[vary]]`` table in the order of its keys, except differences and fractions."""
     keys = ("first", "last", "minimum", "maximum", "mean", "median", "mode")
     return [*(getattr(entry, key) for key in keys if hasattr(entry, key)), *getattr(entry, "values", ())]
 
 
 def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | RandomValue:
-    """Return the axis or distribution of a table; UnitError with the key for an unusable or contradictory value."""
+    """Convert a ``[[vary]]`` table to an axis or distribution; UnitError with the key of an unusable value."""
     is_counted, is_whole = entry.path in WHOLE_NUMBERS, entry.kind == "whole_numbers"
     if is_whole and not is_counted:
         raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE_NUMBERS)} alone; use 'choice' or 'uniform'")
@@ -198,7 +198,7 @@ def _bounded(made: Callable[[float, float], Distribution], entry: Any, varied: V
 
 
 def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: VariedPath) -> Distribution:
-    """Return a log-uniform or log-normal distribution; UnitError if the number may be 0."""
+    """Return a log-uniform or log-normal distribution; UnitError if its lower bound or median is not above 0."""
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
     absolute = replace(varied, is_gauge=False)
     distribution: Distribution
@@ -261,7 +261,7 @@ _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
     "choice": _choice,
     "whole_numbers": partial(_bounded, WholeNumbersBetween),
 }
-"""Builder of each kind. To add one: a table in ``declaration``, a class in ``distributions``, a line here."""
+"""Builders of distributions by kind; a new kind needs a table in ``declaration`` and a class in ``distributions``."""
 
 
 def _bounds(entry: Any, varied: VariedPath) -> tuple[float, float]:
@@ -281,7 +281,7 @@ def _level(key: str, value: str | float, varied: VariedPath) -> float:
 
 
 def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:
-    """Return the distribution of a path and its unit in the parameter set; UnitError without a stated uncertainty."""
+    """Return the stated distribution of a path and its unit in the parameter set; UnitError without an uncertainty."""
     origin, path = scenario.origin, varied.path
     # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
     parameters = parameter_set_of(origin)

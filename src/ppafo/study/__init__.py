@@ -1,1 +1,1 @@
-"""Runs over columns of values and results of an analysis, in one form for all analyses."""
+"""Ensemble runs and stored results of studies, shared by all analyses."""

@@ -18,15 +18,15 @@ from ppafo.studies.study import Configuration, Study, with_followers
 MAXIMUM_RUNS_OF_CHUNK = 65_536
 """Largest number of runs of a chunk, unless the study sets another number."""
 _FEWEST_RUNS_OF_CHUNK = 512
-"""Smallest number of runs of a chunk, whatever memory its traces take."""
+"""Smallest number of runs of a chunk when its size is reduced to limit memory or time."""
 _CHUNKS_OF_SMALL_STUDY, _FEWEST_STEPS = 16, 2**22
-"""Number of chunks into which the runs of a configuration are divided even if they are few, so that an interrupt loses
-one of them, and smallest number of steps of such a chunk: some tenths of a second of a processor."""
+"""Number of chunks of each configuration of a small study, so that an interrupt loses little, and smallest number of
+time steps of such a chunk: some tenths of a second of processor time."""
 _MAXIMUM_STEPS = 2**25
-"""Largest number of steps of all runs between two reports: some seconds of a processor."""
+"""Largest number of time steps, summed over runs, between two progress reports: some seconds of processor time."""
 _SLOW_RUNS_OF_CHUNK = 64
-"""Number of runs of a chunk with a Python controller: a few seconds between reports, so that little can be lost. Also
-the smallest number of runs of an automatic chunk, which keeps two processors busy."""
+"""Number of runs of a chunk with a Python controller: a few seconds, so that an interrupt loses little. Also the
+smallest number of runs of an automatic chunk, which keeps two processors busy."""
 _MAXIMUM_BYTES_OF_TRACES = 48_000_000
 """Largest size of the traces of a chunk during computation [bytes]."""
 
@@ -77,12 +77,12 @@ def samples_of(study: Study, configuration: Configuration) -> int:
 
 
 def chunk_count(study: Study) -> int:
-    """Return the number of chunks of a study, of all its configurations."""
+    """Return the number of chunks of a study over all configurations."""
     return len(study.configurations) * -(-study.runs_of_configuration // chunk_size(study))
 
 
 def chunk(study: Study, number: int) -> Chunk:
-    """Return the chunk with a number, counted over all configurations from 0."""
+    """Return a chunk by its number, counted over all configurations from 0."""
     size = chunk_size(study)
     configuration, index = divmod(number, -(-study.runs_of_configuration // size))
     first = index * size
@@ -90,7 +90,7 @@ def chunk(study: Study, number: int) -> Chunk:
 
 
 def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
-    """Return the values [SI] of all varied paths for ascending runs of a configuration, equal in each of them."""
+    """Return values [SI] by varied path for ascending run indices, the same in every configuration."""
     point, draw = np.divmod(runs, study.sample.runs)
     columns: dict[str, Floats] = {}
     for axis in reversed(study.axes):
@@ -114,6 +114,6 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
 
 
 def varied_columns(study: Study, configuration: Configuration, values: dict[str, Floats]) -> dict[str, Floats]:
-    """Return the varied values that apply to the runs of a configuration."""
+    """Return the columns of varied values that apply in a configuration, and of paths that share these values."""
     own = {path: column for path, column in values.items() if study.varies(path, configuration.name)}
     return with_followers(own, study.same_in(configuration.name))

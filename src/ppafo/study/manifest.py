@@ -1,4 +1,4 @@
-"""``study.json``: definition of the computed study, checked when its folder is used again, and index for readers."""
+"""Manifest of study results (``study.json``): definition of the study, its runs and chunks, units of its columns."""
 
 import hashlib
 import json
@@ -32,13 +32,13 @@ STUDY_COPY = "study.toml"
 FORMAT = "ppafo study results"
 SCHEMA_VERSION = 2
 _NAMED = 4
-"""Number of differences named in a message."""
+"""Largest number of differences between studies named in an error message."""
 _COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
 """Keys of the manifest that must be equal for a study to continue with earlier results."""
 
 
 def manifest(study: Study) -> dict[str, Any]:
-    """Return the manifest: study, base scenarios in SI units, runs, columns with units; without time and computer."""
+    """Return the manifest: study, base scenarios in SI units, runs, units of columns; without time and computer."""
     scenarios: dict[str, Any] = {}
     programs: dict[str, str] = {}
     for configuration in study.configurations:
@@ -99,7 +99,7 @@ def read_manifest(folder: StudyFolder) -> dict[str, Any]:
 
 
 def _channel(name: str) -> str:
-    """Return the name of a channel; ValueError for an unknown name."""
+    """Validate the name of a channel; ValueError for an unknown name."""
     if name not in CHANNELS:
         raise ValueError(f"there is no channel '{one_line(name)}'")
     return name
@@ -109,7 +109,7 @@ _Channel = Annotated[str, AfterValidator(_channel)]
 
 
 class _Part(BaseModel):
-    """Table of the manifest; unknown keys, written by later versions, are ignored."""
+    """Base class of tables of the manifest; unknown keys, written by later versions, are ignored."""
 
     model_config = ConfigDict(strict=True)
 
@@ -177,7 +177,7 @@ class _StoredScenario(_Part):
 
 
 class _Stored(_Part):
-    """Guaranteed fields of the manifest; ``check_same_study`` compares it with the requested study."""
+    """Manifest as read from a folder: required fields, checked for consistency."""
 
     study: _StoredStudy
     scenarios: dict[str, _StoredScenario]
@@ -190,7 +190,7 @@ class _Stored(_Part):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        """Raise ValueError for a number of chunks unfit for the configurations, or a varied path without unit."""
+        """Raise ValueError for chunks that do not fit the configurations, missing units, or invalid display units."""
         names = [configuration.name for configuration in self.study.configurations]
         if len(set(names)) < len(names) or self.chunks % len(names) or self.chunks > self.runs:
             raise ValueError(f"{self.chunks} chunks of {self.runs} runs do not fit {len(names)} configurations")
@@ -223,7 +223,7 @@ def check_same_study(folder: StudyFolder, stored: Mapping[str, Any], requested: 
 
 
 def _plain(document: Any) -> Any:
-    """Return a document as it is after writing and reading as JSON: lists for tuples."""
+    """Return a document after a round trip through JSON: tuples become lists."""
     return json.loads(json.dumps(document))
 
 

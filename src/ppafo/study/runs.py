@@ -1,4 +1,4 @@
-"""Runs of a scenario over columns of values: numbers in, metrics out, accumulated in one table."""
+"""Ensemble runs of a scenario or model over columns of values, with metrics accumulated in one table."""
 
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -29,12 +29,12 @@ from ppafo.study.blocks import runs_at_once
 Rows = dict[str, NDArray[Any]]
 """Columns of one length: metrics by name [SI], nan if a run lacks the metric; and ``failed``, True for a failed run."""
 Evaluation = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
-"""Function from columns to rows and the reason why the first run failed."""
+"""Function from columns of varied values to rows of metrics, and the reason why the first run failed ("" if none)."""
 FAILED = "failed"
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
-"""Largest number of runs between two reports: in general, and for a Python controller."""
+"""Largest number of runs between two progress reports: in general, and with a Python controller."""
 _FIRST_AT_ONCE, _BETWEEN_REPORTS = 1024, 3.0
-"""Largest number of runs before the first report, and time [s] for which later ones are sized."""
+"""Largest number of runs before the first progress report, and target time between later reports [s]."""
 
 
 @final
@@ -46,7 +46,7 @@ class RunCounter:
         self.done, self.failed, self._earlier = done, failed, 0
 
     def add(self, runs: int, failed: int) -> None:
-        """Count finished runs; the rate excludes the first ones, which may include compilation of models."""
+        """Count finished runs; the reported rate excludes the first batch, whose time may include compilation."""
         self.done += runs
         self.failed += failed
         if not self._earlier:
@@ -63,8 +63,8 @@ class RunCounter:
 class Runs:
     """Runs of one scenario or model: ``run(columns)`` returns their rows and appends columns and rows to ``table``.
 
-    ``evaluate`` makes the rows of some runs, at most ``at_once`` of them. ``count`` is the number of runs made,
-    ``failures`` the number that diverged or were refused; ``reason`` says why the first of these failed.
+    ``evaluate`` computes the rows of at most ``at_once`` runs. ``count`` is the number of finished runs, ``failures``
+    the number of runs that diverged or were refused; ``reason`` says why the first of these failed.
     """
 
     def __init__(self, evaluate: Evaluation, metrics: Sequence[str], counter: RunCounter, at_once: int) -> None:
@@ -74,7 +74,7 @@ class Runs:
         self._parts: list[Rows] = []
 
     def run(self, columns: Mapping[str, Floats]) -> Rows:
-        """Return the rows of runs with these values [SI] by path, each column (runs,)."""
+        """Run the model with values [SI] by path, each column (runs,), and return the rows of metrics."""
         runs = len(next(iter(columns.values())))
         parts = []
         if not self._counter.done:
@@ -99,11 +99,11 @@ class Runs:
 
     @property
     def table(self) -> Rows:
-        """All rows so far, together with their columns of values."""
+        """Table of all runs so far: columns of varied values and of metrics."""
         return joined(self._parts) if self._parts else {}
 
     def check(self, rows: Rows, maximum_failed: float, subject: str, metrics: Sequence[str] = ()) -> None:
-        """Raise StudyError if more than a fraction of the rows failed, or lacks one of some metrics.
+        """Raise StudyError if more than the fraction ``maximum_failed`` of the rows failed or lacks one of the metrics.
 
         Statistics of the remaining runs would be biased. ``subject`` names the rows in the message.
         """
@@ -152,7 +152,7 @@ def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
-    """Return the rows of several parts as one table, in order."""
+    """Concatenate tables of rows in order."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -170,7 +170,7 @@ def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ..
 def excess(
     rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
 ) -> TrackingExcess:
-    """Return the numbers of each run by which its tracking is judged, divided by their limits (runs,).
+    """Return the tracking criteria of each run, divided by their limits (runs,).
 
     ``columns`` are the values of the runs by path; paths in ``gauge`` hold gauge pressures.
     """
@@ -183,7 +183,7 @@ def excess(
 
 
 def is_to_follow(scenario: Scenario, columns: Mapping[str, Floats]) -> bool:
-    """Return whether runs are expected to follow their reference: unless the scenario declares it beyond reach."""
+    """Return whether runs are expected to follow the reference: not if the scenario declares it beyond reach."""
     return not scenario.beyond_reach or changes_reach(columns)
 
 
@@ -200,12 +200,12 @@ def tracking_violation(
 
 
 def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:
-    """Tell for each run whether its loop oscillates, from the reversals of its command; False if these are unknown."""
+    """Return flags of oscillating loops (runs,), by the reversals of the command; False for unknown reversals."""
     return np.asarray(command_turning(scenario, rows, most_reversals(scenario)) > 1.0)
 
 
 def settled(rows: Rows, metric: str) -> Floats:
-    """Return a metric for evaluation; for sustained oscillation, a final error becomes the RMS error, if larger."""
+    """Return a metric for evaluation; in sustained oscillation, a final error becomes the RMS error, if larger."""
     if metric not in ONE_INSTANT or "settled_turns" not in rows:
         return rows[metric]
     swings = (rows["settled_turns"] >= SUSTAINED) & (rows["settled_error"] > rows[metric])

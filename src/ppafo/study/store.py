@@ -1,4 +1,4 @@
-"""Results of a study in a folder: chunks of rows, each with a note of its checksum.
+"""Results of a study in a folder: Parquet files of chunks, each with a note that contains its checksum.
 
 A chunk counts as finished once its note is written, after the chunk itself; a file that does not match its note is
 recomputed. Page checksums of Parquet miss some flipped bits; SHA-256 does not.
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _TRIED_RUNS = 8
-"""Number of runs of each configuration made before a study starts, to detect errors at once."""
+"""Number of trial runs of each configuration before a study starts, to detect errors at once."""
 STATUSES = ("completed", "diverged", "refused")
 _PLAIN, _OVER_TIME = "-", "_over_time"
-"""Unit of a plain number, and ending of the name of a column with a trace."""
+"""Unit of a dimensionless column, and suffix of the name of a column with a trace."""
 OSCILLATES, FOLLOWS = "oscillates", "follows"
-"""Columns of flags: the loop of the run oscillates; the run follows its reference."""
+"""Names of the columns of flags: the loop of the run oscillates; the run follows its reference."""
 _TEXT_COLUMNS = ("configuration", "status", "reason", "channel")
 ASKED_ABOVE = 10_000_000_000
 """Size [bytes] above which a study only starts with ``--yes``."""
@@ -54,12 +54,12 @@ _BYTES_OF_NUMBER = 8
 _BYTES_OF_SAMPLE = 4
 """Bytes per sample of a trace, stored in single precision unless needed for bands."""
 _BYTES_OF_FILE = 12_000
-"""Bytes of a file in addition to its rows, with its note: names, units and meanings of the columns."""
+"""Overhead of a chunk file and its note [bytes]: names, units and meanings of the columns."""
 
 
 @dataclass(frozen=True, slots=True)
 class FinishedChunk:
-    """Chunk that has been written: its number, its number of runs, and the number of failed runs."""
+    """Written chunk: chunk number, number of runs, and number of failed runs."""
 
     number: int
     runs: int
@@ -75,7 +75,7 @@ class StudyStore:
 
     @classmethod
     def claim(cls, study: Study, folder: StudyFolder, agreed: bool, threads: int | None) -> "StudyStore":
-        """Assign a folder to a study; error for results of another study or version, and for a lack of space."""
+        """Use a folder for a study; StudyError for results of another study or version, or too little disk space."""
         names = folder.names()
         if MANIFEST in names:
             check_same_study(folder, read_manifest(folder), manifest(study))
@@ -130,7 +130,7 @@ class StudyStore:
 def stored_rows(
     folder: StudyFolder, numbers: Sequence[int], columns: Sequence[str] | None = None
 ) -> "Iterator[pa.Table]":
-    """Yield the tables of some chunks; DataError for a missing or damaged one."""
+    """Yield the tables of chunks by number; DataError for a missing or damaged chunk."""
     for number in numbers:
         name = chunk_file(number)
         try:
@@ -145,7 +145,7 @@ def stored_rows(
 
 
 def check_types(table: "pa.Table", name: str) -> None:
-    """Raise DataError for columns of a type that a study never writes: only texts, numbers and lists of numbers."""
+    """Raise DataError for a column that is neither text, nor number, nor a trace (lists of numbers of equal length)."""
     import pyarrow as pa
 
     for field in table.schema:
@@ -167,7 +167,7 @@ def check_types(table: "pa.Table", name: str) -> None:
 
 
 def compute_chunk(study: Study, number: int, threads: int | None) -> tuple[FinishedChunk, bytes]:
-    """Return the content of a chunk file, not yet written: a row per run in SI units, nan for missing values."""
+    """Compute a chunk; returns the content of its file: a row per run in SI units, nan for missing values."""
     part = chunk(study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
     result = _result(study, part, values, threads)
@@ -197,7 +197,7 @@ def compute_chunk(study: Study, number: int, threads: int | None) -> tuple[Finis
 
 
 def _columns_of_runs(study: Study, part: Chunk, values: dict[str, Floats]) -> dict[str, TableColumn]:
-    """Return the columns of run number, configuration and varied values; nan for a path that does not vary here."""
+    """Return the columns of run number, configuration and varied values; nan for a path fixed in the configuration."""
     configuration = study.configurations[part.configuration]
     first = part.configuration * study.runs_of_configuration + part.first
     numbers = np.arange(first, first + part.runs, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Code generator for C99 that is also valid C++, from the typed functions of a composed module.
+"""Code generator for C99 that is also valid C++, for the typed functions of a composed module.
 
 Each Python function becomes one C function with the same name and docstring; rows become structs passed by value. The
 generated code has no heap, no mutable globals and no recursion. The only library functions are ``sqrt`` and ``fabs``,
@@ -38,7 +38,7 @@ from ppafo.translation.walk import walk_module
 
 WIDTH = 118
 TIED = "\N{NO-BREAK SPACE}"
-"""Non-breaking separator between two words that must stay on one line."""
+"""Non-breaking space between two words of generated code that must stay on one line."""
 
 _SCALARS = {"bool": "bool", "int": "int64_t", "float": "double", "int16": "int16_t", "int32": "int32_t"}
 _PART = f"""
@@ -51,11 +51,11 @@ PPAFO_INLINE ppafo_array {PART}(ppafo_array whole, int64_t first, int64_t beyond
 }}
 """
 LANE = "lane"
-"""Name of loop variables whose iterations are independent; the compiler is told so."""
+"""Name of a loop variable with independent iterations, for which a compiler pragma is emitted."""
 
 
 def program_source(program: Program) -> str:
-    """Return the C translation unit of a program; its function ``advance`` advances one block of runs.
+    """Return the C translation unit of a program; its function ``advance`` advances a block of runs.
 
     Raises ProgramError, with file and line, for code outside the supported subset of Python.
     """
@@ -96,7 +96,7 @@ def c_source(
     prelude: str = "prelude.h",
     reading: ReadableUnit | None = None,
 ) -> str:
-    """Return the C translation unit with all functions of a module; shorter if ``reading`` is given.
+    """Return the C translation unit of a module; with ``reading``, in short human-readable form.
 
     ``documents`` has the docstrings of rows and functions. ``places`` has names for the first indices of some arrays,
     which the surrounding file defines; the key ``x`` applies to all functions, ``advance.x`` to one. ``prelude`` is the
@@ -136,7 +136,7 @@ _DEFINES = re.compile(r"(?:^|\s|\*)(ppafo_\w+)\(|\} (ppafo_\w+);|#define (PPAFO_
 
 
 def _prelude_for(prelude: str, used: str) -> str:
-    """Return the parts of a prelude that the following code uses."""
+    """Return the parts of a prelude that generated code uses."""
     kept: list[str] = []
     # From the end, so that a part which only a later part uses is kept with it.
     for part in reversed(prelude.split("\n\n")):
@@ -149,7 +149,7 @@ def _prelude_for(prelude: str, used: str) -> str:
 
 
 def _comment(text: str, further: Iterable[str] = ()) -> str:
-    """Return a C block comment with the lines of ``text`` and ``further``."""
+    """Return a C block comment with the lines of ``text`` and further lines."""
     # A docstring may contain the end of a C comment.
     lines = [line.rstrip() for line in text.replace("*/", "* /").replace("/*", "/ *").strip().splitlines()] + list(
         further
@@ -159,7 +159,7 @@ def _comment(text: str, further: Iterable[str] = ()) -> str:
 
 @dataclass(slots=True)
 class _Writer:
-    """State of the code generator: structs by type; ``outer`` has the names of functions, finally also of structs."""
+    """State of the code generator for a translation unit: struct names by type, and used names."""
 
     documents: Mapping[str, str]
     outer: set[str]
@@ -173,7 +173,7 @@ class _Writer:
     owner: str = ""
 
     def type_name(self, kind: Type) -> str:
-        """C name of a type; a struct is declared at its first use."""
+        """Return the C name of a type; a struct is declared at its first use."""
         if isinstance(kind, Scalar):
             return _SCALARS[kind.name]
         if isinstance(kind, Array):
@@ -197,7 +197,7 @@ class _Writer:
         return self.names[kind]
 
     def struct_name(self, kind: Items | Row) -> str:
-        """Preferred C name of a struct."""
+        """Return the preferred C name of a struct."""
         if isinstance(kind, Row):
             return kind.name if self.reading is None else self.reading.names.get(kind.name, kind.name)
         if kind.is_uniform:
@@ -206,7 +206,7 @@ class _Writer:
         return f"{owner}_result"
 
     def written_struct(self, kind: Items | Row) -> list[str]:
-        """Declaration of a struct with its constructor function; readable units omit uncalled constructors."""
+        """Return the declaration of a struct with its constructor function; readable units omit unused constructors."""
         name = self.names[kind]
         if isinstance(kind, Items) and kind.is_uniform:
             inner, count = self.type_name(kind.types[0]), len(kind.types)
@@ -243,7 +243,7 @@ class _Writer:
         return ["\n".join([*struct, *head, *body])]
 
     def function(self, function: Function) -> str:
-        """C text of a function, with its comment."""
+        """Return the C code of a function, with its comment."""
         self.owner = function.source
         writer = _Body(self, function, scopes_of(function))
         # An unused parameter is a warning, and warnings are errors where people read the export.
@@ -268,7 +268,7 @@ class _Writer:
 
 
 class _Body:
-    """Writer of the lines of one function body."""
+    """Code generator for a function body."""
 
     def __init__(self, writer: _Writer, function: Function, scopes: Scopes) -> None:
         self.writer = writer
@@ -281,14 +281,14 @@ class _Body:
         self.used: set[str] = set()
 
     def name(self, name: str) -> str:
-        """C name of a local variable, unique in the function and distinct from all names of the file."""
+        """Return the C name of a local variable, unique in the function and among all names of the file."""
         if name not in self.written:
             self.written[name] = c_name(name, self.kinds, self.writer.outer)
             self.used.add(self.written[name])
         return self.written[name]
 
     def block(self, body: tuple[Statement, ...], level: int) -> list[str]:
-        """Lines of a block of statements, preceded by the declarations that they need."""
+        """Return the lines of a block of statements, preceded by the declarations that it needs."""
         lines: list[str] = []
         for name in self.scopes.before.get(id(body), []):
             kind = self.kinds[name]
@@ -384,7 +384,7 @@ class _Body:
 
 
 def _wrapped(line: str, further: str = "    ") -> list[str]:
-    """Split a line of C code into lines within the length limit."""
+    """Wrap a line of C code at the length limit."""
     if len(line) <= WIDTH:
         return [line.replace(TIED, " ")]
     margin = line[: len(line) - len(line.lstrip())]

@@ -47,15 +47,15 @@ _OF_HEADERS = frozenset(
     )
     for word in line.split()
 )
-"""Names of functions in C headers and in the surrounding files, which no function of a module may have."""
+"""Function names in C headers and surrounding files, not available to functions of a module."""
 _MACRO = re.compile(
     r"(_[A-Z_]|(PPAFO|ppafo|DBL|FLT|LDBL|FP|MATH|M|INT|UINT|INTMAX|UINTMAX|SIZE|PTRDIFF|WCHAR|WINT|SIG|INT\d+|UINT\d+)_)"
 )
-"""Prefixes of names that headers or compilers reserve."""
+"""Prefixes of names reserved by headers or compilers."""
 _WORDS = {"and": "&&", "or": "||"}
 _LEVELS = {"or": 2, "and": 3, **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 5), "+": 8, "-": 8, "*": 9, "/": 9}
 PART = "ppafo_part"
-"""C name of the function that returns a slice of an array along the first index."""
+"""C name of the helper function that slices an array along the first index."""
 # Levels of precedence of C, as far as terms have them.
 _CHOICE, _SIGN, _ATOM = 1, 10, 11
 _ARITHMETIC = frozenset({"+", "-", "*", "&", "|", "^", ">>", "min", "max", "choice", "negative"})
@@ -72,7 +72,7 @@ _OF_C = {"sqrt": "sqrt", "abs": "fabs", **{name: name for name in LIBRARY}}
 
 
 def c_name(name: str, others: Collection[str] = (), outer: Collection[str] = ()) -> str:
-    """Valid C identifier for a Python name, distinct from C keywords, from ``others`` and from names in ``outer``."""
+    """Return a valid C identifier for a Python name, different from C keywords, ``others`` and ``outer``."""
     written = name
     # Python allows a final underscore on any name, so one more always ends at a free name.
     while written in _RESERVED or _MACRO.match(written) or written in outer or (written != name and written in others):
@@ -81,12 +81,12 @@ def c_name(name: str, others: Collection[str] = (), outer: Collection[str] = ())
 
 
 def is_free(name: str) -> bool:
-    """Return whether a name is used neither by C nor by its headers."""
+    """Return whether neither C nor its headers use a name."""
     return c_name(name) == name and name not in _OF_HEADERS
 
 
 def member_name(kind: Row, name: str) -> str:
-    """Name of the struct member for a field of a row."""
+    """Return the name of the struct member for a field of a row."""
     return c_name(name, [own for own, _ in kind.fields])
 
 
@@ -106,7 +106,7 @@ class CTerms:
     note_constructed: Callable[[Type], None]
 
     def term(self, term: Term, least: int = 0) -> str:
-        """Text of a term, in parentheses if the surrounding operator binds more tightly than ``least``."""
+        """Return the C expression of a term, in parentheses if it binds less tightly than ``least``."""
         text, level = self.text_and_level(term)
         # An int of 32 bits would carry digits that the small processor does not have.
         if term.type == INT16 and term.kind in _ARITHMETIC:
@@ -115,7 +115,7 @@ class CTerms:
         return f"({text})" if level < least else text
 
     def text_and_level(self, term: Term) -> tuple[str, int]:
-        """Text of a term in C, and the precedence level of the text."""
+        """Return the C expression of a term, and its precedence level."""
         match term.kind:
             case "number":
                 return self.number(term)
@@ -131,7 +131,7 @@ class CTerms:
         return (text, _ATOM) if text else self.operation(term)
 
     def storage(self, term: Term) -> str:
-        """Text of a name, or of an element of a row, tuple or array; empty for any other term."""
+        """Return the C expression of a name, or of an element of a row, tuple or array; else empty."""
         match term.kind:
             case "name":
                 text = self.name(term.detail)
@@ -156,7 +156,7 @@ class CTerms:
         return text
 
     def element(self, term: Term) -> str:
-        """Text of an array element, whose first index may have a name."""
+        """Return the C expression of an array element, whose first index may have a name."""
         owner, first, *further = term.parts
         assert isinstance(owner.type, Array)
         name, names = self.name(owner.detail), self.index_names.get(owner.detail, ())
@@ -172,7 +172,7 @@ class CTerms:
         return f"{name}.values[{index}]"
 
     def call(self, term: Term) -> str:
-        """Text of a call of a function of the module, the prelude or the C library; empty for any other term."""
+        """Return the C call of a function of the module, the prelude or the C library; else empty."""
         if term.kind in ("min", "max") and term.type in (INT, INT16, INT32):
             # The second operand first, as Python's min and max have it for equal numbers.
             first, second = (self.term(part, 6) for part in term.parts)
@@ -200,7 +200,7 @@ class CTerms:
         return f"{function}({', '.join(arguments)})"
 
     def operation(self, term: Term) -> tuple[str, int]:
-        """Text of a binary operation, and its precedence level."""
+        """Return the C expression of a binary operation, and its precedence level."""
         # Operators that many misread get brackets around their operands, sums and products only where they need them.
         level = _LEVELS.get(term.kind, 0)
         inner = level if level >= _LEVELS["+"] else _LEVELS["+"] if level else _SIGN
@@ -211,7 +211,7 @@ class CTerms:
         return f"{left} {_WORDS.get(term.kind, term.kind)} {right}", level or _CHOICE
 
     def number(self, term: Term) -> tuple[str, int]:
-        """Text of a numeric literal, and its precedence level."""
+        """Return the C literal of a number, and its precedence level."""
         value = term.detail
         if term.type == BOOL:
             return ("true" if value else "false"), _ATOM
@@ -229,7 +229,7 @@ class CTerms:
         return repr(float(value)), _ATOM if math.copysign(1.0, value) > 0.0 else _SIGN
 
     def listed(self, term: Term) -> str:
-        """Text of a brace-enclosed initialiser for a struct or tuple, with nested braces for inner structs."""
+        """Return a brace-enclosed initialiser of a struct or tuple, with nested braces for inner structs."""
         if term.kind != "build":
             return self.term(term)
         text = ", ".join(self.listed(part) for part in term.parts if not is_empty(part.type))
@@ -237,7 +237,7 @@ class CTerms:
         return f"{{{{{text}}}}}" if is_array else f"{{{text}}}"
 
     def conversion(self, term: Term) -> tuple[str, int]:
-        """Text of a type conversion, and its precedence level."""
+        """Return the C expression of a type conversion, and its precedence level."""
         source = term.parts[0]
         if term.type in (INT16, INT32):
             text = f"({self.term(source, _CHOICE + 1)} ? 1 : 0)" if source.type == BOOL else self.term(source, _SIGN)

@@ -1,4 +1,4 @@
-"""Call of a C compiler: its arguments, its time limit, and its message if it fails.
+"""Subprocess call of a C compiler: arguments, time limit, and error message.
 
 Loading a cached program does not import this module.
 """
@@ -18,9 +18,9 @@ from ppafo.errors import SimulationError
 from ppafo.wording import one_line, reason
 
 LONGEST_COMPILING = 300.0
-"""Time limit of a compilation [s], after which the compiler is stopped; the longest program takes a tenth of it."""
+"""Time limit of a compilation [s]; the longest program takes a tenth of it."""
 LONGEST_ANSWER = 10.0
-"""Time limit [s] for a compiler to report its version."""
+"""Time limit of a compiler's version report [s]."""
 # Between two looks at an interrupt while a compiler runs [s].
 _PAUSE = 0.25
 
@@ -32,11 +32,11 @@ def asked(
     scratch: Path | None = None,
     limit: float | None = None,
 ) -> "subprocess.CompletedProcess[str]":
-    """Return output and exit status of a compiler run in ``folder``; CompilerError, with a remedy, if it cannot be run.
+    """Run a compiler in ``folder``; return its output and exit status. Raises CompilerError if it cannot be run.
 
     ``scratch`` is the folder for temporary files, which remain there if the compiler is killed. A compiler that runs
     longer than ``limit`` [s] (``LONGEST_COMPILING`` by default) is stopped with its child processes, and raises
-    CompilerError.
+    CompilerError, with ``remedy``.
     """
     # A compiler that is killed leaves its files here, where the whole folder goes away.
     temporary = {} if scratch is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))
@@ -82,7 +82,7 @@ def asked(
 
 
 def complaint(done: "subprocess.CompletedProcess[str]") -> str:
-    """Return the line of the compiler output that states the error, or the exit status if there is no output."""
+    """Return the output line of a compiler that states the error, or the exit status without output."""
     # gcc and clang say it on stderr, some wrappers on stdout.
     lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it returned {done.returncode}"]
     return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
@@ -98,11 +98,11 @@ _PASSING = (
     "killed signal",
     "cache directory",
 )
-"""Fragments of compiler messages about a temporary lack of resources, in lower case."""
+"""Fragments of compiler messages, in lower case, that mean a temporary lack of resources."""
 
 
 def compile_library(source: str, library: Path, command: Sequence[str], flags: Sequence[str]) -> None:
-    """Compile C source text into a shared library; CompilerError if the compilation fails."""
+    """Compile C source text into a shared library. Raises CompilerError if that fails."""
     folder = library.parent
     # Windows has no mounts without execution, nor the flag.
     if hasattr(os, "ST_NOEXEC") and os.statvfs(folder).f_flag & os.ST_NOEXEC:

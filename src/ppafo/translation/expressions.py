@@ -1,4 +1,4 @@
-"""Type inference for the expressions of a function in a composed module: a typed term for each expression.
+"""Type inference for expressions of a composed module: a typed term for each expression.
 
 Code outside the subset is refused with the file and line of its source.
 """
@@ -39,7 +39,7 @@ SIGN_OF: dict[type[ast.AST], str] = {
 }
 CONSTANTS = {"inf": math.inf, "nan": math.nan, "pi": math.pi}
 EXACT = 2**53
-"""Largest magnitude up to which a float represents every integer."""
+"""Largest magnitude up to which floats represent every integer."""
 INTEGER_OPERATORS = frozenset({"&", "|", "^", ">>"})
 _REMEDIES = {
     "exp": ", because its last bits differ between computers; for exp(-rate * step) use decay_factors(rate, step) of "
@@ -47,12 +47,12 @@ _REMEDIES = {
     "log": ", because its last bits differ between computers; use logarithm(number) of ppafo.model.elementary",
     "pow": ", because its last bits differ between computers; use power(base, exponent) of ppafo.model.elementary",
 }
-"""Replacement for a function of a library, if the package has one."""
+"""Remedy for an unsupported library function, if the package has a replacement."""
 
 
 @dataclass(frozen=True, slots=True)
 class Expressions:
-    """Type inference for the expressions of one function.
+    """Type inference for the expressions of a function.
 
     ``types`` has the types of local names, ``counters`` names that only count up from 0, ``rows`` the fields of each
     row class, ``definitions`` the functions of the module, and ``library`` the C library functions that may be called.
@@ -77,7 +77,7 @@ class Expressions:
         return handler(node)
 
     def scalar(self, node: ast.expr, least: Scalar = BOOL) -> Term:
-        """Return the term of an expression that must be a single number, in type ``least`` or a wider one."""
+        """Return the term of an expression that must be a number, converted at least to type ``least``."""
         term = self.term(node)
         if not isinstance(term.type, Scalar):
             raise self.refused(node, f"'{ast.unparse(node)}' must be a single number")
@@ -100,7 +100,7 @@ class Expressions:
         return term if term.type == BOOL else Term("!=", BOOL, (term, converted(Term("number", INT, (), 0), term.type)))
 
     def literal_slice(self, node: ast.expr) -> slice:
-        """Return the slice of a tuple, whose bounds must be literals."""
+        """Return the slice of a tuple index, whose bounds must be literals."""
         if not isinstance(node, ast.Slice) or node.step is not None:
             raise self.refused(node, f"the index '{ast.unparse(node)}' must be a slice without a step, such as 1:3")
         return slice(*(None if bound is None else self.literal(bound) for bound in (node.lower, node.upper)))
@@ -176,7 +176,7 @@ class Expressions:
         return Term("item", owner.type.types[0], (owner, self.from_start(index, Term("number", INT, (), count))))
 
     def element(self, owner: Term, kind: Array, node: ast.Subscript) -> Term:
-        """Return the term of an array element with all its indices, or of a slice along the first index."""
+        """Return the term of an array element with all indices, or of a slice along the first index."""
         if owner.kind != "name":
             raise self.refused(node, f"'{ast.unparse(node)}' indexes an expression; assign the array to a name first")
         if isinstance(node.slice, ast.Slice):
@@ -199,7 +199,7 @@ class Expressions:
         return Term("element", FLOAT, (owner, *terms))
 
     def from_start(self, index: Term, count: Term) -> Term:
-        """Return an index counted from the start, because Python counts negative indices from the end."""
+        """Return an index counted from the start, since negative Python indices count from the end."""
         if self.is_from_zero(index):
             return index
         is_negative = Term("<", BOOL, (index, Term("number", INT, (), 0)))
@@ -293,7 +293,7 @@ class Expressions:
         return made
 
     def is_exact(self, term: Term) -> bool:
-        """Return whether a float represents the term exactly: a float, truth value, small literal or loop counter."""
+        """Return whether a float represents a term exactly: float, flag, small literal or loop counter."""
         number = _literal(term)
         if term.type == FLOAT or number is not None:
             return number is None or abs(number) <= EXACT
@@ -314,7 +314,7 @@ class Expressions:
         return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
 
     def name_called(self, node: ast.Call) -> str:
-        """Return the name of the called function, with functions passed as arguments resolved."""
+        """Return the name of a called function; a function argument is replaced by the function passed."""
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if any(isinstance(argument, ast.Starred) for argument in node.args):
             raise self.refused(node, f"'{ast.unparse(node)}' expands a tuple into arguments; pass each argument")
@@ -339,7 +339,7 @@ class Expressions:
         return self.built_in(name, node)
 
     def called(self, name: str, node: ast.Call) -> tuple[Function, tuple[Term, ...]]:
-        """Return the called function of the module and the arguments passed to the function."""
+        """Return the called function of the module, with its arguments."""
         definition = self.definitions[name]
         takes = definition.args
         names = [argument.arg for argument in (*takes.posonlyargs, *takes.args, *takes.kwonlyargs)]
@@ -366,7 +366,7 @@ class Expressions:
         return self.made(name, types), tuple(values[name] for name in names if not is_empty(values[name].type))
 
     def built_in(self, name: str, node: ast.Call) -> Term:
-        """Return the term of a call of a function available in every language."""
+        """Return the term of a call to a built-in function of every target language."""
         function = name.removeprefix("math.")
         least = FLOAT if function in LIBRARY | {"sqrt", "float"} else INT
         known = FUNCTIONS | {"float", "int", "bool", "len"} | (self.library - {"pow"})
@@ -399,7 +399,7 @@ class Expressions:
 
 
 def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
-    """Join truth values by ``and`` or ``or``."""
+    """Join boolean terms by ``and`` or ``or``."""
     made = parts[0]
     for part in parts[1:]:
         made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
@@ -407,7 +407,7 @@ def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
 
 
 def kind_of(kind: Type) -> str:
-    """Return the description of a type used in messages."""
+    """Return the description of a type for messages."""
     if isinstance(kind, Scalar):
         return "a number"
     if isinstance(kind, Row):

@@ -25,34 +25,32 @@ FOR_GCC = (
     *("--param", "sra-max-scalarization-size-Ospeed=4096"),
     *("-fira-region=one", "--param", "max-combine-insns=2"),
 )
-"""Flags with which gcc vectorises loops over runs. Without the first four, gcc turns conditional expressions into
-jumps. The last two save a third of the time and two thirds of the memory for the largest programs. No flag changes
-results.
-"""
+"""Flags for gcc to vectorise loops over runs. The first four keep conditional expressions from becoming jumps. The
+last two save a third of the time and two thirds of the memory for the largest programs. No flag changes results."""
 _LIBRARY_AS_IT_RUNS = tuple(f"-fno-builtin-{name}" for name in sorted(LIBRARY))
-"""Flags that disable constant folding of library calls, whose last bits may differ from the run-time library."""
+"""Flags against constant folding of library calls, whose last bits may differ from the run-time library."""
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
-"""Flag of gcc and clang that selects the present processor; x86 and other architectures use different flags."""
+"""Flag of gcc and clang for the present processor; x86 and other architectures differ."""
 _WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("-march") else ()
 LIBRARY_FILE = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
-"""File name of a compiled library on this operating system; the library is stored next to its composed text."""
+"""File name of a compiled library on this operating system, next to its composed text."""
 
 
 @dataclass(frozen=True, slots=True)
 class CCompiler:
-    """C compiler of this computer, with the interface that the engine expects: name, command line and optimisation."""
+    """C compiler of this computer, with the compiler interface of the engine."""
 
     name: str
     command: tuple[str, ...]
     effort: Effort = Effort.FULL
 
     def with_effort(self, effort: Effort) -> "CCompiler":
-        """Return the same compiler with another optimisation of its programs."""
+        """Return the same compiler with another optimisation level."""
         return replace(self, effort=effort)
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """Flags for reproducible arithmetic and for the present processor."""
+        """Compiler flags for reproducible arithmetic and the present processor."""
         return (
             *FLAGS,
             self.effort.value,
@@ -63,11 +61,11 @@ class CCompiler:
         )
 
     def identity(self) -> str:
-        """Identity of the compiler file, its flags, the processor features and the translator."""
+        """Return the identity of compiler file, flags, processor features and translator, for cache keys."""
         return repr((_file_identity(self.command[0]), self.flags, described_processor(), translator_hash()))
 
     def described(self) -> str:
-        """Name and version of the compiler, as reported by the compiler."""
+        """Return name and version of the compiler, as it reports them."""
         from ppafo.translation.compiling import LONGEST_ANSWER, asked  # a run asks no compiler
 
         try:
@@ -78,7 +76,7 @@ class CCompiler:
         return f"C by {self.name}: {version}" if version else f"C by {self.name}"
 
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
-        """Compile a composed text through C; the library is kept next to ``path`` if ``path`` is absolute."""
+        """Compile composed text through C into a module; the library is kept next to an absolute ``path``."""
         # Most programs are there: they are loaded without the translator.
         from ppafo.translation.compiling import compile_library
         from ppafo.translation.native_source import translated_text
@@ -99,12 +97,12 @@ class CCompiler:
             raise CompilerError(problem, passing=True) from error
 
     def run_text(self, source: str, path: str, module: ModuleType) -> None:
-        """Load the library next to ``path`` and fill the module with its entries."""
+        """Load the library next to ``path`` and add its entries to the module."""
         fill_module(module, Path(path).with_name(LIBRARY_FILE), parameters_of(source))
 
 
 def compiler(name: str) -> CCompiler:
-    """Return the C compiler ``gcc``, ``clang`` or ``zig``; SimulationError if the compiler is not installed."""
+    """Return the C compiler ``gcc``, ``clang`` or ``zig``. Raises SimulationError if it is not installed."""
     command = _command(name)
     if not command:
         raise SimulationError(f"PPAFO_BACKEND={name}: '{name}' is not on this computer: {HOW_TO_INSTALL}; {WITHOUT_C}")
@@ -112,7 +110,7 @@ def compiler(name: str) -> CCompiler:
 
 
 def _command(name: str) -> tuple[str, ...]:
-    """Return the command line of a compiler; empty if the compiler is not installed."""
+    """Return the command line of a compiler; empty if not installed."""
     found = which(name)
     if name != "zig":
         return (found,) if found else ()
@@ -125,7 +123,7 @@ def _command(name: str) -> tuple[str, ...]:
 
 @cache
 def _file_identity(command: str) -> tuple[str, int, int]:
-    """Path, size and modification time of a compiler file, which change in an update; no process is started."""
+    """Return path, size and modification time of a compiler file, which change in an update."""
     file = Path(command).resolve()
     try:
         status = file.stat()
@@ -148,7 +146,7 @@ def described_processor() -> str:
 
 @cache
 def translator_hash() -> str:
-    """Return the hash of the translator sources, because another version may translate the same text differently."""
+    """Return the hash of the translator sources, a part of cache keys."""
     digest = hashlib.sha256()
     # Sorted: folders list their files in no order.
     for file in sorted(Path(__file__).parent.iterdir()):

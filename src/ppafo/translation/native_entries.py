@@ -1,4 +1,4 @@
-"""Entries of a compiled C library, called like the Python functions of the composed text.
+"""Entries of a compiled C library, with the interface of the Python functions of the composed text.
 
 Passing an array to C costs Python about a microsecond, passing a number a twentieth of a microsecond. The arrays of an
 entry are therefore packed into one block of memory, only once if the arrays stay the same.
@@ -21,19 +21,19 @@ from ppafo.engine.entries import FLOAT, INT, entry_types
 from ppafo.wording import one_line
 
 PACKED = "_packed"
-"""Suffix of the name of an entry that takes its arrays in one block (``ppafo_array``, ``prelude.h``)."""
+"""Name suffix of a library entry that takes its arrays in one block (``ppafo_array``, ``prelude.h``)."""
 ROUNDS_AS_WRITTEN = "ppafo_rounds_as_written"
-"""Name of a function in every library that returns 1 if each operation is rounded separately."""
+"""Name of the library function that returns 1 if every operation is rounded separately."""
 _NO_FLOATS, _FLOATS = ctypes.c_double * 0, np.dtype(np.float64)
 _NUMBERS: dict[str, Any] = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
 
 
 Parameters: TypeAlias = tuple[tuple[int, ...], tuple[str, ...]]
-"""Parameters of an entry: number of dimensions of each array, followed by the types of the numbers."""
+"""Parameters of a library entry: dimensions of each array, then types of the numbers."""
 
 
 def parameters_of(source: str) -> dict[str, Parameters]:
-    """Return the parameters of each entry of a composed text, by its name."""
+    """Return the parameters of each entry of a composed text, by name."""
     return {
         name: (
             # "float64[:, ::1]": the last index runs quickest.
@@ -46,7 +46,7 @@ def parameters_of(source: str) -> dict[str, Parameters]:
 
 @dataclass(frozen=True, slots=True)
 class NativeEntry:
-    """Callable entry of a library, which takes arrays followed by numbers.
+    """Callable entry of a library, with arrays followed by numbers as arguments.
 
     ``function`` takes all arrays packed into one block; ``dimensions`` has the number of dimensions of each array, and
     ``layout`` is the binary layout of the ``ppafo_array`` structs in the block.
@@ -62,7 +62,7 @@ class NativeEntry:
         self.function(self._packed(arguments[:count]), *arguments[count:])
 
     def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
-        """Return the entry as a function of its numbers alone, bound to these arrays.
+        """Return the entry bound to these arrays, as a function of its numbers.
 
         Raises TypeError for arrays that C would misread: wrong data type, wrong number of dimensions, or not
         contiguous.

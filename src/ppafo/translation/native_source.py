@@ -1,4 +1,4 @@
-"""C source of a composed text as a shared library: exported entries, and a test for separate rounding of operations.
+"""C source of a shared library from composed text: exported entries, and a test of separate rounding.
 
 Loading a cached program does not import this module.
 """
@@ -27,19 +27,19 @@ int {ROUNDS_AS_WRITTEN}(double a, double b, double c, double d)
     return a * b + c == 0.0 && (b + d) - b == 0.0;
 }}
 """
-"""C function that returns 1 if each operation is rounded separately.
+"""C source of the function that returns 1 if every operation is rounded separately.
 
 Fused or reordered operations leave a remainder for the arguments in ``fill_module``.
 """
 
 
 def translated_text(source: str) -> str:
-    """Return the C translation of a composed text; ProgramError if it cannot be translated."""
+    """Translate composed text to C. Raises ProgramError if that is not possible."""
     return with_packed_entries(c_source(walk_module(source, library=LIBRARY), {}, _TITLE), parameters_of(source))
 
 
 def with_packed_entries(source: str, parameters: Mapping[str, Parameters]) -> str:
-    """Return a translation unit that exports only its entries, which take their arrays in one block.
+    """Return a translation unit whose only exports are its entries, with arrays in one block.
 
     All other functions are static. An exported function ``advance`` would conflict with the function of this name in
     the GNU C library.

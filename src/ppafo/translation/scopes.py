@@ -1,4 +1,4 @@
-"""Removal of unused assignments in a function, and the innermost scope in which each local name is declared."""
+"""Scopes of local names: removal of unused assignments, innermost block of each declaration."""
 
 import ast
 from collections.abc import Iterable, Iterator
@@ -13,7 +13,7 @@ Block = tuple[Statement, ...]
 
 @dataclass(slots=True)
 class Scopes:
-    """Analysis of the local names of a function: use, types and place of declaration.
+    """Analysis of the local names of a function: uses, types and declarations.
 
     ``read`` are names that are read at all, ``types`` the types of assigned names. ``before`` has the names declared at
     the start of a block, ``first`` the keyword of statements that declare a name with their assignment, ``counted`` the
@@ -32,7 +32,7 @@ class Scopes:
     changes: dict[int, dict[str, int]] = field(default_factory=dict)
 
     def look(self, body: Block) -> tuple[set[str], dict[str, int]]:
-        """Record the names that each statement mentions, and the number of assignments to each name in each block."""
+        """Record the names that each statement mentions, and the assignments to each name in each block."""
         every: set[str] = set()
         changes: dict[str, int] = {}
         for statement in body:
@@ -60,11 +60,11 @@ class Scopes:
         return every, changes
 
     def mentions(self, name: str, body: Block) -> Block:
-        """Statements of a block that mention a name, directly or in nested blocks."""
+        """Return the statements of a block that mention a name, directly or in nested blocks."""
         return tuple(statement for statement in body if name in self.inside[id(statement)])
 
     def place(self, name: str, body: Block) -> None:
-        """Declare a name in the innermost possible block that mentions the name."""
+        """Declare a name in the innermost block that contains all its mentions."""
         mentions = self.mentions(name, body)
         if isinstance(mentions[0], typed.LocalArray):
             return
@@ -81,7 +81,7 @@ class Scopes:
                 self.place(name, inner)
 
     def is_own(self, name: str, body: Block) -> bool:
-        """Return whether a block, or each nested block that mentions a name, assigns the name before reading it."""
+        """Return whether a block, or each nested block with a name, assigns the name before it reads it."""
         mentions = self.mentions(name, body)
         return _begins(mentions[0], name) or all(
             self.counts(name, statement)
@@ -93,7 +93,7 @@ class Scopes:
         )
 
     def counts(self, name: str, statement: Statement) -> bool:
-        """Return whether a statement is a counted loop over a name without other assignments to the name."""
+        """Return whether a statement is a counted loop over a name that is not assigned otherwise."""
         return (
             isinstance(statement, typed.CountedLoop)
             and statement.name == name
@@ -102,7 +102,7 @@ class Scopes:
         )
 
     def blocks(self, name: str, mentions: Block) -> list[Block]:
-        """Nested blocks of some statements that mention a name."""
+        """Return the nested blocks of statements that mention a name."""
         return [inner for statement in mentions for inner in _blocks(statement) if self.mentions(name, inner)]
 
 
@@ -139,7 +139,7 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
 
 
 def scopes_of(function: Function) -> Scopes:
-    """Return the block in which each local name of a function is declared."""
+    """Determine the block in which each local name of a function is declared."""
     scopes = Scopes()
     scopes.look(function.body)
     # In order of names: the order of a set changes from process to process, and an export has one text.
@@ -149,12 +149,12 @@ def scopes_of(function: Function) -> Scopes:
 
 
 def _begins(statement: Statement, name: str) -> bool:
-    """Return whether a statement assigns a name without reading the name."""
+    """Return whether a statement assigns a name without reading it."""
     return isinstance(statement, typed.Assign) and statement.name == name and name not in statement.value.reads
 
 
 def _made(statement: Statement) -> tuple[str, Type] | None:
-    """Return the name that a statement assigns, with its type; None if there is none."""
+    """Return the name assigned by a statement, with its type; None without assignment."""
     if isinstance(statement, typed.Assign):
         return statement.name, statement.value.type
     if isinstance(statement, typed.LocalArray):
@@ -163,14 +163,14 @@ def _made(statement: Statement) -> tuple[str, Type] | None:
 
 
 def _blocks(statement: Statement) -> list[Block]:
-    """Nested blocks of a statement."""
+    """Return the nested blocks of a statement."""
     if isinstance(statement, typed.If):
         return [statement.body, statement.otherwise]
     return [statement.body] if isinstance(statement, typed.CountedLoop | typed.While) else []
 
 
 def _names_of(statement: Statement) -> frozenset[str]:
-    """Names that a statement itself reads, without nested blocks."""
+    """Return the names read by a statement itself, without nested blocks."""
     terms: tuple[Term, ...] = ()
     if isinstance(statement, typed.Assign | typed.Return):
         terms = (statement.value,)
@@ -187,7 +187,7 @@ def _names_of(statement: Statement) -> frozenset[str]:
 
 @dataclass(frozen=True, slots=True)
 class ScopeNames:
-    """Names in a function definition, determined once: all names, names that are read, and pure loop counters."""
+    """Names in a function definition: all names, names that are read, and pure loop counters."""
 
     every: frozenset[str]
     read: frozenset[str]
@@ -210,7 +210,7 @@ class ScopeNames:
 
 
 def changed(body: Iterable[ast.stmt]) -> set[str]:
-    """Return the names that some statements assign."""
+    """Return the names assigned by statements, including nested blocks."""
     names: set[str] = set()
     for statement in body:
         targets: list[ast.expr] = []
@@ -227,7 +227,7 @@ def changed(body: Iterable[ast.stmt]) -> set[str]:
 
 
 def _nodes(definition: ast.FunctionDef) -> Iterator[ast.AST]:
-    """Yield names, arguments and loops of a definition, in a third of the time of ``ast.walk``."""
+    """Yield names, arguments and loops of a definition, faster than ``ast.walk``."""
     waiting: list[ast.AST] = [definition]
     while waiting:
         node = waiting.pop()
@@ -251,7 +251,7 @@ _WITH_PARTS = (ast.expr, ast.stmt, ast.arguments)
 
 
 def _counts_up(node: ast.For) -> bool:
-    """Return whether a loop runs over ``range`` with a literal start and step that are not negative."""
+    """Return whether a loop runs over ``range`` with non-negative literal start and step."""
     if not isinstance(node.iter, ast.Call) or ast.unparse(node.iter.func) != "range":
         return False
     bounds = node.iter.args

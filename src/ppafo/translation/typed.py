@@ -11,13 +11,13 @@ from typing import Any, NamedTuple, TypeAlias
 from ppafo.translation.value_types import FLOAT, Array, Items, Row, RowReference, Scalar, Type, types_in
 
 FUNCTIONS = frozenset({"abs", "min", "max", "sqrt"})
-"""Functions available in every language; functions of a C library may be added (``engine.compilers.LIBRARY``)."""
+"""Functions of every target language; functions of a C library may be added (``engine.compilers.LIBRARY``)."""
 _NONE: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
 class Term:
-    """Expression with its type. The ``kind`` of the term determines the meaning of ``parts`` and ``detail``.
+    """Typed expression; its ``kind`` determines the meaning of ``parts`` and ``detail``.
 
     - number and name: no parts; ``detail`` is the number or the local name.
     - field and item: the part is the row or tuple; ``detail`` is the field name or the item index.
@@ -36,7 +36,7 @@ class Term:
 
     @cached_property
     def reads(self) -> frozenset[str]:
-        """Local names whose values the expression uses."""
+        """Local names read by the expression."""
         # Gathered once: asked again and again while scopes are found.
         names = frozenset((self.detail,)) if self.kind == "name" else _NONE
         return names.union(*(part.reads for part in self.parts)) if self.parts else names
@@ -110,7 +110,7 @@ class Return:
 
 @dataclass(frozen=True, slots=True)
 class ProcedureCall:
-    """Call of a function that returns nothing and writes into arrays passed as arguments."""
+    """Call of a function without return value, which writes into its array arguments."""
 
     function: str
     given: tuple[Term, ...]
@@ -118,7 +118,7 @@ class ProcedureCall:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Comment in a translated text about the following lines."""
+    """Comment on the following lines of a translated text."""
 
     text: str
 
@@ -127,7 +127,7 @@ Statement: TypeAlias = Note | Assign | LocalArray | Store | If | CountedLoop | W
 
 
 class Parameter(NamedTuple):
-    """Parameter of a function; rows without numbers are omitted."""
+    """Parameter of a function; rows without numbers do not occur."""
 
     name: str
     type: Type
@@ -135,11 +135,11 @@ class Parameter(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """Function specialised for one combination of parameter types."""
+    """Function specialised for a combination of parameter types."""
 
     name: str
     source: str
-    """Name in the composed module, where the function is defined once for all types."""
+    """Name of the function in the composed module."""
     parameters: tuple[Parameter, ...]
     returns: Type | None
     """Type of the return value; None if the function returns nothing."""
@@ -151,7 +151,7 @@ class Function:
 
 
 Module: TypeAlias = list[Function]
-"""All functions of a translated text, each after the functions that it calls."""
+"""Functions of a translated text, each after the functions that it calls."""
 
 
 def converted(term: Term, kind: Type) -> Term:
@@ -168,7 +168,7 @@ def converted(term: Term, kind: Type) -> Term:
 
 
 def field_of(term: Term, name: str) -> Term:
-    """Return the term for a field of a row, by its name."""
+    """Return the term of a field of a row, by name."""
     row = term.type.row if isinstance(term.type, RowReference) else term.type
     assert isinstance(row, Row)
     # A field of a struct that is just made is the value it was made of: no struct need exist.
@@ -177,7 +177,7 @@ def field_of(term: Term, name: str) -> Term:
 
 
 def item_of(term: Term, index: int) -> Term:
-    """Return the term for an item of a row or of a tuple, by its index."""
+    """Return the term of an item of a row or tuple, by index."""
     if isinstance(term.type, Row):
         return field_of(term, term.type.fields[index][0])
     assert isinstance(term.type, Items)

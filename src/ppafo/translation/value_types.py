@@ -13,13 +13,13 @@ class Scalar:
 
 BOOL, INT, FLOAT = Scalar("bool"), Scalar("int"), Scalar("float")
 INT16, INT32 = Scalar("int16"), Scalar("int32")
-"""Integer types that ``widths`` assigns for small processors; type inference never produces them."""
+"""Integer types of small processors, assigned by ``widths`` only."""
 _ORDER = (BOOL, INT, FLOAT)
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """NamedTuple type, with the types of its fields at one place of use."""
+    """Type of a NamedTuple, with the types of its fields."""
 
     name: str
     fields: tuple[tuple[str, "Type"], ...]
@@ -39,7 +39,7 @@ class Items:
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """Array of floats; ``shape`` is () for an array passed as an argument, whose extents are known only at run time."""
+    """Type of a float array; ``shape`` is () for an argument, whose extents are known only at run time."""
 
     dimensions: int
     shape: tuple[int, ...] = ()
@@ -47,14 +47,14 @@ class Array:
 
 @dataclass(frozen=True, slots=True)
 class FunctionArgument:
-    """Function passed as an argument; the call is bound at translation."""
+    """Type of a function passed as an argument; the call is bound at translation."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class RowReference:
-    """Row passed by reference, so that assignments to its fields are visible to the caller."""
+    """Type of a row passed by reference, so that the caller sees assignments to its fields."""
 
     row: Row
 
@@ -68,12 +68,12 @@ def is_empty(kind: Type) -> bool:
 
 
 def types_in(kind: Items | Row) -> tuple[Type, ...]:
-    """Return the types of the items of a tuple or of the fields of a row."""
+    """Return the types of tuple items or row fields."""
     return kind.types if isinstance(kind, Items) else tuple(inner for _, inner in kind.fields)
 
 
 def joined(first: Type, other: Type) -> Type | None:
-    """Return the common type of two types, for instance where two branches meet; None if there is none."""
+    """Return the common type of two types, None if there is none."""
     if first == other:
         return first
     if isinstance(first, Scalar) and isinstance(other, Scalar):
@@ -91,7 +91,7 @@ def joined(first: Type, other: Type) -> Type | None:
 
 
 def mixes(first: Type, other: Type) -> bool:
-    """Return whether an integer or truth value meets a float, where -0 and large numbers would differ from Python."""
+    """Return whether an integer or boolean meets a float, where -0 and large numbers differ from Python."""
     if isinstance(first, Scalar) and isinstance(other, Scalar):
         return first != other and FLOAT in (first, other)
     if isinstance(first, Items | Row) and isinstance(other, Items | Row):

@@ -1,4 +1,4 @@
-"""Type inference for a composed module: types of all names, and typed statements for each line.
+"""Type inference for a composed module: types of all names, and typed statements.
 
 A function is analysed once for each combination of parameter types. A function passed as an argument counts as a type,
 so that the call is bound at translation. Code outside the subset is refused with the file and line of its source.
@@ -41,7 +41,7 @@ from ppafo.translation.value_types import (
 def walk_module(
     source: str, entries: Mapping[str, tuple[Type, ...]] | None = None, library: frozenset[str] = frozenset()
 ) -> Module:
-    """Return the typed functions that the entries of a composed module need. ProgramError for code outside the subset.
+    """Infer types for the functions that the entries of a module need. Raises ProgramError outside the subset.
 
     ``entries`` maps function names to parameter types; by default the functions that declare their types in a
     decorator. ``library`` has the functions of ``LIBRARY`` that may be called.
@@ -78,7 +78,7 @@ class _ModuleWalk:
     module: Module = field(default_factory=list)
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
-        """Return the function specialised for the given parameter types."""
+        """Return a function specialised for parameter types."""
         key = name, types
         if key not in self.done:
             definition = self.definitions[name]
@@ -97,7 +97,7 @@ class _ModuleWalk:
         return self.done[key]
 
     def refused(self, where: ast.AST, problem: str) -> ProgramError:
-        """Return the error for untranslatable code at a node, with file and line of the original source."""
+        """Return the error for untranslatable code, with file and line of the original source."""
         number = getattr(where, "lineno", 0)
         place = place_in(self.lines, number)
         problem = f"cannot be translated to C: {problem}"
@@ -106,7 +106,7 @@ class _ModuleWalk:
         return UntranslatableError(str(refusal(place.file, place.line, problem)))
 
     def mistaken(self, where: ast.AST, problem: str, sought: str = "") -> ProgramError:
-        """Return the error for invalid code at a node, with file and line of the source that contains ``sought``.
+        """Return the error for invalid code, with file and line of the source that contains ``sought``.
 
         In the problem text, ``{written}`` is replaced by the source line and ``{name}`` by the function name in this
         line.
@@ -122,13 +122,13 @@ class _ModuleWalk:
 
 
 def _as_written(problem: str, written: str) -> str:
-    """Insert the source line, and the name defined in this line, into the text of a problem."""
+    """Insert source line and function name into the text of a problem."""
     name = written.removeprefix("def ").partition("(")[0]
     return problem.replace("{written}", written).replace("{name}", name)
 
 
 class _FunctionWalk:
-    """Translation of one function for one combination of types; repeated if a name turns out to have a wider type."""
+    """Translation of a function for a combination of types, repeated while types of names widen."""
 
     def __init__(self, module: _ModuleWalk, definition: ast.FunctionDef) -> None:
         self.module = module
@@ -159,7 +159,7 @@ class _FunctionWalk:
         self.writes: ast.AST | None = None
 
     def walked(self, name: str, types: tuple[Type, ...]) -> Function:
-        """Return the function as typed statements."""
+        """Return the translated function with typed statements."""
         parameters = self.definition.args
         names = [argument.arg for argument in (*parameters.posonlyargs, *parameters.args, *parameters.kwonlyargs)]
         self.types.update(zip(names, types, strict=True))
@@ -334,7 +334,7 @@ class _FunctionWalk:
         return [typed.Store(element, converted(value, FLOAT))]
 
     def set_field(self, target: ast.Attribute, value: Term) -> Statement:
-        """Translate an assignment to a field of a row, which only texts written for translation contain."""
+        """Translate an assignment to a field of a row, as in text written for translation."""
         element = self.values.term(ast.copy_location(ast.Attribute(target.value, target.attr, ast.Load()), target))
         owner = element
         while owner.kind in ("field", "item"):
@@ -349,19 +349,19 @@ class _FunctionWalk:
         return typed.Store(element, converted(value, element.type))
 
     def assign(self, name: str, value: Term, node: ast.AST) -> Statement:
-        """Translate an assignment to a name, with the value converted to the inferred type of the name."""
+        """Translate an assignment to a name; the value is converted to the inferred type of the name."""
         self.note_type(name, value.type, node)
         return typed.Assign(name, converted(value, self.types[name]))
 
     def fresh(self, wanted: str, kind: Type) -> str:
-        """Return an unused local name for values of a given type."""
+        """Return an unused local name for values of a type."""
         while wanted in self.names or wanted in self.fresh_names or joined(self.types.get(wanted, kind), kind) is None:
             wanted += "_"
         self.fresh_names.add(wanted)
         return wanted
 
     def note_type(self, name: str, kind: Type, node: ast.AST) -> None:
-        """Widen the inferred type of a name as required by a new value."""
+        """Widen the inferred type of a name for a new value."""
         before = self.types.get(name, kind)
         joint = joined(before, kind)
         if joint is None:
@@ -374,7 +374,7 @@ class _FunctionWalk:
         self.types[name] = joint
 
     def assign_items(self, target: ast.Tuple, value: Term, node: ast.Assign) -> list[Statement]:
-        """Translate tuple unpacking: the right-hand side is evaluated completely before any target is assigned."""
+        """Translate tuple unpacking; the right-hand side is evaluated before any target is assigned."""
         names = [name.id for name in target.elts if isinstance(name, ast.Name)]
         is_stored = len(names) < len(target.elts)
         kind = value.type

@@ -1,4 +1,4 @@
-"""Integer widths of 16 and 32 bits for fixed-point code, verified by interval arithmetic over the input ranges.
+"""Integer widths of 16 and 32 bits for fixed-point code, by interval arithmetic over input ranges.
 
 Every function of a module is evaluated with the ranges of its arguments. The range of all values of a name, field or
 item determines its width. Values beyond 32 bits are refused, so that the remaining code cannot overflow.
@@ -18,14 +18,14 @@ MOST_TURNS = 64
 
 
 class IntegerRange(NamedTuple):
-    """Range of an integer, lowest and highest value included."""
+    """Range of an integer, with both ends included."""
 
     low: int
     high: int
 
 
 Range: TypeAlias = "IntegerRange | tuple[Range, ...]"
-"""Range of a number, or tuple of ranges for the fields of a row or the items of a tuple."""
+"""Range of a number, or ranges of row fields or tuple items."""
 Names: TypeAlias = "dict[str, Range]"
 
 TRUTH = IntegerRange(0, 1)
@@ -33,14 +33,14 @@ _WIDTHS = ((INT16, IntegerRange(-(2**15), 2**15 - 1)), (INT32, IntegerRange(-(2*
 
 
 class Narrowed(NamedTuple):
-    """Module with 16-bit and 32-bit integers, and the range of the return value of its entry."""
+    """Module with 16-bit and 32-bit integers, and the range of its return value."""
 
     module: Module
     returned: Range
 
 
 def narrowed(module: Module, given: Mapping[str, Range]) -> Narrowed:
-    """Return the module with integer widths for the given ranges of the parameters of its last function, by name.
+    """Assign integer widths to a module, given the parameter ranges of its last function by name.
 
     Raises ProgramError for values that may exceed 32 bits, and for operations other than sums, shifts, selections and
     products with a power of two.
@@ -53,7 +53,7 @@ def narrowed(module: Module, given: Mapping[str, Range]) -> Narrowed:
 
 
 def hull(first: Range, other: Range) -> Range:
-    """Return the smallest range that contains both ranges."""
+    """Return the smallest range that contains two ranges."""
     if isinstance(first, IntegerRange) and isinstance(other, IntegerRange):
         return IntegerRange(min(first.low, other.low), max(first.high, other.high))
     assert not isinstance(first, IntegerRange)
@@ -83,7 +83,7 @@ class _Ranges:
     returned: dict[str, Range] = field(default_factory=dict)
 
     def call(self, function: Function, arguments: tuple[Range, ...]) -> Range:
-        """Return the range of a function's return value for given ranges of its parameters."""
+        """Return the range of a function's return value, given the ranges of its parameters."""
         names: Names = {}
         for (name, kind), value in zip(function.parameters, arguments, strict=True):
             self.keep(function, names, name, kind, value)
@@ -103,7 +103,7 @@ class _Ranges:
         self.note(kind, value)
 
     def note(self, kind: Type, value: Range) -> None:
-        """Extend the ranges of a row or tuple type, because all values of one type share the same widths."""
+        """Extend the ranges of a row or tuple type, since all values of a type share widths."""
         if isinstance(kind, Row | Items):
             assert not isinstance(value, IntegerRange)
             self.parts[kind] = hull(self.parts.get(kind, value), value)
@@ -111,7 +111,7 @@ class _Ranges:
                 self.note(part, own)
 
     def run(self, function: Function, body: tuple[Statement, ...], names: Names, results: list[Range]) -> None:
-        """Evaluate statements: update the ranges of names and append the ranges of returned values."""
+        """Evaluate statements: update the ranges of names, append ranges of returned values."""
         for statement in body:
             if isinstance(statement, typed.Assign):
                 self.keep(
@@ -132,7 +132,7 @@ class _Ranges:
                 raise _refused(function, f"the statement '{type(statement).__name__.lower()}' is not supported")
 
     def count(self, function: Function, loop: typed.CountedLoop, names: Names, results: list[Range]) -> None:
-        """Evaluate a loop by iterations; afterwards, names have their ranges over all possible iteration counts."""
+        """Evaluate a loop by iterations; names then have their ranges over all possible counts."""
         start, stop = (self.value(function, part, names) for part in (loop.start, loop.stop))
         assert isinstance(start, IntegerRange)
         assert isinstance(stop, IntegerRange)
@@ -152,7 +152,7 @@ class _Ranges:
         names.update(after or {})
 
     def value(self, function: Function, term: Term, names: Names) -> Range:
-        """Return the range of a term, and extend the recorded range over all evaluations of the term."""
+        """Return the range of a term, and extend its range over all evaluations."""
         parts = tuple(self.value(function, part, names) for part in term.parts)
         if term.kind == "name":
             value = names[term.detail]
@@ -206,7 +206,7 @@ def _calculated(function: Function, term: Term, parts: list[IntegerRange]) -> In
 
 
 def _join(names: Names, other: Names) -> None:
-    """Merge the ranges of names where two branches meet; names assigned in only one branch are not read afterwards."""
+    """Merge the ranges of names of two branches; names assigned in one branch only are not read later."""
     for name, value in other.items():
         names[name] = hull(names.get(name, value), value)
 
@@ -216,13 +216,13 @@ def _refused(function: Function, problem: str) -> ProgramError:
 
 
 def _width(interval: IntegerRange) -> Scalar | None:
-    """Return the narrowest type that contains a range; None if 32 bits do not suffice."""
+    """Return the narrowest type for a range; None beyond 32 bits."""
     return next((kind for kind, own in _WIDTHS if own.low <= interval.low and interval.high <= own.high), None)
 
 
 @dataclass(frozen=True, slots=True)
 class _Narrowing:
-    """Rewriting of one function with integer widths."""
+    """Rewriting of a function with integer widths."""
 
     ranges: _Ranges
     item: Function
@@ -235,7 +235,7 @@ class _Narrowing:
         return replace(self.item, parameters=parameters, returns=returns, body=self.block(self.item.body, returns))
 
     def type_of(self, kind: Type, value: Range) -> Type:
-        """Return a type with the widths that a range of values needs."""
+        """Return a type with the widths required by a range of values."""
         if isinstance(kind, Row | Items):
             every = self.ranges.parts[kind]
             assert not isinstance(every, IntegerRange)
@@ -276,7 +276,7 @@ class _Narrowing:
         return tuple(made)
 
     def term(self, term: Term) -> Term:
-        """Return a term whose width contains its value and all intermediate results."""
+        """Return a term with the width of its value and intermediate results."""
         if term.kind == "call":
             callee = _Narrowing(self.ranges, self.ranges.functions[term.detail])
             wanted = [callee.of_name(*parameter) for parameter in callee.item.parameters]
@@ -298,7 +298,7 @@ class _Narrowing:
         return self.calculated(term, parts)
 
     def calculated(self, term: Term, parts: tuple[Term, ...]) -> Term:
-        """Return an arithmetic term in the widest type of its operands and its value."""
+        """Return an arithmetic term in the widest type of its operands and value."""
         own = self.type_of(term.type, self.ranges.terms[id(term)]) if isinstance(term.type, Scalar) else term.type
         if term.kind == "number" or (term.kind == "convert" and parts[0].type == BOOL):
             return replace(term, type=own, parts=parts)
@@ -319,7 +319,7 @@ class _Narrowing:
 
 
 def converted(term: Term, kind: Type) -> Term:
-    """Return a term converted to another width that is proven to contain its value."""
+    """Convert a term to another width, which is proven to contain its value."""
     if term.type == kind:
         return term
     return replace(term, type=kind) if term.kind == "number" else Term("convert", kind, (term,))

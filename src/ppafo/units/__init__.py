@@ -1,4 +1,4 @@
-"""Conversion of units at the interface: text with units in, SI floats out, and back.
+"""Units at the interface of the package: text with units to SI floats, and back.
 
 Inside the package all floats are SI.
 

@@ -1,4 +1,4 @@
-"""Conversion between texts with a unit and SI floats."""
+"""Conversion between text with a unit and SI floats."""
 
 import contextlib
 import difflib
@@ -21,7 +21,7 @@ LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
 
 
 def hint(unknown: UnknownUnitError, kind: str, si_unit: str | None) -> str:
-    """Return a hint ``, did you mean 'mm^2'?`` with the nearest unit compatible with ``si_unit``; empty if none.
+    """Return a hint ``, did you mean 'mm^2'?`` with the nearest unit that fits ``si_unit``; empty if none.
 
     Without ``si_unit`` only units that differ in upper and lower case are suggested.
     """
@@ -40,7 +40,7 @@ def _in_other_case(name: str) -> list[str]:
 
 
 def _that_fit(names: Iterable[str], name: str, unit: str, kind: str, si_unit: str | None) -> list[tuple[str, ...]]:
-    """Return ``unit`` with ``name`` replaced by each of ``names``, if it fits ``si_unit``, with pressure suffixes.
+    """Return ``unit`` with ``name`` replaced by each fitting name, with pressure suffixes.
 
     If ``si_unit`` is None, all valid units are returned.
     """
@@ -65,7 +65,7 @@ def _did_you_mean(meant: Iterable[tuple[str, ...]]) -> str:
 
 
 SI = "SI"
-"""Unit of a number that is already in SI, for any quantity; written by programs."""
+"""Unit of a number that is in SI units already, for any quantity; written by programs."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)
@@ -74,14 +74,14 @@ CONDUCTANCE = "m^3/(s Pa)"
 
 
 def split_quantity(text: str) -> tuple[float, str]:
-    """Return number and unit of a text such as ``12.6mm^2``, ``50 psi_g`` or ``0.4 1/s``; the unit may be empty."""
+    """Split a text such as ``12.6mm^2``, ``50 psi_g`` or ``0.4 1/s`` into number and unit, which may be empty."""
     value, unit = split_number(text)
     check_unit(unit)
     return value, unit
 
 
 def split_number(text: str) -> tuple[float, str]:
-    """Return the number and the unit of a text, without checking the unit.
+    """Split a text into number and unit, without a check of the unit.
 
     For callers that know the wanted unit and raise a more specific error.
     """
@@ -106,20 +106,20 @@ def split_number(text: str) -> tuple[float, str]:
 
 
 def number_text(text: str) -> str:
-    """Return a text checked as ASCII number for ``float`` or ``int``; ValueError for other digits and ``1_000``."""
+    """Check that a text is an ASCII number for ``float`` or ``int``. Raises ValueError, also for ``1_000``."""
     if not text.isascii() or "_" in text:
         raise ValueError(f"{quote(text)} is not a number")
     return text
 
 
 def parse_quantity(text: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the value of a text in ``si_unit``; gauge pressures are relative to ``atmosphere`` [Pa absolute]."""
+    """Convert a text to a number in ``si_unit``; gauge pressures are relative to ``atmosphere`` [Pa absolute]."""
     value, unit = split_number(text)
     return to_si(value, unit, si_unit, atmosphere)
 
 
 def to_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return ``value`` in ``si_unit``: ``Pa_a`` for a pressure level, ``Pa_d`` for a pressure difference."""
+    """Convert a value to ``si_unit``: ``Pa_a`` for a pressure level, ``Pa_d`` for a pressure difference."""
     scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
     # In decimals: 8.4 g is the float nearest to 0.0084 kg, not one beside it.
     exact = DECIMALS.add(DECIMALS.multiply(_decimal(value), scale), offset)
@@ -127,14 +127,14 @@ def to_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_AT
 
 
 def from_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the SI ``value`` in ``unit``: the inverse of ``to_si``."""
+    """Convert an SI value to ``unit``, the inverse of ``to_si``."""
     scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
     above = _finite(value, value) - (atmosphere if counts_from_atmosphere else 0.0)
     return float(DECIMALS.divide(DECIMALS.subtract(_decimal(above), offset), scale))
 
 
 def format_quantity(value: float, unit: str) -> str:
-    """Return a value and a unit as text, from which ``split_quantity`` recovers exactly the same number and unit."""
+    """Format value and unit as text, which ``split_quantity`` reads back exactly."""
     return f"{repr(float(value)).removesuffix('.0')} {unit}".rstrip()
 
 
@@ -142,7 +142,7 @@ _LARGEST_WITHOUT_EXPONENT = 1.0e6
 
 
 def without_exponent(value: float, form: str) -> str:
-    """Return a number formatted by ``form``, with thousands written out instead of an exponent.
+    """Format a number by ``form``, with thousands written out instead of an exponent.
 
     Zero has neither a sign nor an exponent.
 
@@ -159,21 +159,18 @@ def without_exponent(value: float, form: str) -> str:
 
 
 def percentage(fraction: float, digits: int) -> str:
-    """Return a fraction [-] as a percentage with ``digits`` significant digits, without exponent: ``120 %``."""
+    """Format a fraction [-] as a percentage with ``digits`` significant digits, without exponent: ``120 %``."""
     return f"{float(f'{100.0 * fraction:.{digits}g}'):.12g} %"
 
 
 def check_unit(unit: str, near: str | None = None) -> None:
-    """Check that a unit exists and is written like ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``; UnitError if not.
-
-    The message suggests only units compatible with ``near``, if given.
-    """
+    """Check that a unit exists and is written like ``kg`` or ``m^3/(s Pa)``. Raises UnitError if not."""
     if unit != SI:
         _read(unit, near)
 
 
 def _read(unit: str, si_unit: str | None) -> tuple[ParsedUnit, str]:
-    """Return a unit as data with the kind of a pressure.
+    """Parse a unit with the kind of a pressure.
 
     UnitError for an unknown unit suggests units compatible with ``si_unit``.
     """
@@ -185,7 +182,7 @@ def _read(unit: str, si_unit: str | None) -> tuple[ParsedUnit, str]:
 
 
 def base_value(value: float, unit: str) -> float:
-    """Return ``value`` in the base units (m, kg, s, K, mol, rad), for a unit of any dimension."""
+    """Convert a value in any unit to base units (m, kg, s, K, mol, rad)."""
     parsed, kind = _read(unit, None)
     base = float(parsed.in_base(_decimal(value)))
     return base + (STANDARD_ATMOSPHERE if kind == "g" else 0.0)
@@ -198,7 +195,7 @@ def dimension(unit: str) -> dict[str, int]:
 
 @functools.lru_cache(maxsize=512)
 def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
-    """Return scale, offset and a flag for adding the atmosphere; decimals, so that 8.4 g is exactly 0.0084 kg."""
+    """Return scale, offset and a flag to add the atmosphere; decimals, so that 8.4 g is exactly 0.0084 kg."""
     if unit == SI:
         return Decimal(1), Decimal(0), False
     wanted, _ = read_unit(si_unit)

@@ -1,4 +1,4 @@
-"""Volume flow at a reference condition, equivalent to a mass flow of the gas: ``L/min (ANR, air)``.
+"""Volume flow at a reference condition as mass flow of a gas: ``L/min (ANR, air)``.
 
 ``m_dot = rho q``, where rho = p M/(R T) is the density of an ideal gas of molar mass M at the condition. Air in the
 atmosphere of ISO 8778, which is humid, has the 1.185 kg/m^3 of ISO 6358.
@@ -28,7 +28,7 @@ _MOLAR_MASS = {"[mass]": 1, "[substance]": -1}
 
 
 class Condition(NamedTuple):
-    """Reference temperature [K] and pressure [Pa absolute] of a gas volume; humid as in ISO 8778, or dry."""
+    """Reference condition of a gas volume: temperature [K], pressure [Pa absolute], humid as in ISO 8778 or dry."""
 
     temperature: float
     pressure: float
@@ -56,7 +56,7 @@ _EXAMPLE = "70 degF, 14.696 psi_a"
 
 
 def flow_of(unit: str) -> tuple[str, str, bool]:
-    """Return the volume flow of a unit, the words after it, and True if it is a normal or standard flow.
+    """Split a unit into volume flow, words after it, and a flag for normal or standard flow.
 
     The words are the condition and the gas, if given; otherwise empty.
     """
@@ -77,13 +77,13 @@ def flow_of(unit: str) -> tuple[str, str, bool]:
 
 
 def is_volume_flow(unit: str) -> bool:
-    """Return True if a unit is a volume per time, with or without reference condition; UnitError if invalid."""
+    """Return whether a unit is a volume per time, with or without condition. Raises UnitError if invalid."""
     flow, _, is_normal = flow_of(unit)
     return is_normal or parse_unit(flow)[0].dimensions == VOLUME_FLOW
 
 
 def with_condition(unit: str, condition: str, gas: str) -> str:
-    """Return a unit of volume flow, completed by the known condition and gas."""
+    """Add reference condition and gas to a unit of volume flow."""
     flow, words, is_normal = flow_of(unit)
     place, own = _condition_and_gases(words)
     name = unit.strip() if not words else unit.strip().removesuffix(")").removesuffix(words).rstrip(" (_")
@@ -92,7 +92,7 @@ def with_condition(unit: str, condition: str, gas: str) -> str:
 
 
 def read_unit(unit: str) -> tuple[ParsedUnit, str]:
-    """Return a unit as data with the kind of a pressure; a volume flow with condition and gas becomes a mass flow.
+    """Parse a unit with the kind of a pressure; a volume flow with condition and gas becomes a mass flow.
 
     Raises UnitError for an invalid unit, a normal flow without condition, and a condition without gas.
     """
@@ -127,7 +127,7 @@ def read_unit(unit: str) -> tuple[ParsedUnit, str]:
 
 
 def without_condition(unit: str) -> str:
-    """Return the message about a volume flow without reference condition and gas where a mass flow is required."""
+    """Return the message on a volume flow without reference condition and gas, given for a mass flow."""
     named, normal, own = (with_condition(unit, at, "air") for at in ("ANR", "DIN 1343", _EXAMPLE))
     return (
         f"'{unit}' is a volume flow without its reference condition, by which it is a mass flow: write '{named}' "
@@ -137,21 +137,18 @@ def without_condition(unit: str) -> str:
 
 
 def density(condition: Condition, molar_mass: float) -> float:
-    """Return the density [kg/m^3] of an ideal gas, ``p M/(R T)``; for air at ANR, the density given in ISO 6358."""
+    """Return the density of an ideal gas [kg/m^3], ``p M/(R T)``; for air at ANR the density of ISO 6358."""
     if condition.is_humid and abs(molar_mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR:
         return STANDARD_REFERENCE_DENSITY_AIR
     return condition.pressure * molar_mass / (MOLAR_GAS_CONSTANT * condition.temperature)
 
 
 _AS_AIR = 5.0e-3
-"""Relative deviation from the package's molar mass of air within which a gas counts as air."""
+"""Relative deviation from the molar mass of air [-] within which a gas counts as air."""
 
 
 def condition_of(text: str, unit: str) -> Condition:
-    """Return a condition by its name, or from a temperature and a pressure; UnitError for any other text.
-
-    A pressure without a kind is absolute, as in every reference condition. ``unit`` is quoted in the message.
-    """
+    """Parse a reference condition: a name, or temperature and pressure. Raises UnitError for other text."""
     name = re.sub(r"[\s_-]+", " ", text).upper()
     if name in CONDITIONS:
         return CONDITIONS[name]
@@ -179,12 +176,12 @@ def condition_of(text: str, unit: str) -> Condition:
 
 
 def _split(words: str) -> list[str]:
-    """Return the words separated by commas, semicolons or 'and'; a comma between digits is a decimal comma."""
+    """Split words at commas, semicolons or 'and'; a comma between digits is a decimal comma."""
     return re.split(r"(?<!\d),|,(?!\d)|;|\band\b|&|@", words)
 
 
 def _condition_and_gases(words: str) -> tuple[str, list[str]]:
-    """Return the reference condition in the words after a flow, and the gases or molar masses."""
+    """Split the words after a flow into reference condition, and gases or molar masses."""
     said = [word.strip() for word in _split(words) if word.strip()]
     known = [name.lower() for name in MOLAR_MASSES]
     gases = [word for word in said if word.lower() in known or word.endswith("/mol")]

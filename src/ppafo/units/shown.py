@@ -1,4 +1,4 @@
-"""Display units of numbers: the unit as given, else the unit of the parameter set, else the default of the catalogue.
+"""Display units: unit as given, else unit of the parameter set, else default of the package.
 
 ``QUANTITIES`` is the only table of display units, and ``shown_text`` writes a number in its display unit. Files and
 data stay in SI. Gauge pressures are relative to the atmosphere of the device. This zero is stored with the units, so
@@ -23,7 +23,7 @@ R = TypeVar("R")
 
 
 class Units(NamedTuple):
-    """SI unit of a quantity, and its default display unit, used unless a parameter set has another.
+    """SI unit of a quantity, and its default display unit.
 
     ``zero`` [SI] is the accuracy of computed values: magnitudes up to it are rounding errors and displayed as 0. It is
     0 for quantities that are given and not computed.
@@ -67,9 +67,9 @@ QUANTITIES: Mapping[str, Units] = MappingProxyType(
         "conductance": Units("m^3/(s Pa)", "L/(s bar)"),
     }
 )
-"""Units by kind of quantity."""
+"""Display units by kind of quantity."""
 NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
-"""Kinds of quantity that share their SI unit with another kind and must be named explicitly."""
+"""Kinds of quantity that share an SI unit with another kind, so that callers must name them."""
 _OF_UNIT = {
     **{units.si: quantity for quantity, units in QUANTITIES.items() if quantity not in NAMED},
     # Metrics and channels write Pa for a level; of the quantities in kg the plain one is meant.
@@ -78,20 +78,20 @@ _OF_UNIT = {
 }
 """Kind of quantity by SI unit."""
 _WRITTEN = {"Pa": "Pa_a", "-": "1"}
-"""Unit of a number in a file for the unit of a metric or a channel."""
+"""Unit as written in files, by unit of a metric or channel."""
 _PER_PRESSURE = {"N/Pa": "N", "N m/Pa": "N m"}
-"""SI unit of the numerator for each quantity per pressure; the pressure is in the unit of the set."""
+"""SI unit of the numerator of each quantity per pressure."""
 _DIGITS = 9
-"""Significant digits of written numbers; further digits are rounding errors of the unit conversion."""
+"""Significant digits of written numbers, free of rounding errors of the unit conversion."""
 GAUGE_ZERO = "gauge_zero"
-"""Key, among the SI units, of the absolute pressure that is the zero of gauge pressures."""
+"""Key of the absolute pressure displayed as gauge zero, among display units by SI unit."""
 
 _chosen: ContextVar[Mapping[str, str]] = ContextVar("_chosen", default=MappingProxyType({}))
 
 
 @contextlib.contextmanager
 def shown_in(units: Mapping[str, str]) -> Iterator[None]:
-    """Use these display units within the ``with`` block, keyed by SI unit: ``{"Pa_a": "bar_g", "N m": "N cm"}``."""
+    """Set the display units by SI unit in a ``with`` block: ``{"Pa_a": "bar_g", "N m": "N cm"}``."""
     token = _chosen.set(units)
     try:
         yield
@@ -100,7 +100,7 @@ def shown_in(units: Mapping[str, str]) -> Iterator[None]:
 
 
 def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator that runs a function with the display units returned by ``units`` for its arguments."""
+    """Decorate a function to run with the display units that ``units`` returns for its arguments."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
@@ -114,13 +114,13 @@ def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R
 
 
 def pressure_units(level: str) -> dict[str, str]:
-    """Return the display units of pressure levels and differences, by SI unit, for a level unit such as ``bar_g``."""
+    """Return the display units of pressure levels and differences for a level unit such as ``bar_g``."""
     unit, kind = split_pressure_kind(level)
     return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
 
 
 def units_beside(si_unit: str, unit: str) -> dict[str, str]:
-    """Return the display units, by SI unit, implied by the use of ``unit`` for quantities of ``si_unit``.
+    """Return the display units implied by ``unit`` for quantities of ``si_unit``, by SI unit.
 
     With levels in ``bar_g`` differences are in ``bar_d``, with angles in ``deg`` angular velocities in ``deg/s``.
     """
@@ -130,12 +130,12 @@ def units_beside(si_unit: str, unit: str) -> dict[str, str]:
 
 
 def counted_from(units: Mapping[str, str], atmosphere: float) -> dict[str, str]:
-    """Return display units by SI unit, supplemented by the atmosphere [Pa absolute] as zero of gauge pressures."""
+    """Add the atmosphere [Pa absolute], as zero of gauge pressures, to display units by SI unit."""
     return {**units, GAUGE_ZERO: f"{atmosphere!r} Pa_a"}
 
 
 def gauge_zero() -> float:
-    """Return the absolute pressure [Pa] that is displayed as gauge zero."""
+    """Return the absolute pressure displayed as gauge zero [Pa]."""
     stated = _chosen.get().get(GAUGE_ZERO)
     return STANDARD_ATMOSPHERE if stated is None else float(stated.removesuffix(" Pa_a"))
 
@@ -146,7 +146,7 @@ def units_in_force() -> dict[str, str]:
 
 
 def quantity_of_unit(si_unit: str) -> str:
-    """Return the kind of quantity for an SI unit; empty for a plain number or a unit without another display unit.
+    """Return the kind of quantity of an SI unit; empty for a plain number or a unit without display unit.
 
     ``kg`` is a mass and ``s`` a time. Masses of gas and of parts, displayed in grams, and durations in minutes must be
     named explicitly.
@@ -155,13 +155,13 @@ def quantity_of_unit(si_unit: str) -> str:
 
 
 def usual_unit(si_unit: str) -> str:
-    """Return the default display unit of an SI unit; "" for a number."""
+    """Return the default display unit of an SI unit; "" for a plain number."""
     quantity = quantity_of_unit(si_unit)
     return QUANTITIES[quantity].shown if quantity else "" if si_unit == "1" else si_unit
 
 
 def shown_unit(si_unit: str) -> str:
-    """Return the display unit of an SI unit: the chosen one, else the default; "" for a number."""
+    """Return the display unit of an SI unit, as set by ``shown_in`` or by default; "" for a plain number."""
     chosen, si_unit = _chosen.get(), _WRITTEN.get(si_unit, si_unit)
     if si_unit in chosen:
         return chosen[si_unit]
@@ -178,7 +178,7 @@ def unit_of(quantity: str) -> str:
 def shown_value(
     value: float, si_unit: str, unit: str = "", atmosphere: float | None = None, zero: float = 0.0
 ) -> float:
-    """Return an SI value in ``unit``, by default its display unit; magnitudes up to ``zero`` become 0.
+    """Convert an SI value to ``unit``, by default its display unit; magnitudes up to ``zero`` become 0.
 
     Gauge pressures are relative to ``atmosphere`` [Pa absolute], by default the atmosphere of the device in force.
     """
@@ -191,7 +191,7 @@ def shown_value(
 
 
 def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float | None = None, unit: str = "") -> str:
-    """Return an SI value as text in its display unit; a value that is zero within the accuracy of a run is 0.
+    """Format an SI value in its display unit; a value within the accuracy of a run is 0.
 
     ``unit`` is the unit in which the value was given, if known. Gauge pressures are relative to ``atmosphere`` [Pa
     absolute].
@@ -207,7 +207,7 @@ def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float 
 
 
 def written_text(value: float, si_unit: str, atmosphere: float | None = None, unit: str = "") -> str:
-    """Return an SI value as text in its display unit, to be read again, without the rounding errors of the conversion.
+    """Format an SI value in its display unit for reading back, without conversion errors.
 
     >>> written_text(206842.71879504 + 101325.0, "Pa_a"), written_text(3.929e-9, "m^3/(s Pa)")
     ('30 psi_g', '0.3929 L/(s bar)')

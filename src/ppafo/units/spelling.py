@@ -1,4 +1,4 @@
-"""Normalisation of unit spellings to one form: ``N m s/rad``, ``mm^2``, ``L/(s bar)``, ``psi_g``.
+"""Spelling of units: conversion to a normal form such as ``N m s/rad``, ``mm^2``, ``L/(s bar)``, ``psi_g``.
 
 Only unambiguous spellings are changed. Unknown units are refused where the unit is looked up.
 """
@@ -15,7 +15,7 @@ UNITS = (
     *("L", "in", "ft", "lb", "lbf", "oz", "ozf", "kgf", "percent"),
 )
 PRESSURES = ("Pa", "bar", "psi", "atm", "Torr", "mHg", "inHg", "mWC", "inWC")
-"""Pressure units that consist of one word."""
+"""Pressure units of a single word."""
 
 LONGEST_UNIT = 60
 _MOST_FACTORS = 4
@@ -91,7 +91,7 @@ _MEANT = {
 }
 _WORDS = {word: unit for unit, words in _MEANT.items() for word in words}
 _COLUMNS_OF = re.compile(r"\b(mm|cm|m|in) ?(?:H2O|h2o|WS|wc)(?![A-Za-fh-z0-9])")
-"""Water heads, written with the unit WC (water column)."""
+"""Pattern of water heads, written with the unit WC (water column)."""
 
 _SQUARE_OR_CUBIC = (
     (re.compile(r"\bsq\.? ?(mm|cm|m|in|ft)\b"), r"\1^2"),
@@ -109,7 +109,7 @@ _FORCES = {
     "kg/cm^2": "kgf/cm^2",
     "kg/mm^2": "kgf/mm^2",
 }
-"""Spellings in which a pound, an ounce or a kilogram is a force."""
+"""Spellings in which pound, ounce or kilogram is a force."""
 
 
 _KIND_OF_QUOTIENT = re.compile(
@@ -120,7 +120,7 @@ _KIND_OF_QUOTIENT = re.compile(
 
 @functools.lru_cache(maxsize=512)
 def split_pressure_kind(unit: str) -> tuple[str, str]:
-    """Return a unit in normal spelling without its suffix ``_g``, ``_a`` or ``_d``, and the letter of that suffix.
+    """Return a unit in normal spelling without pressure suffix, and its suffix letter ``g``, ``a`` or ``d``.
 
     Raises UnitError for a text that does not have the form of a unit.
     """
@@ -150,12 +150,12 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
 
 
 def says_kind(unit: str) -> bool:
-    """Return True if a word after a unit states the kind of a pressure."""
+    """Return whether a word after a unit states the kind of a pressure."""
     return _kind_of_pressure(unit.translate(_CHARACTERS).strip(" "))[1] != ""
 
 
 def _kind_of_pressure(text: str) -> tuple[str, str]:
-    """Return a pressure unit without the word for its kind, and the kind: ``psig``, ``bar (abs)``, ``kPa gauge``."""
+    """Split off the word for the kind of a pressure: ``psig``, ``bar (abs)``, ``kPa gauge``."""
     match = _KIND.fullmatch(text)
     word = "" if match is None else match["word"]
     if match is None and "/" in text:
@@ -168,7 +168,7 @@ def _kind_of_pressure(text: str) -> tuple[str, str]:
 
 
 def as_product(name: str) -> str:
-    """Return a joined name as known units with spaces, ``N m`` for ``Nm``; empty if already known or no product.
+    """Split a joined name into known units, ``Nm`` into ``N m``; empty if already known or no product.
 
     Each unit occurs at most once, so that ``Nmm`` is ``N mm``. After the first unit, shorter ones are tried first:
     ``Nms`` is ``N m s``.
@@ -195,11 +195,11 @@ def as_product(name: str) -> str:
 
 @functools.cache
 def spellings() -> frozenset[str]:
-    """Return the names of units with all their prefixes."""
+    """Return all unit names with all prefixes."""
     return frozenset(prefix + unit for unit in (*UNITS, "l") for prefix in ("", "µ", *PREFIXES))
 
 
 def quote(text: object) -> str:
-    """Return a short quotation of a value on one line."""
+    """Quote a value for a message, shortened to one line."""
     quoted = repr(text)
     return quoted if len(quoted) <= 50 else f"{quoted[:46]}...'"

@@ -1,4 +1,4 @@
-"""Validation of the model against recordings: replay, then comparison channel by channel, in units and in percent."""
+"""Validation of the model against recordings: replay, then errors channel by channel, in units and in percent."""
 
 from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement, compare_recording
 from ppafo.validation.compared import Thresholds, parse_thresholds

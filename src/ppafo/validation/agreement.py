@@ -1,4 +1,4 @@
-"""Comparison of the model with one recording, replayed on the recorded inputs: errors channel by channel."""
+"""Agreement of the model with a recording, replayed on the recorded inputs: errors channel by channel."""
 
 import math
 from dataclasses import dataclass
@@ -35,13 +35,13 @@ ENGINE_ERROR = 3.0e-5
 LEAST_NOISE = 1.0e-4
 """Lower bound of the estimated sample noise as a fraction of the full range [-]."""
 _UNMOVED = 1.0e-3
-"""Accepted error of a signal that does not move, as a fraction of the full range [-]: the zero error of its sensor."""
+"""Accepted error of a constant signal, as a fraction of the full range [-]: the zero error of its sensor."""
 _WITHIN_NOISE = 1.5
-"""RMS error as a multiple of the estimated white noise [-] up to which the error may be noise."""
+"""Largest ratio of RMS error to estimated white noise [-] at which the error may be noise."""
 _LONGEST_WEIGHT = 3.0
 """Largest weight of one sample, in usual sample intervals [-], so that a gap in time gets no weight."""
 _OTHER_SUPPLY = 0.05
-"""Relative difference between recorded and model gauge supply pressure [-] from which a remark is made."""
+"""Relative difference of recorded and model supply pressure (gauge) [-] from which a remark is made."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,7 @@ def channel_agreement(curve: ComparedCurve, delay: float) -> ChannelAgreement:
 
 
 def noise_in(values: Floats, full_range: float) -> float:
-    """Return the noise of samples [their unit], including the rounding of a converter, resolution / sqrt(8)."""
+    """Return the noise of samples [their unit], including the rounding of a converter with resolution / sqrt(8)."""
     # At rest a coarse converter repeats one value, and third differences see no noise at all. It is then off by up to
     # half a step throughout, whose square is twice this one's, and not by what rounding leaves on average.
     return max(math.hypot(noise_of(values), resolution_of(values) / math.sqrt(8.0)), LEAST_NOISE * full_range)
@@ -198,9 +198,9 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
 
 
 def measured_values(recording: Recording, name: str) -> Floats | None:
-    """Return the measured values of a channel, None if they were not recorded.
+    """Return the measured values of a channel, None if not recorded.
 
-    The pressure difference is computed from both chamber pressures if both were recorded.
+    The pressure difference is computed from the pressures of both chambers if both were recorded.
     """
     if name == PRESSURE_DIFFERENCE and PRESSURE_1 in recording and PRESSURE_2 in recording:
         return np.asarray(recording[PRESSURE_1] - recording[PRESSURE_2])
@@ -212,7 +212,7 @@ def measured_values(recording: Recording, name: str) -> Floats | None:
 def _curves(
     measured: MeasuredRecording, replayed: Replayed, device: Device, settings: ReplaySettings
 ) -> list[ComparedCurve]:
-    """Return the recorded channels that are no inputs of the model. Raises DataError if there are none."""
+    """Return measured and modelled curves of the recorded channels, without inputs. Raises DataError if none remain."""
     gauge = supply_gauge(measured.recording, device)
     # Where the vane is locked, or where there is none, some channels carry no information.
     informative = {name for name in COMPARED if settings.motion != "locked" or name != ANGLE}

@@ -1,4 +1,4 @@
-"""Candidate causes of a disagreement, with the trial magnitudes of each: one generator per stage of the search."""
+"""Candidate causes of a disagreement with trial magnitudes, in one generator for each stage of the search."""
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -38,7 +38,7 @@ def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> Model
 
 
 def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]]:
-    """Yield groups of pressure sensors that may share an error: their channels, a description, and "seem" or "seems".
+    """Yield groups of pressure sensors that may share an error: channels, description, and "seem" or "seems".
 
     Groups are each recorded sensor, both chambers, both supplies, and all sensors; the largest group comes first.
     """
@@ -55,20 +55,26 @@ def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]
 def exchanges(
     device: Device, names: Collection[str], units: Mapping[str, AbstractSet[str]]
 ) -> Iterator[CandidateCause]:
-    """Yield mistakes without a magnitude: wrong unit, gauge read as absolute or reverse, swapped channels, wrong signs.
+    """Yield causes without a magnitude: wrong unit, gauge read as absolute or reverse, swapped channels, wrong signs.
 
     ``units`` has, for each channel that moves, the units declared in the files, empty for none. Units are not tried for
     a chamber that stays at atmospheric pressure, which shows no factor, nor against a unit that the file declares.
     """
     atmosphere = device.supply.atmospheric_pressure
+    quantities = (ANGLE, "rad"), (EXTERNAL_TORQUE, "N m")
+    measured = [((name,), f"{name} seems", unit, 0.0) for name, unit in quantities if name in names]
     for channels, group, verb in _groups(names):
-        yield from _units(channels, f"{group} {verb}", "Pa", units, atmosphere)
+        measured.append((channels, f"{group} {verb}", "Pa", atmosphere))
         for kind, zero in (("gauge read as absolute", -atmosphere), ("absolute read as gauge", atmosphere)):
             words = f"{group} {verb} to be {kind}"
             yield CandidateCause(words, words, partial(_sensed, channels, "zero", 0.0), (zero,), is_of_unit=True)
-    for name, unit in ((ANGLE, "rad"), (EXTERNAL_TORQUE, "N m")):
-        if name in names:
-            yield from _units((name,), f"{name} seems", unit, units, 0.0)
+    for channels, seems, si_unit, true_zero in measured:
+        stated = set[str]().union(*(units.get(name, ()) for name in channels))
+        for mistake, factor in misread_units(si_unit, stated) if units.keys() & {*channels} else ():
+            name = f"{seems} to be {mistake}"
+            words = f"{name}: the unit is probably wrong, by a factor of {max(factor, 1.0 / factor):.4g}"
+            change = partial(_sensed, channels, "gain", true_zero)
+            yield CandidateCause(name, words, change, (factor,), is_of_unit=True)
     has_both = PRESSURE_1 in names and PRESSURE_2 in names
     if has_both:
         yield CandidateCause(
@@ -89,20 +95,7 @@ def exchanges(
         yield CandidateCause("end of angle", words, partial(_sensed, [ANGLE], "gain", middle), (-1.0,))
 
 
-def _units(
-    channels: tuple[str, ...], seems: str, si_unit: str, units: Mapping[str, AbstractSet[str]], zero: float
-) -> Iterator[CandidateCause]:
-    """Yield the unit mistakes of a sensor group that moves; ``zero`` [SI] is the true value of a reading of zero."""
-    stated = set[str]().union(*(units.get(name, ()) for name in channels))
-    for mistake in misread_units(si_unit, stated) if units.keys() & {*channels} else ():
-        name = f"{seems} to be {mistake.in_words}"
-        words = f"{name}: the unit is probably wrong, by a factor of {mistake.larger_factor}"
-        change = partial(_sensed, channels, "gain", zero)
-        yield CandidateCause(name, words, change, (mistake.factor,), is_of_unit=True)
-
-
 def _both_ways(*sizes: float) -> tuple[float, ...]:
-    """Return the given magnitudes with both signs, in increasing order."""
     return (*(-size for size in reversed(sizes)), *sizes)
 
 
@@ -112,18 +105,18 @@ _ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
 _GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
 """Trial gains of a sensor [-]."""
 _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
-"""Trial delays [s] of one sensor with respect to the others."""
+"""Trial delays of a sensor relative to the other sensors [s]."""
 _LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
 """Trial delays [s] of all sensors with respect to the command."""
 _RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
 """Trial rates [-] of the clock of a recording."""
 
 _EXACT = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
-"""Usual sensor errors of a command: none, since no sensor reads the command."""
+"""Usual sensor errors of a command: none, because a command is not read by a sensor."""
 
 
 def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
-    """Yield errors with a magnitude: gain and zero of pressures, angle and command; delays; the rate of the clock."""
+    """Yield causes with a magnitude: gain and zero of pressures, angle and command; delays; clock rate."""
     atmosphere = device.supply.atmospheric_pressure
     gauge = max(device.supply.pressure, device.supply.dorsiflexion_pressure) - atmosphere
     unit, per_pascal = _unit_of_pressure(device)
@@ -184,12 +177,12 @@ _ATMOSPHERES = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
 _SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas")
 """Sections of the parameter set whose parameters are tried, in this order."""
 _NOT_TRIED = ("actuator.angle_min", "actuator.angle_max", "actuator.restitution")
-"""Parameters that are observable only in a vane that reaches a stop; a replay starts between the stops."""
+"""Parameters observable only when the vane reaches a stop; a replay starts between the stops."""
 _OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
 
 
 def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Iterator[CandidateCause]:
-    """Yield each parameter of the set with trial values, and a wrong atmospheric pressure of gauge sensors."""
+    """Yield every parameter of the set with trial values, and a wrong atmospheric pressure for gauge sensors."""
     request = replay_of(measured, device, settings)
     scenario = replace(replayed_scenario(request), device=request.device)
     # Supply pressures that a replay follows in the recording, whatever the set has.
@@ -205,7 +198,7 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
         factors = tuple(factor for factor in _FACTORS if quantity.minimum <= factor * value <= quantity.maximum)
         if value > 0.0 and len(factors) > 2:
             words = f"{path} seems to be {{:.3g}} times the model's value"
-            change = partial(_scaled, path, value)
+            change = partial(lambda path, value, factor: ModelChange(numbers={path: factor * value}), path, value)
             usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
             yield CandidateCause(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
@@ -225,18 +218,13 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
 
 
 def _unit_of_pressure(device: Device) -> tuple[str, float]:
-    """Return the display unit of a pressure difference, and its value for a difference of 1 Pa."""
+    """Return the display unit of a pressure difference, and the number of these units in 1 Pa."""
     with shown_in(device.shown):
         return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
-def _scaled(path: str, value: float, factor: float) -> ModelChange:
-    """Return a change in which one parameter is ``factor`` times its ``value`` [SI]."""
-    return ModelChange(numbers={path: factor * value})
-
-
 class _UnknownEffect(NamedTuple):
-    """Effect that a device may have and its model has not, with one magnitude to fit.
+    """Effect that is off in the model and may be present in the device, with one magnitude to fit.
 
     ``words`` describes the effect in messages. ``scaled`` are the settings equal to the magnitude, which is tried from
     ``lowest`` to ``highest`` [unit of these settings]; ``constant`` are the constant settings.
@@ -250,45 +238,29 @@ class _UnknownEffect(NamedTuple):
     constant: Mapping[str, float] = MappingProxyType({})
 
 
+_OPENING, _STRIBECK = MappingProxyType({"rise": 0.3}), MappingProxyType({"share": 0.9})
+_VIRIAL = MappingProxyType({"coefficient": SECOND_VIRIAL["CO2"]})
 _EFFECTS = (
+    _UnknownEffect("leak_opening", "the leak seems to open at {:.3g} Pa", ("pressure",), 1e3, 2e5, _OPENING),
     _UnknownEffect(
-        name="leak_opening",
-        words="the leak seems to open at {:.3g} Pa",
-        scaled=("pressure",),
-        lowest=1e3,
-        highest=2e5,
-        constant={"rise": 0.3},
+        "stribeck", "friction seems to be higher up to {:.2g} rad/s (Stribeck)", ("velocity",), 0.02, 6.0, _STRIBECK
     ),
     _UnknownEffect(
-        name="stribeck",
-        words="friction seems to be higher up to {:.2g} rad/s (Stribeck)",
-        scaled=("velocity",),
-        lowest=0.02,
-        highest=6.0,
-        constant={"share": 0.9},
+        "seal_friction",
+        "friction seems to grow with pressure by {:.2g} N m/Pa",
+        ("static_per_pressure", "dynamic_per_pressure"),
+        1e-8,
+        5e-6,
     ),
     _UnknownEffect(
-        name="seal_friction",
-        words="friction seems to grow with pressure by {:.2g} N m/Pa",
-        scaled=("static_per_pressure", "dynamic_per_pressure"),
-        lowest=1e-8,
-        highest=5e-6,
+        "second_virial",
+        "the gas seems to have {:.2g} times the virial coefficient of CO2",
+        ("share",),
+        0.05,
+        8.0,
+        _VIRIAL,
     ),
-    _UnknownEffect(
-        name="second_virial",
-        words="the gas seems to have {:.2g} times the virial coefficient of CO2",
-        scaled=("share",),
-        lowest=0.05,
-        highest=8.0,
-        constant={"coefficient": SECOND_VIRIAL["CO2"]},
-    ),
-    _UnknownEffect(
-        name="spool_play",
-        words="the spool seems to have a play of {:.2g} of full command",
-        scaled=("width",),
-        lowest=0.005,
-        highest=0.4,
-    ),
+    _UnknownEffect("spool_play", "the spool seems to have a play of {:.2g} of full command", ("width",), 0.005, 0.4),
 )
 _SIZES_OF_AN_EFFECT = 5
 """Number of trial magnitudes of an effect, in geometric progression."""

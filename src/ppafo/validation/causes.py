@@ -29,20 +29,17 @@ from ppafo.validation.search import CauseSearch, SizedCause
 from ppafo.validation.settings import ReplaySettings
 from ppafo.wording import argument_text
 
-_TIMES = {
-    "milliseconds read as seconds": (1.0e3, "ms"),
-    "seconds read as milliseconds": (1.0e-3, "s"),
-}
-"""Clock rate [-] by which misread times are corrected, and the correct unit, for each mistake."""
+_TIMES = {"milliseconds read as seconds": (1.0e3, "ms"), "seconds read as milliseconds": (1.0e-3, "s")}
+"""Clock rate [-] that corrects misread times, and the correct unit, by kind of mistake."""
 
 _LESS = 0.5
-"""Fraction of an error above its limit [-] that may remain if times in another unit explain the error."""
+"""Largest remaining fraction of an error above its limit [-] for times in another unit to explain the error."""
 
 _SHORT_INTERVAL = 2.0e-5
-"""Sample interval [s] up to which times may be seconds read as milliseconds: truly 50 samples per second or more."""
+"""Longest sample interval [s] that may be milliseconds read as seconds: 50 samples per second or more in truth."""
 
 _AT_REST = 2.0
-"""Standard deviation of the angle divided by its noise [-] below which the vane may be locked."""
+"""Ratio of the angle's standard deviation to its noise [-] below which the vane may be locked."""
 
 _LONGEST_SEARCHED = 10.0
 """Duration [s] of all recordings up to which a device with a measured angle is searched for causes beside samples."""
@@ -65,7 +62,7 @@ The two outermost values lie outside the range, and a best fit there is rejected
 
 @dataclass(frozen=True, slots=True)
 class ResidualCause:
-    """Possible cause of the residuals.
+    """Possible cause of the residuals of a validation.
 
     ``in_words`` describes the cause in a message. ``gain`` is its gain G [-] in explained error (see ``search.py``).
     ``left`` is the largest RMS error of any channel divided by its noise [-] under the cause. ``numbers`` has the
@@ -108,7 +105,7 @@ def causes_of(
     settings: ReplaySettings,
     report: Report = report_nothing,
 ) -> Diagnosis:
-    """Return the single cause that explains all recordings together, or a diagnosis without one if residuals are noise.
+    """Return the single cause that explains all recordings together, or a diagnosis without a cause.
 
     ``agreements`` are the comparisons of the recordings ``read``, in the same order.
     """
@@ -206,7 +203,7 @@ def _units_of_moving(
 
 
 def _tried_in_turn(stages: Iterable[Sequence[SizedCause]]) -> tuple[list[SizedCause], list[SizedCause]]:
-    """Return the candidates tried, stage by stage until one explains the recordings, and the candidates that do."""
+    """Return the candidates tried stage by stage until success, and the candidates that explain the recordings."""
     tried: list[SizedCause] = []
     for stage in stages:
         tried += stage
@@ -217,7 +214,7 @@ def _tried_in_turn(stages: Iterable[Sequence[SizedCause]]) -> tuple[list[SizedCa
 
 
 def _usual_errors(search: CauseSearch, none: ScaledResiduals, of_bench: Sequence[SizedCause]) -> ResidualCause | None:
-    """Return a usual sensor error that explains the recordings, or several together; None if there is none.
+    """Return a usual sensor error, or several together, that explains the recordings; None if no such error does.
 
     ``of_bench`` are the candidate errors of single sensors and sensor groups.
     """
@@ -298,7 +295,7 @@ def _in_other_unit(
 
 
 def _samples(records: Sequence[Record]) -> list[CandidateCause]:
-    """Return faulty samples of all channels as one candidate cause; an empty list if there are none."""
+    """Return faulty samples of all channels as a single candidate cause; empty without faulty samples."""
     faulty = [record for record in records if record.words]
     if not faulty:
         return []
@@ -336,7 +333,7 @@ def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candid
 
 
 def _cause_of(named: Sequence[SizedCause], penalty: float, others: Sequence[SizedCause] = ()) -> ResidualCause:
-    """Return the best of the ``named`` causes, with all others that the recordings cannot distinguish from it.
+    """Return the best of the ``named`` causes, with all causes that the recordings cannot distinguish from it.
 
     ``others`` explain the recordings only together with usual sensor errors, and are listed last.
     """

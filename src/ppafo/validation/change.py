@@ -1,4 +1,4 @@
-"""Changes of the model as values: sensor model, change of the model, and candidate cause."""
+"""Values of the cause search: sensor model, change of the model, candidate cause."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -9,7 +9,7 @@ from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
 from ppafo.validation.replay import Motion
 
 SENSORS = (ANGLE, PRESSURE_1, PRESSURE_2)
-"""Channels measured by a sensor of the device; torque and pressure difference are computed from them."""
+"""Channels with a sensor on the device; torque and pressure difference are computed from them."""
 SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
 """Channel recorded under each name when the two chamber pressures are swapped."""
 
@@ -34,7 +34,7 @@ class SensorModel:
 
 @dataclass(frozen=True, slots=True)
 class ModelChange:
-    """Difference between the device as recorded and its parameter set; none by default.
+    """Difference between the recorded device and its parameter set; by default no difference.
 
     ``sensors``: sensor models by channel. ``numbers``: changed parameters by path [SI]. ``effects``: settings of
     effects by the name of the effect. ``is_swapped``: pressures 1 and 2 are exchanged. ``delay``: delay [s] of all
@@ -54,12 +54,12 @@ class ModelChange:
 
     @property
     def has_delay(self) -> bool:
-        """True if all sensors lag the command, through a sensor delay or the delay of the valve."""
+        """True if all sensors lag behind the command, by a sensor delay or the delay of the valve."""
         return self.delay != 0.0 or any(path.endswith("delay") for path in self.numbers)
 
 
 def joined(first: ModelChange, second: ModelChange) -> ModelChange:
-    """Return both changes combined; ``first`` takes precedence for parameters and settings that both change."""
+    """Return the combination of two changes; ``first`` has precedence for parameters and settings in both."""
     sensors = dict(first.sensors)
     for name, other in second.sensors.items():
         sensor = sensors.get(name, SensorModel())
@@ -101,7 +101,7 @@ class CandidateCause:
 
     @property
     def has_size(self) -> bool:
-        """True if the magnitude is fitted; a swap or a wrong sign has none."""
+        """True if the magnitude is fitted; a swap or a wrong sign has no magnitude."""
         return len(self.sizes) > 1
 
     @property

@@ -1,4 +1,4 @@
-"""Channels in which recording and model are compared, their full ranges, and the limits of the error."""
+"""Channels compared between recording and model, with full ranges and error limits."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ The paper calls 10 % acceptable (page with figure 7); a lag of 10 ms of both pre
 """
 
 EXPLAINED_FRACTION = 0.5
-"""Least fraction of the variance of a signal that an acceptable model explains (R^2) [-]; the mean explains none."""
+"""Least explained fraction of signal variance (R^2) [-] for an acceptable model; the mean explains 0."""
 
 _FRACTION_UNITS = ("%", "percent")
 _EXAMPLES = "a threshold is written 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
@@ -73,13 +73,13 @@ class ErrorLimit:
     is_fraction: bool
 
     def fraction_of(self, full_range: float) -> float:
-        """Return the limit as a fraction [-] of a full range, given in the SI unit of the channel."""
+        """Return the limit as a fraction [-] of a full range [SI unit of the channel]."""
         return self.value if self.is_fraction else self.value / full_range
 
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """Error limits by channel (``channels``), and limit of all other channels (``others``, None for the default)."""
+    """Error limits by channel (``channels``), and limit of other channels (``others``, None for the default)."""
 
     others: ErrorLimit | None
     channels: Mapping[str, ErrorLimit]
@@ -90,7 +90,7 @@ class Thresholds:
 
 
 def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
-    """Return the thresholds of texts such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later texts override.
+    """Parse thresholds such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later texts override.
 
     Raises DataError for a channel that is not compared, or a limit that is not above 0.
     """
@@ -112,7 +112,7 @@ def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
 
 
 def _limit(value: str, text: str, unit: str) -> ErrorLimit:
-    """Return the limit in ``value``, as a fraction for percent, else in SI; messages show the whole ``text``."""
+    """Parse a limit in ``value``: a fraction for percent, else SI; messages quote the whole ``text``."""
     try:
         is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
         number = parse_quantity(value, "" if is_fraction else unit)

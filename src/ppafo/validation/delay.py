@@ -9,15 +9,15 @@ from ppafo.signals.recording import Floats
 from ppafo.validation.compared import ErrorLimit
 
 _SHIFTS = 81
-"""Number of delays on the initial grid, from one limit to the other."""
+"""Number of delays on the initial search grid between both limits."""
 _MAXIMUM_SAMPLES = 4000
 """Largest number of samples of a channel used to estimate the delay."""
 _MINIMUM_GAIN = 25.0
-"""Least reduction of the squared error by a delay, in sample variances: five standard deviations of white noise."""
+"""Least reduction of the squared error for a delay, in sample variances: five standard deviations of white noise."""
 _SMALLEST_GAIN = 1.0e-12
-"""Gain below which two curves are the same to the accuracy of the engine."""
+"""Reduction of the squared error below which two curves are equal to engine accuracy."""
 _RESOLUTION = 0.02
-"""Delay as a fraction of the sample interval [-] below which it is taken as 0."""
+"""Smallest detectable delay, as a fraction of the sample interval [-]; smaller delays count as 0."""
 _ACCURACY = 1.0e-7
 """Accuracy of the estimated delay as a fraction of the limit [-]."""
 _AT_LIMIT = 0.99
@@ -26,7 +26,7 @@ _AT_LIMIT = 0.99
 
 @dataclass(frozen=True, slots=True)
 class ComparedCurve:
-    """Measured and modelled values of one channel, each with their own times [s].
+    """Measured and modelled values of a channel, each with its own times [s].
 
     ``unit`` is the SI unit of an error, ``full_range`` the full range of the channel, ``usual_zero`` the usual zero
     error of a sensor, both in this unit. ``limit`` is the error limit set by the user, if any.
@@ -43,25 +43,25 @@ class ComparedCurve:
     limit: ErrorLimit | None = None
 
     def shift(self, delay: float, times: Floats) -> Floats:
-        """Return the model delayed by ``delay`` [s] at ``times``, constant outside the range of the model."""
+        """Return the model delayed by ``delay`` [s] at ``times`` [s], constant outside the range of the model."""
         return np.interp(times - delay, self.model_times, self.model_values)
 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """Delay [s] of the measurement with respect to the model, 0 if undetectable, and whether the limit is reached."""
+    """Delay of the measurement behind the model [s], 0 if undetectable, and flag for the search limit."""
 
     value: float
     is_at_limit: bool
 
     @property
     def correction(self) -> float:
-        """Delay [s] to correct for; 0 at the limit, because a best fit there is no longer the delay of a sensor."""
+        """Delay to correct [s]; 0 at the search limit, where the best fit is no longer a sensor delay."""
         return 0.0 if self.is_at_limit else self.value
 
 
 def estimate_delay(curves: list[ComparedCurve], limit: float) -> Delay:
-    """Return the delay within +-``limit`` [s] with the least mean squared error of all channels, in full ranges."""
+    """Return the delay within +-``limit`` [s] with the least mean squared error over all channels."""
     if limit <= 0.0 or not curves:
         return Delay(0.0, is_at_limit=False)
     # No more measured samples than the search needs.

@@ -32,22 +32,22 @@ from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
 from ppafo.wording import nearest_name, override_text
 
 MINIMUM_SAMPLES = 10
-"""Least number of samples of a recording; fewer do not show a signal over time."""
+"""Least number of samples of a recording."""
 
 _REMARKED_GAP = 3.0
-"""Gap in time, in usual sample intervals [-], from which a remark is made."""
+"""Time gap from which a remark is made, in usual sample intervals [-]."""
 _ABOVE_SUPPLY = 0.05
-"""Fraction of the gauge supply pressure [-] by which two pressure sensors may disagree."""
+"""Largest disagreement of two pressure sensors, as a fraction of the gauge supply pressure [-]."""
 _ROUNDING = 1.0e-9
-"""Relative pressure difference [-] that is rounding: a settled chamber may exceed its supply by this much."""
+"""Relative pressure difference [-] due to rounding, by which a settled chamber may exceed its supply."""
 _KILOPASCALS_AS_PSI = 1.0e3 / PASCALS_PER_PSI
 """Factor [-] that corrects a pressure in kPa read as psi."""
 _LEAST_OF_SUPPLY = 0.5
-"""Least peak pressure of a chamber as a fraction of the supply [-] after correction of a unit, to suggest that unit."""
+"""Least peak chamber pressure after correction of the unit, as a fraction of the supply [-], to suggest the unit."""
 _MAXIMUM_RANGES = 20.0
-"""Largest reading in full ranges [-]; more means a damaged line or a wrong unit."""
+"""Largest plausible reading in full ranges [-]; a larger reading means a damaged line or a wrong unit."""
 _MINIMUM_CHANGE = 0.01
-"""Fraction of the full range [-] by which at least one channel must change."""
+"""Least change in at least one channel, as a fraction of the full range [-]."""
 
 if TYPE_CHECKING:
     from pandas import DataFrame  # type: ignore[import-untyped]
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredRecording:
-    """Recording with the name and SHA-256 checksum of its file, and remarks on its quality."""
+    """Measured recording with name and SHA-256 checksum of its file, and remarks on its quality."""
 
     file: str
     sha256: str
@@ -70,7 +70,7 @@ def read_measured(
     columns: ColumnMap | None = None,
     map_name: str = "",
 ) -> MeasuredRecording:
-    """Return a recording, read from a file or result folder unless given as an object.
+    """Read and check a recording, given as an object, a file or a result folder.
 
     With ``columns``, a file is read through this column map, which messages call ``map_name``. Raises DataError if the
     recording cannot be compared with a model.
@@ -98,7 +98,7 @@ def read_all(
     device: Device,
     columns: "ColumnMap | str | Path | None",
 ) -> list[MeasuredRecording]:
-    """Return all recordings of a validation. Raises DataError if there are none or if a recording is given twice."""
+    """Read all recordings of a validation. Raises DataError for no recording or for a recording given twice."""
     if not sources:
         raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
     column_map, map_name = (None, "") if columns is None else column_map_of(columns)
@@ -115,7 +115,7 @@ def read_all(
 
 @in_units(lambda _recording, device, *_: device.shown)
 def check_recording(recording: Recording, device: Device, file: str, sha256: str = "") -> MeasuredRecording:
-    """Return a checked recording with remarks. Raises DataError, starting with ``file``, if it cannot be compared."""
+    """Check that a recording suits validation. Raises DataError, starting with ``file``, if it does not."""
     count = len(recording)
     if count < MINIMUM_SAMPLES:
         noun = "sample" if count == 1 else "samples"
@@ -159,7 +159,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
 
 
 def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
-    """Raise DataError for a misspelt or missing channel name; return remarks on other unknown channels."""
+    """Check channel names: raise DataError if misspelt or missing, return remarks on unknown channels."""
     used = (COMMAND, SUPPLY, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, *COMPARED)
     missing = [name for name in used if name not in recording]
     unknown = [name for name in recording.names if name not in CHANNELS]

@@ -33,13 +33,13 @@ from ppafo.wording import argument_text
 Flags = NDArray[np.bool_]
 
 ONLY_NOISE = 2.0
-"""Mean squared residual divided by noise variance [-] up to which residuals are noise; correlated noise exceeds 1."""
+"""Largest ratio of mean squared residual to noise variance [-] that counts as noise; above 1 for correlated noise."""
 STEPS = 2
 """Number of Gauss-Newton steps from the best trial magnitude."""
 _BY_CHANCE = 1.0e-3
-"""Probability [-] below which a run of equal extreme samples is taken as clipping."""
+"""Probability [-] below which a run of equal extreme samples counts as clipping."""
 _FEW_OUTLIERS = 0.01
-"""Fraction of the samples of a channel [-] up to which isolated outliers are usual for a logger."""
+"""Largest usual fraction of isolated outliers in a channel [-]."""
 
 
 class Record(NamedTuple):
@@ -64,7 +64,7 @@ class Record(NamedTuple):
 
 
 class ScaledResiduals(NamedTuple):
-    """Residuals under a change, divided by noise: mean square of each channel of each recording, and all errors."""
+    """Residuals under a change, divided by noise [-]: mean square by channel and recording, and all errors."""
 
     squares: Floats
     errors: Floats
@@ -78,7 +78,7 @@ class ScaledResiduals(NamedTuple):
 def record_of(
     measured: MeasuredRecording, agreement: RecordingAgreement, device: Device, settings: ReplaySettings
 ) -> Record:
-    """Return the recording with faulty samples marked and the sensitivity of its readings to each initial value."""
+    """Prepare a recording: faulty samples marked, sensitivity of the readings to each initial value."""
     compared = [channel for channel in agreement.channels if channel.channel in SENSORS] or agreement.channels[:1]
     values, noises, faults = zip(*(_samples_of(channel, agreement) for channel in compared), strict=True)
     noise, full_ranges = np.array(noises), np.array([channel.full_range for channel in compared])
@@ -116,7 +116,7 @@ def record_of(
 
 
 def _samples_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> "tuple[Floats, float, _Wrong | None]":
-    """Return values [SI], noise [SI] and faulty samples (or None) of a channel; the noise excludes faulty samples."""
+    """Return values [SI], noise without faulty samples [SI], and faulty samples (or None) of a channel."""
     recording, model = agreement.measured, agreement.model
     values = measured_values(recording, channel.channel)
     assert values is not None
@@ -134,7 +134,7 @@ def _samples_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> "tu
 
 
 class _Wrong(NamedTuple):
-    """Faulty samples of a channel: description, flag of each sample, and whether the faults are isolated outliers."""
+    """Faulty samples of a channel: description, flag by sample, and flag for isolated outliers."""
 
     words: str
     samples: Flags
@@ -142,7 +142,7 @@ class _Wrong(NamedTuple):
 
 
 def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement, time: Floats) -> _Wrong | None:
-    """Return the faulty samples of a channel: constant signal, clipping, or outliers in the samples or residuals."""
+    """Return the faulty samples of a channel: constant signal, clipping, or outliers of samples or residuals."""
     if np.ptp(values) == 0.0:
         locked = argument_text("motion", "locked")
         other_cause = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
@@ -163,7 +163,7 @@ def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement,
 
 
 def _clipped_samples(values: Floats) -> _Wrong | None:
-    """Return the samples at the least or largest value if this value is repeated more often than chance allows.
+    """Return the samples at the least or largest value if repeated more often than by chance, else None.
 
     A coarse converter repeats inner values too. Agreement of the other channels tells a stop of the vane from clipping.
     """
@@ -187,7 +187,7 @@ def _clipped_samples(values: Floats) -> _Wrong | None:
 
 
 def starts_without_wrong(record: Record, device: Device, share: float) -> dict[str, float]:
-    """Return initial values [SI] of channels whose first samples are faulty.
+    """Return initial values [SI] of the channels with faulty first samples.
 
     The value is the mean of the valid first samples, or else a fraction ``share`` [-] of the range of the channel.
     """
@@ -204,7 +204,7 @@ def starts_without_wrong(record: Record, device: Device, share: float) -> dict[s
 
 
 def at_rate(recording: Recording, rate: float) -> Recording:
-    """Return a recording in true time, given the rate [-] of its clock with respect to true time."""
+    """Return a recording in true time, given the ``rate`` of its clock relative to true time [-]."""
     first = recording.time[0]
     return replace(recording, time=first + (recording.time - first) / rate)
 
@@ -240,7 +240,7 @@ def residuals_of(record: Record, replayed: Replayed, change: ModelChange, longes
 def _errors_from(
     record: Record, replayed: Replayed, change: ModelChange, good: Floats, first_delay: float, longest_delay: float
 ) -> Floats:
-    """Return the errors divided by noise (channels * samples,) after Gauss-Newton steps from an initial delay [s].
+    """Return errors divided by noise [-] (channels * samples,) after Gauss-Newton steps from an initial delay [s].
 
     Each step fits the delay and the initial values; these have a prior with a standard deviation of one standard error.
     """

@@ -30,16 +30,16 @@ Motion = Literal["free", "measured", "locked", "leg"]
 MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")
 
 MAXIMUM_STEPS = 20_000_000
-"""Largest number of steps of one replay; longer recordings have times in a wrong unit, or must be split."""
+"""Largest number of steps of a replay; more indicates a wrong time unit."""
 _RECORD_INTERVAL = 2.5e-4
 """Largest interval [s] between two records of the model: fine enough for interpolation and time shifts."""
 _ROUNDING = 1.0e-9
-"""Rounding tolerance [-] when an interval is divided into steps."""
+"""Rounding tolerance [-] for the number of steps in an interval."""
 
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """Result of a replay on the clock of the recording, time step of the engine [s], and names of the inputs."""
+    """Replayed recording on the clock of the measurement, engine time step [s], and names of the inputs."""
 
     recording: Recording
     step: float
@@ -62,7 +62,7 @@ class Replay:
 
 
 def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
-    """Return the results of many replays in order; a replay that is invalid or diverges gives its error.
+    """Run many replays and return their results in order; an invalid or diverging replay gives its error.
 
     Replays with the same program, clock and inputs are run in one batch.
     """
@@ -98,7 +98,7 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
 
 @dataclass(frozen=True, slots=True)
 class _Planned:
-    """Replay ready to run: its request, the planned run, the inputs of each step, and a batch of this single run."""
+    """Replay ready to run: request, planned run, inputs of each step, and a batch with this run alone."""
 
     request: Replay
     run: Run
@@ -107,7 +107,7 @@ class _Planned:
 
 
 def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: Floats) -> Replayed | SimulationError:
-    """Return one replay from its record (records, rows) and final state (rows,), or SimulationError if it diverged."""
+    """Return a replay from its record (records, rows) and final state (rows,), or SimulationError if it diverged."""
     request, run = planned.request, planned.run
     failure_time = float(ends[rows["result.failure_time"]])
     if failure_time < NEVER_FAILED or not np.isfinite(record).all():
@@ -139,7 +139,7 @@ def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: 
 
 
 def followed_channels(measured: MeasuredRecording, motion: Motion) -> tuple[str, ...]:
-    """Return the channels used as inputs; external torque is an input only of a free vane."""
+    """Return the recorded channels used as inputs; external torque is an input of a free vane only."""
     followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in measured.recording]
     followed += [EXTERNAL_TORQUE] if EXTERNAL_TORQUE in measured.recording and motion == "free" else []
     return (COMMAND, *followed, *([ANGLE] if motion == "measured" else []))
@@ -164,7 +164,7 @@ def replayed_scenario(request: Replay) -> Scenario:
 
 
 def _plan(request: Replay) -> Run:
-    """Return the run of a replay: a whole number of samples long, with the measured angle prescribed if requested."""
+    """Return the run of a replay, an integer number of samples long, with a measured angle prescribed if requested."""
     scenario = replayed_scenario(request)
     run = plan_run(scenario)
     if run.step_count > MAXIMUM_STEPS:

@@ -1,4 +1,4 @@
-"""Search for a cause: residuals under changes of the model, best magnitude of each change, and combined changes.
+"""Search for a cause: residuals under model changes, best magnitude of each change, and combined changes.
 
 G = sum over channels of n [ln max(MS0/s^2, 1) - ln max(MSc/s^2, 1)] - k ln N, with MS0 and MSc the mean squared
 residuals without and with a change, s the noise of the n samples of a channel, N the number of all samples, and k = 1
@@ -37,13 +37,13 @@ from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_
 from ppafo.validation.settings import ReplaySettings
 
 _TOGETHER = 32
-"""Number of changes replayed in one batch; limits memory and lets progress be shown."""
+"""Number of changes replayed in a batch, which limits memory and sets the rate of progress reports."""
 _DIFFERENCE = 0.02
 """Step of a finite difference as a fraction of the distance between two trial magnitudes [-]."""
 _SMALL = 0.1
-"""Trial magnitude of a second change as a fraction of the smallest magnitude on its grid [-]."""
+"""Trial magnitude of a second change, relative to the smallest magnitude on its grid [-]."""
 _PARTING = 1.0e-4
-"""Least fraction of a squared slope that is orthogonal to the first change, for a second change to be distinct [-]."""
+"""Least squared fraction of a slope [-] orthogonal to the first change, for a second change to be distinct."""
 _UNUSUAL = 0.01
 """Probability [-] below which several usual sensor errors together are unusual."""
 _SMALLEST = 1.0e-300
@@ -51,7 +51,7 @@ _SMALLEST = 1.0e-300
 
 
 class SizedCause(NamedTuple):
-    """Candidate cause at its best magnitude (for ratios, its logarithm), with its residuals and gain G [-]."""
+    """Candidate cause at its best magnitude (for ratios, its logarithm), with residuals and gain G [-]."""
 
     candidate: CandidateCause
     size: float
@@ -65,7 +65,7 @@ class SizedCause(NamedTuple):
 
     @property
     def is_inside(self) -> bool:
-        """True if the magnitude is not at an end of its grid, beyond which a better one may lie."""
+        """True if the magnitude is inside its grid; at an end, a better magnitude may lie beyond."""
         return min(self.candidate.grid) < self.size < max(self.candidate.grid)
 
     @property
@@ -88,7 +88,7 @@ class _Slope(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class CauseSearch:
-    """Recordings of one device on which changes are tried; ``report`` receives the progress of long searches."""
+    """Recordings of a device on which changes are tried; ``report`` receives the progress."""
 
     device: Device
     settings: ReplaySettings
@@ -97,11 +97,11 @@ class CauseSearch:
 
     @property
     def penalty(self) -> float:
-        """Logarithm of the number of samples: cost of a fitted magnitude, and least G that separates two causes."""
+        """Logarithm of the number of samples: penalty of a fitted magnitude, and least difference of two gains."""
         return math.log(sum(record.values.size for record in self.records))
 
     def evaluated(self, changes: Sequence[ModelChange]) -> list[ScaledResiduals | None]:
-        """Return the residuals under each change; None if the changed device could not have produced the recordings."""
+        """Return the residuals under each change; None for a device that cannot produce the recordings."""
         evaluated: list[ScaledResiduals | None] = []
         for start in range(0, len(changes), _TOGETHER):
             self.report(Progress("searching for causes", start, len(changes), noun="changes"))
@@ -125,7 +125,7 @@ class CauseSearch:
         return evaluated
 
     def _request(self, record: Record, change: ModelChange) -> Replay | None:
-        """Return the replay of the corrected recording on the changed device; None if the device is invalid."""
+        """Return the replay of a corrected recording on the changed device; None for an invalid device."""
         recording, settings = record.measured.recording, self.settings
         for name, sensor in change.sensors.items():
             if name in recording:
@@ -180,7 +180,7 @@ class CauseSearch:
         return float(counts @ (np.log(np.maximum(none.squares, 1.0)) - np.log(np.maximum(residuals.squares, 1.0))))
 
     def _improved(self, causes: Sequence[SizedCause]) -> list[tuple[CandidateCause, float]]:
-        """Return the magnitude of each candidate after a Gauss-Newton step, limited to the neighbouring grid points."""
+        """Return the magnitude of each candidate after a Gauss-Newton step, kept between neighbouring grid points."""
         ends = []
         for cause in causes:
             grid = sorted(cause.candidate.grid)
@@ -199,7 +199,7 @@ class CauseSearch:
     def slopes(
         self, change: ModelChange, residuals: ScaledResiduals, candidates: Sequence[CandidateCause]
     ) -> list[_Slope]:
-        """Return the derivatives of the errors under a change by the magnitude of each further candidate."""
+        """Return the derivatives of the errors under a change, by the magnitude of each additional candidate."""
         # A delay of all sensors is free already, unless the change has one itself.
         is_free = self.settings.longest_delay > 0.0 and not change.has_delay
         candidates = [item for item in candidates if not (is_free and item.at(item.grid[0]).has_delay)]
@@ -212,7 +212,7 @@ class CauseSearch:
         ]
 
     def together(self, usual: Sequence[CandidateCause], none: ScaledResiduals) -> list[CandidateCause]:
-        """Return the likeliest usual errors of all sensors as one change; an empty list if together they are unusual.
+        """Return the likeliest usual errors of all sensors as a single change; empty if together they are unusual.
 
         Only errors of single sensors are used; errors of groups would add to them beyond their limits. In each channel
         the sum of the explained errors, squared and divided by its variance, is chi-square distributed; many errors at
@@ -234,7 +234,7 @@ class CauseSearch:
         return [CandidateCause("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
     def beside_usual(self, slopes: Sequence[_Slope], none: ScaledResiduals, known: Collection[str]) -> list[SizedCause]:
-        """Return unusually large changes that explain the recordings in combination with usual sensor errors.
+        """Return unusually large changes that explain the recordings together with usual sensor errors.
 
         Magnitudes come from a linear fit, and a replay verifies each. Usual errors cost no penalty. Names in ``known``
         are left out.
@@ -264,7 +264,7 @@ class CauseSearch:
         return [cause for cause in causes if cause.explains and cause.is_inside]
 
     def needs_another(self, first: SizedCause, slopes: Sequence[_Slope]) -> bool:
-        """Return whether a second, unusually large change is needed to explain the residuals left by the first.
+        """Return whether the residuals left by the first change need a second, unusually large change.
 
         The test is linear in both magnitudes. The squared error explained by the second change must exceed 2 (ln N + ln
         p) m^2 + e^2, with N samples, p candidates (extended BIC, Chen and Chen 2008), m >= 1 the mean square of the
@@ -297,7 +297,7 @@ class CauseSearch:
 
 
 def _bounded(slopes: Sequence[_Slope], errors: Floats) -> list[float]:
-    """Return the most likely magnitude of each candidate within its usual limit, from a linear fit of the errors.
+    """Return the most likely magnitude of each candidate within its usual limit, from a linear fit.
 
     Each usual limit acts as a prior, so that a magnitude on which the errors carry no information stays small. A
     candidate with an infinite usual magnitude is not bounded.

@@ -1,4 +1,4 @@
-"""Settings of a validation: motion, initial values, delay and error limits, checked and in SI."""
+"""Settings of a validation in SI units: motion, initial values, delay limit and error limits."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,9 +12,9 @@ from ppafo.validation.replay import MOTIONS, Motion
 from ppafo.wording import argument_text, nearest_name, one_line
 
 DEFAULT_LIMIT = 0.02
-"""Default limit of the estimated delay [s]; sensors, filters and valves lag less, so a longer lag is a model error."""
+"""Default limit of the estimated delay [s]; sensors, filters and valves lag less."""
 LARGEST_DELAY = 1.0
-"""Largest limit of the delay that a user may set [s]; with a longer delay the command is not of this recording."""
+"""Largest delay limit that a user may set [s]."""
 _UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
 """Unit of an initial value by channel."""
 _EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2: "pressure_2=50 psi_g"}
@@ -47,7 +47,7 @@ def replay_settings(
     thresholds: Sequence[str],
     longest_delay: float,
 ) -> ReplaySettings:
-    """Return the settings of a validation from its arguments. Raises DataError if arguments contradict each other."""
+    """Check the arguments of a validation and return its settings. Raises DataError for contradictions."""
     if volume is not None and not volume > 0.0:
         raise DataError(f"volume of {volume:g} m^3: must be above 0")
     if not 0.0 <= longest_delay <= LARGEST_DELAY:
@@ -65,7 +65,7 @@ def replay_settings(
 
 
 def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
-    """Return initial values [SI] by channel from texts such as ``pressure_1=0 psi_g``.
+    """Parse initial values [SI] by channel, from texts such as ``pressure_1=0 psi_g``.
 
     Gauge pressures are relative to ``atmosphere`` [Pa absolute]. Raises DataError for an unknown channel, unit or form.
     """
@@ -88,5 +88,5 @@ def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
 
 
 def initial_remedies() -> dict[str, str]:
-    """Return, by channel, the remedy to show if the initial value of a replay was not recorded."""
+    """Return by channel the remedy for an initial value that was not recorded."""
     return {name: f"give its initial value, {argument_text('initial', example)}" for name, example in _EXAMPLES.items()}

@@ -55,7 +55,7 @@ def test_the_text_of_an_import_names_the_file_to_walk_with_and_other_files_are_a
     assert main(["gait", "import", str(walk), "--body-mass", "62 kg", "--name", "mine", "--out", str(out)]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == f"file to use: {out / 'mine.toml'}"
     assert main(["walk", "solenoid", "--gait", str(walk)]) == 2
-    assert "give a .toml file, which 'ppafo gait import' makes of a recording\n" in capsys.readouterr().err
+    assert "give a .toml file, which 'ppafo gait import' makes from a recording\n" in capsys.readouterr().err
     assert main(["walk", "solenoid", "--gait", str(out)]) == 2
     assert f"a directory, not a file; give {out / 'mine.toml'}\n" in capsys.readouterr().err
 

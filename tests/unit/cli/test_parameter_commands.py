@@ -59,7 +59,7 @@ def test_a_place_that_cannot_be_written_is_found_before_any_work(
     file.write_text("mine")
     assert main([*words, "--out", str(file / "deeper")]) == 2
     captured = capsys.readouterr()
-    assert f"{file / 'deeper'}: cannot be written: there is a file '{file}' in the place of a folder" in captured.err
+    assert f"{file / 'deeper'}: cannot be written: '{file}' is a file, not a folder" in captured.err
     assert captured.err.count("\n") == 1
     assert captured.out == ""
     assert file.read_text() == "mine"

@@ -192,7 +192,10 @@ def test_a_mark_that_says_its_files_in_another_form_is_refused(
     assert damage.keys() <= document.keys()
     mark.write_text(json.dumps(document | damage))
     assert main(["export", "figure", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == f"ppafo: {mark}: does not state what its files are\n"
+    assert (
+        capsys.readouterr().err
+        == f"ppafo: {mark}: 'files' must be a list of names and 'sha256' an object; make the result again\n"
+    )
     assert names(tmp_path) == ["ppafo.json", "recording.nc"]
 
 

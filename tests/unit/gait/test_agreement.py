@@ -45,11 +45,13 @@ def test_angles_on_another_clock_than_the_plates_are_said_with_the_delay(
     names: tuple[str, ...],
     seconds: float,
 ) -> None:
-    remark = next(line for line in remarks_of(later(columns, names, seconds), names) if "on one clock" in line)
+    remark = next(
+        line for line in remarks_of(later(columns, names, seconds), names) if "check clocks and filters" in line
+    )
     which = " and ".join(name.partition(" ")[0] for name in names)
     assert remark.startswith(f"{which}: about ")
     assert float(remark.partition("about ")[2].split()[0]) == pytest.approx(1000.0 * abs(seconds), abs=12.0)
-    assert (" behind vertical_force" in remark) is (seconds > 0.0)
+    assert (" late relative to vertical_force" in remark) is (seconds > 0.0)
 
 
 def test_an_ankle_on_another_clock_than_the_shank_is_said_without_a_force(
@@ -58,7 +60,7 @@ def test_an_ankle_on_another_clock_than_the_shank_is_said_without_a_force(
     angles = {name: columns[name] for name in (SHANK, ANKLE)}
     assert not [line for line in remarks_of(angles) if "clock" in line]
     (remark,) = (line for line in remarks_of(later(angles, (ANKLE,), 0.05), (ANKLE,)) if "clock" in line)
-    assert "behind shank_angle" in remark
+    assert "late relative to shank_angle" in remark
 
 
 @pytest.mark.parametrize("names", [(SHANK, ANKLE), (SHANK,), (ANKLE,), (MOMENT,)])
@@ -71,12 +73,12 @@ def test_curves_of_one_file_are_on_one_clock(
 @pytest.mark.parametrize(
     ("name", "factor", "words"),
     [
-        (MOMENT, 1.0 / 1.75, "8 cm from the ankle, usual are 10 to 21 cm: check its scale: N m/kg is per body mass"),
-        (MOMENT, 0.5, "7 cm from the ankle"),
-        (MOMENT, 2.0, "29 cm from the ankle"),
-        (ANKLE, 2.0, "ankle_angle turns 1.9 times as far as shank_angle while the foot stands"),
-        (ANKLE, 0.5, "ankle_angle covers 16 deg in a stride"),
-        (SHANK, 0.5, "shank_angle covers 36 deg in a stride"),
+        (MOMENT, 1.0 / 1.75, "8 cm about the ankle (usual: 10 to 21 cm); check the scale: N m/kg is per body mass"),
+        (MOMENT, 0.5, "7 cm about the ankle"),
+        (MOMENT, 2.0, "29 cm about the ankle"),
+        (ANKLE, 2.0, "ankle_angle changes 1.9 times as much as shank_angle"),
+        (ANKLE, 0.5, "ankle_angle has a range of 16 deg per stride"),
+        (SHANK, 0.5, "shank_angle has a range of 36 deg per stride"),
     ],
 )
 def test_a_curve_of_another_size_than_the_others_let_expect_is_said(
@@ -98,7 +100,7 @@ def test_an_ankle_that_turns_less_than_the_shank_while_the_foot_stands_is_usual_
     # It turned 0.96 times as far; the factors leave what the whole stride covers above 18 deg for the first two alone.
     middle = float(np.mean(columns[ANKLE]))
     scaled = columns | {ANKLE: middle + follows / 0.96 * (columns[ANKLE] - middle)}
-    assert any("times as far as shank_angle" in line for line in remarks_of(scaled)) is is_said
+    assert any("times as much as shank_angle" in line for line in remarks_of(scaled)) is is_said
 
 
 def test_a_moment_without_a_force_is_judged_by_its_peak(
@@ -107,7 +109,7 @@ def test_a_moment_without_a_force_is_judged_by_its_peak(
     given = {name: columns[name] for name in (SHANK, ANKLE, MOMENT)}
     assert not any("ankle_moment" in line for line in remarks_of(given))
     said = remarks_of(given | {MOMENT: given[MOMENT] / 1.75})
-    assert any("ankle_moment reaches 0.832 N m/kg, usual are 0.9 to 2.2 N m/kg" in line for line in said)
+    assert any("ankle_moment reaches 0.832 N m/kg (usual: 0.9 to 2.2 N m/kg)" in line for line in said)
 
 
 def test_the_ankle_of_the_other_foot_is_refused_as_such_and_not_as_a_wrong_zero(
@@ -144,7 +146,7 @@ def test_real_angles_half_a_stride_or_50_ms_away_from_their_plates_are_said(
     moved = ["\t".join([f"{float(row[0]) + 0.05:.6f}", *row[1:]]) for row in rows]
     late.write_text("\n".join([*lines[:first], *moved]) + "\n")
     remarks = import_gait([late, plates], ImportSettings(72.6, side)).remarks
-    assert any(line.startswith("shank_angle and ankle_angle: about ") and "behind" in line for line in remarks)
+    assert any(line.startswith("shank_angle and ankle_angle: about ") and " late " in line for line in remarks)
     names = lines[first - 1].split()
     own, other = (names.index(f"ankle_angle_{foot}") for foot in ("rl" if side == "right" else "lr"))
     swapped = ["\t".join([*row[:own], row[other], *row[own + 1 :]]) for row in rows]

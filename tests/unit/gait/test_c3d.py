@@ -112,9 +112,9 @@ def test_a_walk_the_other_way_is_seen_in_the_markers_and_a_map_may_name_axes_and
     seen = import_gait([path], ImportSettings(normative.body_mass))
     assert same(seen.gait, normative)
     assert knee_error(seen.gait, normative) < 0.15
-    assert "the walk goes along -x, upwards is z" in seen.remarks
+    assert "walking direction is -x, upwards is z" in seen.remarks
     forwards = columns.model_copy(update={"shank_angle": ShankMap(knee="RKNE", ankle="RANK", forward="x")})
-    with pytest.raises(DataError, match="shank_angle grows by 13 deg in stance"):
+    with pytest.raises(DataError, match="shank_angle increases by 13 deg in mid-stance"):
         import_gait([path], ImportSettings(normative.body_mass, columns=forwards))
 
 
@@ -152,7 +152,7 @@ def test_a_label_of_two_points_refuses_nothing_but_itself(
     nobody = np.zeros((3, np.arange(0.0, walk.duration, 0.01).size))
     found = import_gait([written({"C1": nobody, "Other:C1": nobody})], ImportSettings(normative.body_mass))
     assert same(found.gait, normative)
-    assert "points of one name, 'C1': they are 'C1#1', 'C1#2' here" in "\n".join(found.remarks)
+    assert "several points are named 'C1': they were renamed 'C1#1', 'C1#2'" in "\n".join(found.remarks)
     with pytest.raises(
         DataError, match=r"has several different columns 'RANK'; choose 'RANK#1' or 'RANK#2' in a gait map"
     ):
@@ -160,7 +160,7 @@ def test_a_label_of_two_points_refuses_nothing_but_itself(
     content = open_c3d(written({"C1": nobody}))
     content["parameters"]["POINT"]["LABELS"]["value"] = content["parameters"]["POINT"]["LABELS"]["value"][:-1]
     monkeypatch.setattr("ppafo.gait.recorded.forms.c3d.open_c3d", lambda _path: content)
-    assert "points not read, for they have no label: 1" in read_table(written({"C1": nobody})).remarks
+    assert "1 point without a label not read" in read_table(written({"C1": nobody})).remarks
 
 
 def test_what_is_no_c3d_file_is_refused(tmp_path: Path) -> None:
@@ -188,7 +188,7 @@ def test_without_the_library_the_message_says_what_to_install(tmp_path: Path, mo
     ("place", "byte", "told"),
     [
         (b"DESCRIPTIONS\x07\x00\xff", 0x00, "is damaged: the library ezc3d crashes on it"),
-        (b"EZC3D\x03\x00", 0x80, "ezc3d cannot read it|requires far more memory"),
+        (b"EZC3D\x03\x00", 0x80, "ezc3d cannot read the file|requires far more memory"),
     ],
     ids=["no dimensions", "a description of negative length"],
 )

@@ -94,7 +94,7 @@ def test_several_plates_of_one_foot_are_summed_and_named(tmp_path: Path) -> None
     assert_true(found.gait)
     assert len(found.curves["vertical_force"].strides) == 2
     assert (
-        "vertical force: the contacts of this foot, going by the lean of its shank, summed over "
+        "vertical force: sum of the contacts of this foot, judged by the lean of the shank, on "
         "'1_ground_force_vy' (1), '2_ground_force_vy' (1)"
     ) in found.remarks
 
@@ -115,7 +115,7 @@ def test_a_wrong_count_of_columns_and_repeated_last_times_are_mended_and_said(tm
     path.write_text(text + 2 * (text.splitlines()[-1] + "\n"))
     found = import_gait([path], PERSON)
     assert_true(found.gait, ("shank_angle", "ankle_angle"))
-    assert "ik.mot: the header states 9 columns, labels and every row have 5, which were taken" in found.remarks
+    assert "ik.mot: the header states 9 columns, but labels and rows have 5: 5 columns were read" in found.remarks
     assert "ik.mot: the last 2 rows repeat the time 5.19 s and were dropped" in found.remarks
 
 
@@ -129,7 +129,9 @@ def test_one_cycle_that_wraps_around_is_a_stride(tmp_path: Path) -> None:
         assert_true(found.gait)
         assert found.gait.strides == 1
         assert found.gait.stance_share == pytest.approx(0.627, abs=0.01)
-        assert any(line.startswith("one cycle that wraps around: 1.21 s of data around") for line in found.remarks)
+        assert any(
+            line.startswith("the recording is one cycle: 1.21 s of data were closed to") for line in found.remarks
+        )
 
 
 def test_a_cycle_whose_ends_are_not_the_same_motion_is_not_wrapped() -> None:
@@ -162,7 +164,7 @@ def test_markers_give_shank_knee_and_an_ankle_whose_zero_is_the_flat_foot(tmp_pa
         for shift in np.linspace(-0.03, 0.03, 61)
     ]
     assert min(turned) < 0.02, "but for the zero it is the same curve"
-    assert "ankle angle from the markers RHEE and RTOE; its zero is the foot that stands flat" in found.remarks
+    assert "ankle angle from the markers RHEE and RTOE; zero from the flat foot" in found.remarks
     assert not any("zero of ankle_angle" in line for line in found.remarks)
 
 
@@ -234,7 +236,7 @@ def test_a_cell_that_is_no_number_is_a_gap_of_its_column_only(tmp_path: Path) ->
     columns["knee_angle_r"][150] = np.nan
     found = import_gait([opensim(tmp_path / "ik.mot", TIME, columns, "inDegrees=yes")], PERSON)
     assert all(not stride.start <= 1.5 <= stride.end for stride in found.strides)
-    assert any("1 frame of its markers or angles lost" in remark for remark in found.remarks)
+    assert any("markers or angles lost in 1 frame" in remark for remark in found.remarks)
 
 
 def test_start_and_end_leave_out_the_rest(tmp_path: Path) -> None:
@@ -256,7 +258,7 @@ def test_the_reading_of_a_neutral_ankle_may_be_given(tmp_path: Path) -> None:
     columns["ankle_angle_r"] = columns["ankle_angle_r"] - 8.0
     path = opensim(tmp_path / "ik.mot", TIME, columns, "inDegrees=yes")
     (said,) = [line for line in import_gait([path], PERSON).remarks if "zero of ankle_angle" in line]
-    assert "off by 12." in said
+    assert "tilted by 12." in said
     assert "ankle_neutral=-0.2" in said
     found = import_gait([path], ImportSettings(MASS, ankle_neutral=np.radians(-8.0)))
     assert_true(found.gait, ("ankle_angle",))
@@ -343,8 +345,8 @@ def test_a_plain_table_with_opensims_names_is_read(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("frame,shank\n1,2\n", "the first column must be 'time', it is 'frame'"),
-        ("percent [%],a [deg]\n0,1\n", "it is 'percent'; give at least two strides over time"),
+        ("frame,shank\n1,2\n", "the first column must be 'time', not 'frame'"),
+        ("percent [%],a [deg]\n0,1\n", "not 'percent'; give at least two strides over time"),
         ("time,a,\n0,1,2\n", "a column has no name"),
         ("time,a\n0,1,2\n", "line 2 has 3 values for 2 columns"),
         ("time,a\n0,one\n", "line 2"),
@@ -369,12 +371,12 @@ def test_a_column_without_unit_is_one_that_a_gait_map_may_name(tmp_path: Path) -
     table = read_table(path)
     assert (table.units["Kraft"], np.array_equal(table.columns["Kraft"], force(TIME))) == ("", True)
     path.write_text(f"time [s],Kraft\n{''.join(f'{0.01 * k},1{chr(10)}' for k in range(30))}")
-    with pytest.raises(DataError, match=r"Kraft\); name the columns in a gait map \(columns\)"):
+    with pytest.raises(DataError, match=r"Kraft\); name the columns in a gait map \(columns; format"):
         import_gait([path], PERSON)
 
 
 def test_a_plain_table_without_units_asks_for_them(tmp_path: Path) -> None:
     path = tmp_path / "walk.csv"
     path.write_text("time,shank_angle,ankle_angle\n" + "".join(f"{0.01 * k},1,2\n" for k in range(30)))
-    with pytest.raises(DataError, match=r"'shank_angle': the file does not state its unit; give shank_angle.unit in a"):
+    with pytest.raises(DataError, match=r"'shank_angle' has no unit in the file; give shank_angle.unit in a"):
         import_gait([path], PERSON)

@@ -109,41 +109,41 @@ def turned(amplitudes: tuple[float, ...]) -> tuple[float, ...]:
 
 
 IMPLAUSIBLE = {
-    "shank": ({"shank_angle": negative}, "in stance, so the shank would rotate backwards over the foot"),
+    "shank": ({"shank_angle": negative}, "in mid-stance, so the shank would rotate backwards over the foot"),
     "ankle": (
         {"ankle_angle": lambda c: dataclasses.replace(negative(c), mean=math.pi - c.mean)},
-        "its sign is reversed; write mean, cosine and sine with the other sign about 90 deg",
+        "the sign is reversed; write mean, cosine and sine with the opposite sign about 90 deg",
     ),
     "zero of the ankle": (
         {"ankle_angle": lambda c: dataclasses.replace(c, mean=c.mean - math.pi / 2)},
-        "write its mean so that it is 90 deg when the foot is perpendicular to the shank",
+        "correct the mean so that the angle is 90 deg with the foot perpendicular to the shank",
     ),
-    "moment": ({"ankle_moment": negative}, "its sign is reversed; write mean, cosine and sine with the other sign"),
+    "moment": ({"ankle_moment": negative}, "its sign is reversed; write mean, cosine and sine with the opposite sign"),
     "unit of the shank": ({"shank_angle": lambda c: c.scale(math.radians(1.0))}, "the numbers look like radians"),
     "force in newton": ({"vertical_force": lambda c: c.scale(608.0)}, "check the body mass and the unit"),
     "moment of the other foot": (
         {"ankle_moment": lambda c: dataclasses.replace(c, cosines=turned(c.cosines), sines=turned(c.sines))},
-        "peaks at 98 % of the stride, but the foot is off the ground from 64 % on; write the moment of this foot",
+        "peaks at 98 % of the stride, but the foot is off the ground from 64 % on; give the moment of the same foot",
     ),
     "knee in g": (
         {"knee_forward": lambda c: c.scale(1.0 / 9.80665), "knee_up": lambda c: c.scale(1.0 / 9.80665)},
-        "are in units of g: while the foot is flat",
+        "are in units of g: they differ by",
     ),
     "knee forward": (
         {"knee_forward": negative},
-        "knee_forward is -10.5 m/s^2 about toe-off and 7.82 m/s^2 in mid-swing; in walking both signs are opposite",
+        "knee_forward is -10.5 m/s^2 around toe-off and 7.82 m/s^2 in mid-swing, opposite to walking",
     ),
     "knee up": (
         {"knee_up": negative},
-        "its sign is reversed, or it is of the other knee; write mean, cosine and sine with the other sign",
+        "the sign is reversed, or the data are of the other knee; write mean, cosine and sine with the opposite sign",
     ),
     "knee with gravity": (
         {"knee_up": lambda c: dataclasses.replace(c, mean=9.81)},
-        "knee_up is 9.81 m/s^2 on average, and a periodic stride has 0",
+        "knee_up has a mean of 9.81 m/s^2, but must average to 0 over a stride",
     ),
     "knee in another unit": (
         {"knee_forward": lambda c: c.scale(100.0)},
-        "knee_forward covers a range of 2.02e+03 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; check the unit",
+        "knee_forward has a range of 2.02e+03 m/s^2 per stride (plausible: 0.5 to 80 m/s^2); check the unit",
     ),
 }
 
@@ -161,14 +161,14 @@ def test_a_gait_file_that_no_leg_walks_is_refused_with_the_remedy(normative: Gai
 def test_a_gait_file_with_its_knee_exchanged_is_refused(normative: Gait) -> None:
     wrong = dataclasses.replace(normative, knee_forward=normative.knee_up, knee_up=normative.knee_forward)
     with pytest.raises(
-        DataError, match=r"^bad.toml: knee_forward and knee_up are exchanged: .*; exchange them in every"
+        DataError, match=r"^bad.toml: knee_forward and knee_up are exchanged: .*; exchange them in the gait file"
     ):
         parse_gait(gait_toml(wrong).encode(), "bad.toml")
 
 
 def test_a_gait_file_needs_no_knee_but_not_half_of_one(normative: Gait) -> None:
     half = dataclasses.replace(normative, knee_up=None)
-    with pytest.raises(DataError, match=r"half.toml: knee_forward needs knee_up; give both, or neither"):
+    with pytest.raises(DataError, match=r"half.toml: knee_forward needs knee_up; give both or neither"):
         parse_gait(gait_toml(half).encode(), "half.toml")
     without = dataclasses.replace(normative, knee_forward=None, knee_up=None)
     again = parse_gait(gait_toml(without).encode(), "without.toml")
@@ -296,7 +296,7 @@ def test_stride_times_of_the_subject_follow_the_law_of_the_scaling(normative: Ga
     assert np.sqrt(np.mean(error**2)) < 0.7 * np.sqrt(np.mean(unscaled**2))
 
 
-@pytest.mark.parametrize(("tilt", "remarked"), [(0.0, ""), (5.0, "off by 9.6 deg"), (-12.0, "off by 7.4 deg")])
+@pytest.mark.parametrize(("tilt", "remarked"), [(0.0, ""), (5.0, "tilted by 9.6 deg"), (-12.0, "tilted by 7.4 deg")])
 def test_an_ankle_zero_that_is_off_is_remarked_with_the_correction(tilt: float, remarked: str) -> None:
     gait = load_gait()
     moved = replace(gait, ankle_angle=replace(gait.ankle_angle, mean=gait.ankle_angle.mean + math.radians(tilt)))
@@ -304,7 +304,7 @@ def test_an_ankle_zero_that_is_off_is_remarked_with_the_correction(tilt: float, 
     assert bool(remarks) == bool(remarked)
     assert all(remarked in line for line in remarks)
     if remarks:
-        mean = float(re.search(r"would be (\S+) deg", remarks[0])[1])  # type: ignore[index]
+        mean = float(re.search(r"to (\S+) deg$", remarks[0])[1])  # type: ignore[index]
         corrected = replace(gait, ankle_angle=replace(gait.ankle_angle, mean=math.radians(mean)))
         assert abs(standing_tilt_of(corrected)) < 0.1
 
@@ -318,7 +318,9 @@ def standing_tilt_of(gait: Gait) -> float:
 def test_an_ankle_zero_that_no_standing_foot_has_is_refused(tilt: float) -> None:
     gait = load_gait()
     moved = replace(gait, ankle_angle=replace(gait.ankle_angle, mean=gait.ankle_angle.mean + math.radians(tilt)))
-    with pytest.raises(DataError, match=r"would tilt the foot by -?2\d deg in stance, plausible is up to 20 deg"):
+    with pytest.raises(
+        DataError, match=r"implies a foot tilted by -?2\d deg in mid-stance \(plausible: up to 20 deg\)"
+    ):
         parse_gait(gait_toml(moved).encode(), "moved.toml")
 
 

@@ -116,7 +116,7 @@ def test_a_name_that_two_columns_have_is_refused_where_it_is_asked_for(tmp_path:
     assert list(read_foreign(written(tmp_path, text), columns)["torque"]) == [3.0, 4.0]
     columns = mapped(header=True, channels={"time": time, "torque": {"column": "p", "unit": "N m"}})
     with pytest.raises(
-        DataError, match=r"channels\.torque\.column: columns 2 and 3 are both called 'p'; give the number of"
+        DataError, match=r"channels\.torque\.column = 'p': columns 2 and 3 have this name; give the number of"
     ):
         read_foreign(written(tmp_path, text), columns)
 
@@ -185,9 +185,9 @@ def test_a_netcdf_file_is_not_taken_for_text_in_another_encoding(tmp_path: Path)
     ("channel", "message"),
     [
         ({"column": 2, "unit": "N"}, "a unit like 'N m' is needed"),
-        ({"column": "torque", "unit": "N m"}, "the file has no header; give its number"),
+        ({"column": "torque", "unit": "N m"}, "has no column names; give the column number"),
         ({"column": 2, "constant": "1 N m"}, "both a column and a constant"),
-        ({}, "channels.torque gives no column or constant"),
+        ({}, "channels.torque needs a column or constant"),
         ({"column": 2, "unit": "N", "times": "arm"}, "does not start with a number"),
         ({"constant": "3 bananas"}, "not a known unit"),
     ],
@@ -328,7 +328,7 @@ def test_a_delimiter_that_the_map_lacks_is_named(tmp_path: Path, text: str, head
 def test_commas_for_columns_and_decimals_alike_are_named_whatever_the_map_says(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,u\n0,5,1,5\n")
     channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "u"}}
-    with pytest.raises(DataError, match="commas seem to separate columns and decimals alike"):
+    with pytest.raises(DataError, match="commas seem to be both delimiter and decimal mark"):
         read_foreign(tmp_path / "log.csv", ColumnMap.model_validate({"decimal": "comma", "channels": channels}))
 
 
@@ -366,7 +366,7 @@ def test_of_many_doubled_names_three_are_told_and_the_rest_counted() -> None:
     twins = {f"M{number}": [f"M{number}#1", f"M{number}#2"] for number in range(9)}
     said = said_of_doubled(twins, {name: 0 for names in twins.values() for name in names}, "columns")
     assert len(said) == 4
-    assert said[-1] == "so are columns of 6 more names"
+    assert said[-1] == "columns of 6 more repeated names were renamed likewise"
 
 
 def test_one_of_many_trials_with_a_clock_from_0_each_is_a_recording(tmp_path: Path) -> None:
@@ -381,7 +381,7 @@ def test_one_of_many_trials_with_a_clock_from_0_each_is_a_recording(tmp_path: Pa
     ):
         read_foreign(path, mapped(channels=channels, trial=4))
     with pytest.raises(
-        DataError, match=r"line 5, column 'time'.*, or take one of 3 trials with trial = 1, or 'all', in a"
+        DataError, match=r"line 5, column 'time'.*; to read its 3 trials, give trial = 1, or 'all', in a"
     ):
         read_foreign(path, mapped(channels=channels))
 
@@ -394,7 +394,7 @@ def test_some_trials_or_all_are_a_recording_each(tmp_path: Path) -> None:
     assert [one["torque"][0] for one in every] == [100.0, 200.0, 300.0]
     some = read_trials(path, mapped(channels=channels, trial=[3, 1]))
     assert [one["torque"][0] for one in some] == [300.0, 100.0]
-    with pytest.raises(DataError, match=r"raw.csv: trial: the file has 3 recordings; name one"):
+    with pytest.raises(DataError, match=r"raw.csv: trial selects 3 recordings; give the number of one trial"):
         read_foreign(path, mapped(channels=channels, trial="all"))
     with pytest.raises(
         DataError, match=r"raw.csv: trial = 7: the clock restarts 2 times, so the file has trials 1 to 3"

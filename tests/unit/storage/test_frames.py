@@ -64,7 +64,7 @@ def test_other_channels_need_a_unit() -> None:
             lambda: frame(**{"pressure_1 [bar_g]": np.where(TIME == 0.0, np.nan, FALL)}),
             r"column 'pressure_1 \[bar_g\]': row 0 is nan, not a finite number",
         ),
-        (lambda: frame(word="a"), "column 'word' is not of numbers"),
+        (lambda: frame(word="a"), "column 'word' is not numeric"),
         (lambda: frame().iloc[::-1], "the clock goes backwards"),
         (lambda: dataset_of(a_recording()).rename(time="t"), "the Dataset has no coordinate 'time'"),
     ],

@@ -61,7 +61,9 @@ def test_labview_with_a_header_and_decimal_commas(tmp_path: Path, name: str) -> 
 
 def test_a_header_further_down_is_answered_with_what_to_skip(tmp_path: Path) -> None:
     path = written(tmp_path, "test.txt", LVM)
-    with pytest.raises(DataError, match=r'line 16 has it: give skip_lines = 15 and delimiter = "tab"') as caught:
+    with pytest.raises(
+        DataError, match=r'line 16 contains this name: give skip_lines = 15 and delimiter = "tab"'
+    ) as caught:
         read_foreign(path, columns({"time": TIME, "pressure_1": DRUCK}, delimiter="tab", decimal="comma"))
     assert "channels.time.column = 'X_Value'" in str(caught.value)
 
@@ -135,7 +137,7 @@ def test_a_volume_flow_without_its_condition_asks_for_it(tmp_path: Path, unit: s
 def test_a_condition_of_no_flow_is_named_with_its_key(tmp_path: Path) -> None:
     path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
     chosen = columns({"time": {"column": "t", "unit": "s"}, "torque": {"column": "Q", "unit": "N m", "at": "ANR"}})
-    with pytest.raises(DataError, match=r"channels\.torque\.unit .*apply only to a volume flow"):
+    with pytest.raises(DataError, match=r"channels\.torque\.unit .*are allowed only for a volume flow"):
         read_foreign(path, chosen)
 
 
@@ -271,7 +273,7 @@ def test_times_of_day_and_rates_with_variables_of_matlab(matlab: Path) -> None:
 @pytest.mark.parametrize(
     ("column", "message"),
     [
-        ("p11", "channels.pressure_1.column = 'p11': the file has no such column, did you mean 'p1'"),
+        ("p11", "channels.pressure_1.column = 'p11': the file has no such variable, did you mean 'p1'"),
         ("scale", "it has"),
     ],
 )

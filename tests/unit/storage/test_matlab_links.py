@@ -45,7 +45,7 @@ def test_numbers_of_another_file_are_refused(fill: Any, tmp_path: Path, monkeypa
     monkeypatch.chdir(tmp_path)
     written(tmp_path / "secret.h5", lambda _file: None)
     Path("secret.txt").write_text("root", encoding="utf-8")
-    with pytest.raises(DataError, match=r"'other' is a link|numbers of 'other' are in another file"):
+    with pytest.raises(DataError, match=r"'other' is an HDF5 link|numbers of 'other' are stored in another file"):
         read_matlab(written(tmp_path / "given.mat", fill))
 
 

@@ -49,7 +49,7 @@ def test_a_file_cut_off_anywhere_is_refused_by_name(tmp_path: Path) -> None:
     path = tmp_path / "cut.nc"
     for share in (0.001, 0.2, 0.5, 0.9, 0.999):
         path.write_bytes(whole[: int(len(whole) * share)])
-        with pytest.raises(DataError, match="no complete NetCDF file of a recording"):
+        with pytest.raises(DataError, match="not a complete NetCDF recording"):
             read_netcdf(path)
 
 
@@ -57,7 +57,7 @@ def test_a_file_cut_off_anywhere_is_refused_by_name(tmp_path: Path) -> None:
 def test_a_file_of_another_kind_is_refused_by_name(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "other.nc"
     path.write_bytes(content)
-    with pytest.raises(DataError, match=r"other\.nc: is no complete NetCDF file"):
+    with pytest.raises(DataError, match=r"other\.nc: is not a complete NetCDF recording"):
         read_netcdf(path)
 
 
@@ -101,7 +101,7 @@ def test_an_unknown_kind_is_refused_by_file_with_the_nearest(tmp_path: Path) -> 
 def test_a_wrong_unit_is_refused_by_file_and_channel(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"bench\.nc: .*channel 'angle' is in 'deg', it is always kept in 'rad'"):
         read_netcdf(changed(tmp_path / "bench.nc", "angle", "deg"))
-    with pytest.raises(DataError, match=r"'time' is in 'ms', it must be in 's'"):
+    with pytest.raises(DataError, match=r"'time' must be in 's', not in 'ms'"):
         read_netcdf(changed(tmp_path / "bench.nc", "time", "ms"))
 
 
@@ -110,7 +110,7 @@ def test_a_dataset_of_something_else_is_refused(tmp_path: Path) -> None:
 
     path = tmp_path / "map.nc"
     xarray.Dataset({"height": (("x", "y"), np.zeros((2, 3)))}).to_netcdf(path, engine="h5netcdf")
-    with pytest.raises(DataError, match="there is no variable 'time'"):
+    with pytest.raises(DataError, match="has no variable 'time'"):
         read_netcdf(path)
 
 

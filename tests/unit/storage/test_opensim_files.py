@@ -48,17 +48,23 @@ def test_line_ends_of_every_system_are_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (NEW.replace("endheader\n", "") + ROWS, "has no line 'endheader': it is cut off in its header"),
+        (NEW.replace("endheader\n", "") + ROWS, "has no line 'endheader': the header is cut off"),
         ("Walk\nnRows=3\n", "has no line 'endheader'"),
         (NEW.partition("time")[0], "has nothing after 'endheader': the file is cut off"),
         (NEW, "has labels but no rows"),
-        (NEW + ROWS.rpartition("0.02")[0], "has 2 rows, its header states 3: the file is cut off or was edited"),
-        (OLD + ROWS + "0.03 1 1\n", "has 4 rows, its header states 3"),
+        (NEW + ROWS.rpartition("0.02")[0], "has 2 rows, but the header states 3: the file is cut off or was edited"),
+        (OLD + ROWS + "0.03 1 1\n", "has 4 rows, but the header states 3"),
         (NEW.replace("nRows=3", "nRows=three") + ROWS, "line 3: nRows is 'three', not a whole number"),
         (NEW.replace("nColumns=3", "nColumns=4") + ROWS.replace("\t.5", ""), "line 10 has 2 values for 3 columns"),
-        (NEW.replace("inDegrees=yes", "inDegrees=maybe") + ROWS, "line 5: inDegrees is 'maybe'; it is 'yes' or 'no'"),
-        (NEW.replace("endheader", "Angles are in radians.\nendheader") + ROWS, "the header states degrees and radians"),
-        (NEW.replace("time\t", "frame\t") + ROWS, "line 7: the first column must be 'time', it is 'frame'"),
+        (
+            NEW.replace("inDegrees=yes", "inDegrees=maybe") + ROWS,
+            "line 5: inDegrees is 'maybe'; it must be 'yes' or 'no'",
+        ),
+        (
+            NEW.replace("endheader", "Angles are in radians.\nendheader") + ROWS,
+            "the header states both degrees and radians",
+        ),
+        (NEW.replace("time\t", "frame\t") + ROWS, "line 7: the first column must be 'time', not 'frame'"),
         (NEW + ROWS.replace("\t2\n", "\tnan\n"), "line 8, column 'ankle_angle_r': 'nan' is not a finite number"),
         (NEW + ROWS.replace("-1.6", "1,6"), "line 9, column 'knee_angle_r': '1,6' is not a finite number"),
         (NEW + ROWS.replace("-1.7", "1e999"), "line 10, column 'knee_angle_r': '1e999' is not a finite number"),
@@ -127,4 +133,4 @@ def test_real_files_of_opensim_are_read(
 def test_two_columns_of_one_label_have_their_numbers(tmp_path: Path) -> None:
     found = read_opensim(table(NEW.replace("ankle_angle_r", "knee_angle_r") + ROWS, tmp_path))
     assert list(found.columns) == ["knee_angle_r#1", "knee_angle_r#2"]
-    assert "columns of one name, 'knee_angle_r'" in found.remarks[-1]
+    assert "several columns are named 'knee_angle_r'" in found.remarks[-1]

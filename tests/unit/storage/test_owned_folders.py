@@ -70,7 +70,7 @@ def test_a_mark_without_hashes_removes_nothing(tmp_path: Path) -> None:
     mark = {"format": "ppafo files", "schema_version": 1, "command": "reproduce", "files": ["thesis.txt"]}
     (tmp_path / MARK).write_text(json.dumps(mark))
     (tmp_path / "thesis.txt").write_text("years of work")
-    with pytest.raises(DataError, match=r"has no hashes of its files, .* remove the folder"):
+    with pytest.raises(DataError, match=r"has no file hashes .* remove the folder"):
         write_reproduction(tmp_path, WHOLE)
 
 
@@ -182,7 +182,7 @@ def test_folder_that_cannot_be_renamed_is_refused_before_anything_runs(
 
     check_reproduction_folder(out)
     monkeypatch.setattr(Path, "rename", busy)
-    with pytest.raises(DataError, match=r"cannot be replaced \(device or resource busy\); choose a new folder in it"):
+    with pytest.raises(DataError, match=r"cannot be replaced \(device or resource busy\); choose a new subfolder"):
         check_reproduction_folder(out)
     assert contents(out) == there
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
@@ -207,5 +207,5 @@ def test_earlier_result_and_new_one_change_places_in_one_step(tmp_path: Path, mo
 
 @pytest.mark.parametrize("address", ["s3://bucket/out", "https:/host/out"])
 def test_an_address_is_no_folder(address: str) -> None:
-    with pytest.raises(DataError, match=r": is an address; .* is written into a folder of this computer"):
+    with pytest.raises(DataError, match=r": is a remote address; .* needs a local folder"):
         check_owned_folder(Path(address), marked_folder("compare"))

@@ -85,7 +85,7 @@ def filled_with_something_else(folder: Path) -> str:
 
 def filled_with_a_run_file_of_another_program(folder: Path) -> str:
     (folder / "run.json").write_text('{"format": "other"}')
-    return "is not of a ppafo result"
+    return "does not belong to a ppafo result"
 
 
 def filled_with_a_result_and_something_else(folder: Path) -> str:
@@ -126,7 +126,7 @@ def test_a_file_in_the_place_of_the_folder_or_above_it_is_refused(tmp_path: Path
     file.write_text("")
     with pytest.raises(DataError, match="is a file; a ppafo result needs a folder"):
         check_result_folder(file)
-    with pytest.raises(DataError, match=r"task: cannot be written: there is a file '.*file' in the place of a folder"):
+    with pytest.raises(DataError, match=r"task: cannot be written: '.*file' is a file, not a folder"):
         check_result_folder(file / "task")
 
 
@@ -208,9 +208,9 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path, monkeypatch:
         ("", "is empty"),
         ("{", "is not JSON"),
         ("[" * 100_000, "is not JSON"),
-        ("[]", "is not of a ppafo result"),
+        ("[]", "does not belong to a ppafo result"),
         ('{"format": "ppafo result", "schema_version": 99}', "has schema_version 99, this version of ppafo reads 1"),
-        ('{"format": "ppafo result", "schema_version": 1}', "does not state what its recording and its files are"),
+        ('{"format": "ppafo result", "schema_version": 1}', "'recording' must be an object and 'files' a list"),
     ],
 )
 def test_an_unusable_document_is_one_line_that_names_it(tmp_path: Path, content: str, message: str) -> None:
@@ -239,7 +239,7 @@ def test_a_recording_that_changed_on_disk_is_refused_before_it_is_opened(tmp_pat
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.xlsx").write_bytes(b"")
-    with pytest.raises(DataError, match=r"is no \.nc, \.parquet or \.csv, .* file and no result folder"):
+    with pytest.raises(DataError, match=r"must be a result folder or a \.nc, \.parquet, \.csv, .* or \.asc file"):
         read_recording(tmp_path / "a.xlsx")
     with pytest.raises(DataError, match=r"nothing: no such file or folder"):
         read_recording(tmp_path / "nothing")
@@ -249,5 +249,8 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
 
 def test_a_folder_of_an_analysis_is_no_result_of_a_run_and_says_what_reads_it(tmp_path: Path) -> None:
     ppafo.audit("ppafo2011").save(tmp_path / "audit")
-    with pytest.raises(DataError, match="is a result of 'ppafo sets audit', not of a run; 'ppafo export figure' draws"):
+    with pytest.raises(
+        DataError,
+        match="is a result of 'ppafo sets audit', not of a run; use its JSON file for numbers, read",
+    ):
         ppafo.read_result(tmp_path / "audit")

@@ -34,12 +34,12 @@ def test_markers_are_read_and_what_was_not_seen_is_a_gap(tmp_path: Path, end: st
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("time,angle\n0,1\n", "is not a .trc file: its first line begins with 'PathFileType'"),
+        ("time,angle\n0,1\n", "is not a .trc file: line 1 must begin with 'PathFileType'"),
         (HEAD, "has no rows"),
         (HEAD.replace("\tmm\n", "\tinch\n") + ROWS, "line 3: Units is 'inch'; allowed are mm, cm, m"),
         (HEAD.replace("\tUnits", "") + ROWS, "line 3: Units is ''; allowed are mm, cm, m"),
         (HEAD.replace("Time", "Clock") + ROWS, "line 4: must begin with 'Frame#', 'Time'"),
-        (HEAD.replace("RKNE", "").replace("R.Ankle", "") + ROWS, "line 4: names no marker"),
+        (HEAD.replace("RKNE", "").replace("R.Ankle", "") + ROWS, "line 4: has no marker names"),
         (HEAD + ROWS.replace("\t6\n2", "\t6\t7\n2"), "line 7 has 9 values for 8 columns"),
         (HEAD + ROWS.replace("\t4\t", "\tfour\t", 1), "line 7, column 'X of R.Ankle': 'four' is not a finite number"),
         (HEAD + ROWS.replace("0.01", "nan"), "line 8, column 'time': 'nan' is not a finite number"),
@@ -69,7 +69,7 @@ def test_two_markers_of_one_name_have_their_numbers(tmp_path: Path) -> None:
     found = read_trc(table(HEAD.replace("R.Ankle", "RKNE") + ROWS, tmp_path))
     assert list(found.markers) == ["RKNE#1", "RKNE#2"]
     assert found.markers["RKNE#2"][:, 1].tolist() == [4.0, 5.0, 6.0]
-    assert found.remarks == ("markers of one name, 'RKNE': they are 'RKNE#1', 'RKNE#2' here",)
+    assert found.remarks == ("several markers are named 'RKNE': they were renamed 'RKNE#1', 'RKNE#2'",)
 
 
 def test_the_same_marker_twice_is_one(tmp_path: Path) -> None:

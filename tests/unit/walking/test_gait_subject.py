@@ -113,4 +113,4 @@ def test_a_subject_who_cannot_wear_the_device_is_refused_with_the_key(tmp_path: 
 def test_a_tilted_foot_is_remarked_where_it_walks(tmp_path: Path) -> None:
     straight, tilted = (load_walk("off", gait=gait_file(tmp_path, 62.0, tilt=tilt)) for tilt in (0.0, 0.1))
     assert len(person_remarks(straight)) == 1
-    assert "the zero of ankle_angle seems to be off by 10.3 deg" in person_remarks(tilted)[1]
+    assert "the flat foot appears tilted by 10.3 deg" in person_remarks(tilted)[1]

@@ -36,7 +36,7 @@ _PROBABILITY = Kind(form=".4g")
 
 @dataclass(frozen=True, slots=True)
 class ConfigurationResult:
-    """Result of a configuration on a task.
+    """Result of a configuration on a task: nominal run, and runs over the draws.
 
     ``status``: end of the nominal run
     ``metrics``: metrics of the nominal run
@@ -67,7 +67,7 @@ class ConfigurationResult:
         return self.tracking is None or not self.tracking.is_useless
 
     def value(self, metric: str) -> float:
-        """Return a metric [SI] of the nominal run, nan if the run does not have this metric."""
+        """Return a metric [SI] of the nominal run; nan if the run does not have the metric."""
         values = self.metrics.get(metric)
         return math.nan if values is None else values.value
 
@@ -89,7 +89,7 @@ class TaskComparison:
     best: dict[str, dict[str, ConfidenceInterval]]
 
     def case(self, configuration: str) -> ConfigurationResult:
-        """Return the result of a configuration."""
+        """Return the result of a configuration by its name."""
         return next(case for case in self.cases if case.configuration == configuration)
 
 
@@ -291,7 +291,7 @@ _MARKS = "osD^vP"
 _MAXIMUM_DOTS = 1500
 _BINS = 40
 _TICKS_OF_CHANGE = 4
-"""Largest number of intervals between ticks: labels such as -98.85 do not touch."""
+"""Largest number of tick intervals on the axis of the change, so that labels such as -98.85 do not touch."""
 _SHOWN_PERCENTILES = (0.5, 99.5)
 """Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
 
@@ -306,7 +306,7 @@ def _change_panels(comparison: ComparisonResult) -> list[Panel]:
 
 
 def _colours(task: TaskComparison) -> dict[str, str]:
-    """Return a colour for each configuration: its valve's colour if these differ, else the palette's in order."""
+    """Return a colour for each configuration: colours of the valves if all differ, else of the palette in order."""
     of_valves = [look_of_valve(case.scenario.device.valve.kind).colour for case in task.cases]
     chosen = (
         of_valves

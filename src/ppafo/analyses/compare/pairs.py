@@ -14,7 +14,7 @@ from ppafo.studies.intervals import effective_sample_size, noise_interval, repli
 
 Masks = NDArray[np.bool_]
 OUTER_QUANTILES = (0.05, 0.95)
-"""Quantiles over the draws that tables show beside a median."""
+"""Quantiles over the draws that tables show next to the median."""
 COMPARED: dict[str, int] = {
     **{name: -1 for name in TRACKING if name not in ONE_INSTANT},
     "gas_supplied": -1,
@@ -30,7 +30,7 @@ COMPARED: dict[str, int] = {
     "torque_error": -1,
     "toe_clearance": 1,
 }
-"""Metrics of the table: -1 if smaller is better, 1 if larger is better, 0 if neither."""
+"""Compared metrics by name: -1 if smaller is better, 1 if larger is better, 0 if neither."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ def compare_pairs(
 
 
 def best_probabilities(values: Sequence[Floats], better: int, confidence: float) -> list[ConfidenceInterval]:
-    """Return the probability of each configuration to be the best in a draw; equally good ones all count."""
+    """Return the probability of each configuration to be the best in a draw; a tie counts for all of the best."""
     table = better * np.stack(values)
     known = np.all(np.isfinite(table), axis=0)
     if not known.any():

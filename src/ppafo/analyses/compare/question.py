@@ -1,4 +1,4 @@
-"""The question which configuration is better: its arguments."""
+"""Public function ``compare``: arguments of a comparison of configurations."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def compare(
 ) -> Finding[ComparisonResult]:
     """Compare configurations, also over an uncertain device.
 
-    All have common random numbers. ``configurations`` are scenarios by name (or a list of names, files or Scenario
-    objects). Draws are randomised Sobol replicates whatever the study's sampling method; where a controller receives
-    noise, each has a noise stream of its own, the same in all configurations, and without a study the noise alone is
-    drawn. Runs that fail are left out in pairs.
+    All configurations get the same random numbers. ``configurations`` are scenarios by name (or a list of names, files
+    or Scenario objects). Draws are randomised Sobol replicates whatever the study's sampling method. With sensor noise,
+    each draw has its own noise stream, the same in all configurations; without a study, only the noise is drawn. A draw
+    that fails in a configuration is left out of its pairs.
 
     Arguments:
         configurations: names of scenarios or .toml files; default: the configurations of the study

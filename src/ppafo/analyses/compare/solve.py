@@ -26,7 +26,7 @@ from ppafo.study.runs import Rows, RunCounter, failures_of, scenario_runs, unvar
 from ppafo.wording import argument_text, first_twice, nearest_name, said_of_configuration
 
 AS_WRITTEN = "as written"
-"""Name of the task of configurations that run as written."""
+"""Task name of scenarios that run as written, without overrides of a task."""
 DEFAULT_DRAWS = 4096
 """Default number of draws of the uncertain values."""
 _SAME = 1.0e-9
@@ -52,11 +52,11 @@ class DrawSettings:
 
     @property
     def count(self) -> int:
-        """Number of draws."""
+        """Number of draws of the uncertain values; ``DEFAULT_DRAWS`` if not requested."""
         return DEFAULT_DRAWS if self.requested is None else self.requested
 
     def check(self) -> None:
-        """Raise StudyError for numbers outside their ranges."""
+        """Raise StudyError for numbers of draws, confidence or failed runs outside their ranges."""
         if not FEWEST_DRAWS <= self.count <= MAXIMUM_DRAWS:
             raise StudyError(f"draws = {self.count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
         check_fraction(self.confidence, *CONFIDENCE)
@@ -64,11 +64,11 @@ class DrawSettings:
 
 
 Scenarios = Mapping[tuple[str, str], Scenario]
-"""Scenarios by task and configuration."""
+"""Scenarios by name of the task and name of the configuration."""
 
 
 class _DrawnRuns(NamedTuple):
-    """Runs of a scenario over the draws.
+    """Runs of a scenario over the draws of the uncertain values.
 
     ``rows``: runs; None without draws
     ``renoised``: first runs repeated with other sensor noise; None without noise
@@ -175,7 +175,7 @@ def compared(
 
 
 def _check_different_values(study: Study, scenarios: Scenarios) -> None:
-    """Raise StudyError if the study draws one value for scenarios that have different ones."""
+    """Raise StudyError for a path that the study draws once for scenarios whose declared values differ."""
     for path in study.paths:
         # Orifices of different valves are meant to differ: what the study draws replaces the value of each.
         if path.startswith("valve.") or path == NOISE:

@@ -16,7 +16,7 @@ FILE = TomlKind("design", "design", resources.files("ppafo.analyses.design") / "
 
 @checked
 def load_design(problem: str | Path, *, plugins: Plugins = ()) -> SizingProblem:
-    """Return the problem of a design file, by its name in the package or by its path.
+    """Load the sizing problem of a design file with a torque profile, by its name in the package or by its path.
 
     Paths in a design file are relative to its folder. ``plugins`` are modules of your own whose objects files may name,
     as in ``simulate``.

@@ -1,4 +1,4 @@
-"""The device for what was given: a wearer or a torque profile."""
+"""Public function ``design``: sizing of a device for a wearer or a torque profile."""
 
 from __future__ import annotations
 
@@ -40,8 +40,9 @@ def design(
 ) -> Finding[Sizing] | Finding[WearerSizing]:
     """Find a device: for a wearer or for a torque profile.
 
-    A wearer has a body mass and may have a stature; torque, pressure and minutes of walking are what the device is for,
-    and the toes have to clear the ground. In Python a number is in SI, minutes in minutes, and a text has its unit.
+    A wearer is described by body mass and, optionally, stature. The device must provide the torque at the pressure for
+    the minutes of walking, and the toes must clear the ground. Numbers in Python are in SI units, minutes in minutes;
+    texts have their unit.
 
     Arguments:
         problem: name of a design file, or a .toml file

@@ -32,7 +32,7 @@ _WARMTH = Kind("Temperature of the bottle", "K", "temperature", ".1f")
 
 @dataclass(frozen=True, slots=True)
 class Endurance:
-    """Request for the duration of a bottle, and its result.
+    """Duration of a bottle for one gas demand: inputs and result.
 
     - ``bottle``: the bottle
     - ``draw``: gas demand
@@ -55,7 +55,7 @@ class Endurance:
 
     @property
     def shown(self) -> dict[str, str]:
-        """Display units by SI unit: from the device if it is known, otherwise from the bottle's file."""
+        """Display units by SI unit: of the device if it is known, otherwise of the bottle file."""
         return pressure_units(self.bottle.entries["regulator.set_pressure"].unit) | dict(self.device_units)
 
     def json_document(self) -> dict[str, Any]:
@@ -211,7 +211,7 @@ def endurance_panels(endurance: Endurance) -> list[Panel]:
 
 
 def _facts(endurance: Endurance) -> list[tuple[str, str]]:
-    """Return the most important results as pairs of name and value."""
+    """Return the most important results of a discharge as pairs of name and value."""
     result, draw = endurance.discharge, endurance.draw
     recording, bottle, room = result.recording, endurance.bottle, endurance.bottle.room_temperature
     # What warms the gas of the full bottle to the room's temperature behind the regulator.

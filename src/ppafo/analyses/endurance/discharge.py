@@ -1,4 +1,4 @@
-"""Simulation of a bottle from full until the supply pressure is no longer maintained."""
+"""Simulation of the discharge of a full bottle until it no longer maintains the supply pressure."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -32,9 +32,9 @@ from ppafo.walking.bottle.course import WALKED, SupplyBalance
 
 TIME_IS_UP = "time is up"
 Stop = Literal["supply", "frozen", "time"]
-"""Reason for the end of a run: supply pressure not maintained, cold end of the property table, or time limit."""
+"""Reason for the end of a discharge: supply pressure lost, cold end of the property table, or time limit."""
 _NEXT_TO_NOTHING = 0.01
-"""Usable gas at room temperature, as a fraction of a full bottle, below which the bottle is called empty."""
+"""Usable gas at room temperature, as a fraction of a full bottle, below which a bottle counts as empty [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class DischargeEnd:
 def reserves(bottle: Bottle, draw: GasDemand, pressure: float, temperature: float) -> tuple[float, float]:
     """Return the relative margins of pressure and flow [-] at the largest flow; below 0 the supply pressure is lost.
 
-    The first is the pressure in excess of the regulator's need divided by the set pressure, the second is the flow
+    The pressure margin is the excess over the regulator's need divided by the set pressure; the flow margin is the flow
     limit of the regulator divided by the largest flow, minus 1.
     """
     to_spare = pressure_reserve(bottle.regulator, pressure, draw.peak_flow) / bottle.regulator.set_pressure
@@ -79,7 +79,7 @@ def smallest_mass_when_warm(bottle: Bottle, draw: GasDemand) -> float:
 
 
 def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent, stopped_by: Stop) -> DischargeEnd:
-    """Return the ending for a cause: loss of supply pressure, cold end of the property table, or time limit.
+    """Return the end of a discharge by cause: loss of supply pressure, cold end of the property table, or time limit.
 
     After a loss of pressure, the bottle is "too cold" if it could still deliver at room temperature, and "empty"
     otherwise.
@@ -108,16 +108,16 @@ def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent,
 MAXIMUM_INTERVALS = 2000
 """Largest number of walking and resting intervals of a schedule; each is integrated separately."""
 SAMPLES = 1001
-"""Number of samples of the recording."""
+"""Number of samples of the recording of a discharge."""
 _RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
-"""Tolerances of the solver: relative [-], and absolute for each component of the state, in its SI unit."""
+"""Tolerances of the ODE solver: relative [-], and absolute for each component of the state [SI]."""
 _ABOVE_FREEZING = 0.02
 """Temperature [K] above the cold end of the property table at which a run stops, to stay within the table."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Interval:
-    """Interval with a constant draw [kg/s], from ``start`` to ``end`` [s].
+    """Interval of a discharge with a constant gas flow ``draw`` [kg/s], from ``start`` to ``end`` [s].
 
     ``solution`` is the state as a function of time and ``last`` the state at the end; ``stopped_by`` is the reason of
     an early end, or None. The state consists of mass [kg] and energy [J] of the content, temperature of the wall [K],
@@ -272,7 +272,7 @@ def _recording(bottle: Bottle, intervals: Sequence[_Interval]) -> Recording:
 
 
 def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
-    """Return the state of the bottle's content for a mass [kg] and an internal energy [J]."""
+    """Return the state of the content of the bottle for a mass [kg] and an internal energy [J]."""
     table = bottle.fluid.table
     return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
 
@@ -280,7 +280,7 @@ def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
 def _solve_interval(
     bottle: Bottle, draw: GasDemand, start: float, end: float, values: Floats, walking: bool
 ) -> _Interval:
-    """Return one interval of walking or rest; walking ends early if the supply pressure is no longer maintained."""
+    """Simulate one interval of walking or rest; walking ends early if the supply pressure is no longer maintained."""
     from scipy.integrate import solve_ivp
 
     flow = draw.mean_flow if walking else 0.0

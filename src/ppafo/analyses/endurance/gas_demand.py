@@ -50,7 +50,7 @@ def demand_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: flo
 
 
 def demand_of_recording(recording: Recording, stride_time: float | None) -> GasDemand:
-    """Return the gas demand of an endlessly repeated recording with ``supplied_mass``; it is one stride by default."""
+    """Return the gas demand of an endlessly repeated recording with ``supplied_mass``; by default it is one stride."""
     if "supplied_mass" not in recording:
         raise DataError(
             f"{recording.label}: there is no channel 'supplied_mass'; available: {', '.join(recording.names)}"

@@ -1,4 +1,4 @@
-"""Arguments of the analysis ``bottle``: duration of a gas bottle."""
+"""Public function ``bottle``: duration of a gas bottle."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def bottle(
 ) -> Finding[Endurance] | Finding[Endurances]:
     """Compute how long a bottle of gas lasts, and why it ends.
 
-    A walk, its result or its folder, walks on the bottle until that ends it. Any other gas use is in
-    ``recordings``, or else ``gas_per_stride`` every ``stride_time`` with at most ``peak_flow``. ``overrides`` are texts
-    such as ``room.temperature=5 degC``. ParameterError or DataError for bad input, SimulationError where the solver
-    fails.
+    A walk in ``recordings``, as a result or its folder, continues on the bottle until the bottle ends; any other
+    recording is repeated. Without recordings, the gas use is ``gas_per_stride`` every ``stride_time``, with at most
+    ``peak_flow``. ``overrides`` are texts such as ``room.temperature=5 degC``. Raises ParameterError or DataError for
+    bad input, SimulationError if the solver fails.
 
     recordings: a .csv or .nc file with supplied_mass, or the result folder of a run or a walk; repeated until the
         bottle ends; several are compared side by side

@@ -1,4 +1,4 @@
-"""Duration of a bottle for a gas demand: of given numbers, of a recording, or of a walk."""
+"""Duration of a bottle for a gas demand from given numbers, from a recording, or from a walk."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -38,7 +38,7 @@ LONGEST = 24.0 * 3600.0
 """Default of the longest simulated time [s]: one day."""
 WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 GasUse = str | Path | Recording | WalkResult
-"""Gas use of a device: a walk or its folder, or a recording, its file or its folder."""
+"""Gas use of a device: a walk or its result folder, or a recording, its file or its folder."""
 
 
 def named_gas_uses(uses: Sequence[GasUse]) -> dict[str, GasUse]:
@@ -67,8 +67,8 @@ def endurance_of_gas_use(
 ) -> Endurance:
     """Return the duration of a bottle for a walk that continues, or for a recording that is repeated.
 
-    ``stride_time`` is the time of a stride in a recording [s]; by default the whole recording is what repeats. A walk
-    has its own: ParameterError, which calls the walk ``name``.
+    ``stride_time`` is the time of a stride in a recording [s]; by default the whole recording is repeated. For a walk,
+    it raises ParameterError, in which the walk is called ``name``.
     """
     for override in read_overrides(overrides):
         # The bottle's gas is in its file, and the device's in the scenario of the run: neither is a value of a bottle.
@@ -115,8 +115,8 @@ def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -
     """Return the duration of a bottle when the walk continues without rest, or None if the walk took no gas.
 
     The same device, without faults, walks on the bottle until the bottle is exhausted, as with ``ppafo walk --bottle``.
-    The default of ``bottle`` is the bottle of the walk, or else the paper's. A stride is one of the leg with the
-    device, or a whole task sequence.
+    The default of ``bottle`` is the bottle of the walk, else the paper's bottle. A repetition is a stride of the leg
+    with the device, or a whole task sequence.
 
     >>> import ppafo
     >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1))
@@ -131,7 +131,7 @@ def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -
 def endurance_of_walk_gas(
     gas: WalkGas, bottle: str | Path | None, schedule: Schedule, overrides: Iterable[str] = ()
 ) -> Endurance:
-    """Return the duration of a bottle for a walk that continues.
+    """Return the duration of a bottle for a walk that continues, from the gas demand of the walk.
 
     Raises DataError if the walk took no gas or its scenario is unknown.
     """

@@ -21,9 +21,9 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WALK_FORMAT
 
 WALK_FILE = "walk.json"
-"""File in the result folder of a walk that describes the walk."""
+"""Name of the file in a result folder that describes a walk."""
 _LEAST_GAS = -1.0e-12
-"""Lower limit of the gas use [kg], slightly negative because of rounding."""
+"""Lower limit of the gas use of a walk [kg], slightly negative because of rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def walk_gas(result: WalkResult) -> WalkGas:
 
 
 def demand_of_walk(walk: WalkGas) -> GasDemand:
-    """Return the gas demand of a walk that continues; a stride is one of the leg with the device."""
+    """Return the gas demand of a walk that continues, per stride of the leg with the device or per task sequence."""
     if walk.gas_per_stride <= 0.0:
         raise DataError(
             f"walk '{walk.name}': takes no gas from the supply, so no bottle would become empty; give "
@@ -113,7 +113,7 @@ class _WalkFile:
     content: Mapping[str, Any]
 
     def table(self, name: str) -> Mapping[str, Any]:
-        """Return a table by name, {} if it is missing; raises DataError for any other type of value."""
+        """Return a table of the file by dotted path, {} if it is missing; DataError for any other type of value."""
         node = self.content
         for part in name.split("."):
             node = node.get(part, {})
@@ -122,7 +122,7 @@ class _WalkFile:
         return node
 
     def number(self, name: str, above: float) -> float:
-        """Return a number [SI]; raises DataError if it is missing, or not greater than ``above``."""
+        """Return a number [SI] of the file by dotted path; DataError if it is missing or not above ``above``."""
         node: Any = self.content
         for part in name.split("."):
             node = node.get(part) if isinstance(node, Mapping) else None

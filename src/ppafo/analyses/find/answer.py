@@ -15,7 +15,7 @@ from ppafo.wording import override_text
 
 @dataclass(frozen=True, slots=True)
 class FindSample:
-    """Tried value and its metric.
+    """Tried value of the varied path, and the metric of its run.
 
     ``value``: tried value [SI]
     ``metric``: metric at this value [SI]; nan if the run failed
@@ -63,7 +63,7 @@ class Threshold:
 
 
 def finding_of(outcome: FindResult) -> Finding[Threshold]:
-    """Return the search as a finding: sentences, table of the intervals that meet the condition, metric over value."""
+    """Return a search as a finding: sentences, table of intervals that meet the condition, metric over value."""
     wanted = "highest" if outcome.highest else "lowest"
     path, condition, tried = outcome.path, outcome.condition, outcome.tried
     # In the unit of the range that was given.
@@ -114,7 +114,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
 
 
 def _not_followed(outcome: FindResult) -> int:
-    """Return the number of values that meet the condition with a reference that is not followed."""
+    """Return the number of values that meet the condition although the run does not follow its reference."""
     return int(np.count_nonzero(~outcome.tried["follows"] & outcome.condition.is_kept(outcome.tried["judged"])))
 
 

@@ -1,4 +1,4 @@
-"""The question from which value on a condition is met: its arguments."""
+"""Public function ``find``: lowest or highest value that meets a condition on a metric."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def find(
 ) -> Finding[Threshold]:
     """Find the lowest or highest value that meets a condition on a metric.
 
-    A grid of values over the range is run side by side; between the last one that does not meet the condition and the
-    first one that does, the bracket is divided again and again down to 1e-6 of the range. What happens between two
-    values of the grid on one side of the condition is not seen.
+    A grid of values over the range is run in parallel. The bracket between the outermost grid value that meets the
+    condition and its outer neighbour is then divided repeatedly, down to 1e-6 of the range. A change of the condition
+    between two neighbouring grid values that both meet it, or both miss it, is not detected.
 
     Arguments:
         scenario: name of a scenario, or a .toml file

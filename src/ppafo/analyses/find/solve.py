@@ -24,16 +24,16 @@ from ppafo.wording import one_line
 FEWEST, MOST = 3, 100_000
 """Range of the number of grid values: both ends and one between, up to the maximum."""
 _PARTS = 32
-"""Number of parts of a bracket: so many parallel runs take little longer than one."""
+"""Number of parts into which a bracket is divided: this many parallel runs take little longer than one run."""
 _STREAMS = 16
 """Number of noise streams for every value if sensors are noisy, the same for all values."""
 ACCURACY = 1.0e-6
-"""Width of the last bracket, as a fraction of the range."""
+"""Width of the last bracket, as a fraction of the range of values [-]."""
 _SEED = 1
-"""Seed of the noise streams."""
+"""Random seed of the noise streams."""
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 FOLLOWS = "follows"
-"""Condition that the run follows its reference, as ``simulate`` judges it."""
+"""Text of the condition that the run follows its reference, by the verdict of ``simulate``."""
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
@@ -111,7 +111,7 @@ class FindResult:
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
-        """Mask of the values that meet the condition with a reference that is followed."""
+        """Mask of the values that meet the condition and whose runs follow the reference."""
         return np.asarray(self.condition.is_kept(self.tried["judged"]) & self.tried["follows"])
 
     @property

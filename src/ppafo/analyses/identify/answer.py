@@ -31,11 +31,11 @@ from ppafo.units.shown import counted_from, in_units
 from ppafo.wording import count_of
 
 _FAR = 2.0
-"""Number of standard deviations above which a tolerance counts as contradicted."""
+"""Number of standard deviations above which a tolerance counts as contradicted by the recordings."""
 _SHOWN = 0.05
-"""Smallest share of a variance that is shown."""
+"""Smallest share of a variance that the report shows [-]."""
 _ROW_HEAD = ("",) * 4
-"""Column heads of the rows of ``estimate_row``, which need none."""
+"""Empty column heads for the rows of ``estimate_row``."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
 _CHANNELS = {
     "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),
@@ -46,7 +46,7 @@ _CHANNELS = {
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """Result of an identification problem.
+    """Result of an identification: estimates of procedures and trajectory fit, and the new parameter set.
 
     ``name``: name of the problem
     ``results``: results of the procedures, in the order of their evaluation
@@ -142,7 +142,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     for result in identification.results:
         kind = "" if result.kind == "measured" else f" ({result.kind})"
         remarks = [
-            *_conflict(result.conflict),
+            *([f"holds for this model only: {result.conflict}"] if result.conflict else []),
             *(f"{estimate.path}: {estimate.explanation}" for estimate in result.estimates),
         ]
         for estimate in result.estimates:
@@ -182,17 +182,12 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     )
 
 
-def _conflict(sentence: str) -> tuple[str, ...]:
-    """Return a remark on the validity of the numbers under a conflict; empty without a conflict."""
-    return (f"holds for this model only: {sentence}",) if sentence else ()
-
-
 def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Section:
     """Return the section of the trajectory fit: estimates, tolerances, remarks and proposed next experiments."""
     kind, fit = kind_of_fit(outcome.fit), outcome.fit
     origin = "" if kind == "measured" else f" ({kind})"
     remarks = [
-        *_conflict(fit.conflict),
+        *([f"holds for this model only: {fit.conflict}"] if fit.conflict else []),
         # Of a conflict the explanation of each number is the one sentence that stands above.
         *(
             f"{estimate.path}: {estimate.explanation}"
@@ -246,7 +241,7 @@ def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> lis
 
 
 def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:
-    """Return a number in the unit of the set, or in the display unit if the set does not have the number."""
+    """Convert a number [SI] to the unit of the parameter set, or to the display unit if the set does not have it."""
     reported, set_unit = in_set_unit(number, path, unit, before)
     return in_shown_unit(number, unit) if set_unit == unit else (reported, set_unit)
 

@@ -1,4 +1,4 @@
-"""The question which parameters recordings show: its arguments."""
+"""Public function ``identify``: identification of a parameter set from bench recordings."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def identify(
 ) -> Finding[Identification]:
     """Identify a parameter set, with uncertainty, from bench recordings.
 
-    The procedures of the problem file run in the recommended order; the trajectory fit comes last and starts from what
-    they found.
+    The procedures of the problem file run in the recommended order; the trajectory fit comes last and starts from the
+    estimates of the procedures.
 
     Arguments:
         problem: a problem file (.toml); see 'ppafo doctor --schema identification'

@@ -14,8 +14,8 @@ from ppafo.identification.procedures import PROCEDURES, ProcedureContext, Proced
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.identification.trajectory.layout import ExperimentSection
-from ppafo.identification.trajectory.section import SectionContext, TrajectoryOutcome, solve_section
-from ppafo.identification.unit_check import with_wrong_units
+from ppafo.identification.trajectory.section import SectionContext, solve_section
+from ppafo.identification.unit_check import FAR_FROM_SET, with_wrong_units
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
@@ -28,13 +28,13 @@ from ppafo.storage.result_folder import RUN_FILE
 from ppafo.units.shown import counted_from, shown_in
 
 _FILES_IN_TITLE = 4
-"""Number of recordings named in the title of the new set; its notes name all."""
+"""Largest number of recordings named in the title of the new set; the notes of the set name all."""
 _REPORTED = "reported."
-"""Prefix of the paths of values that others report of their device."""
+"""Prefix of the paths of values that a publication reports about its own device."""
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
-    """Return the result of an identification problem.
+    """Solve an identification problem: procedures in order, trajectory fit, new parameter set.
 
     Paths are relative to ``folder``; ``file`` is the name used in error messages. The procedures run first, in the
     order in which each depends on the earlier ones, then the section [trajectory]. Raises the errors of ``identify``.
@@ -84,7 +84,17 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
                 used=used,
                 tolerances=tolerances,
             )
-            trajectory = _with_wrong_units(solve_section(problem.trajectory, section, progress), current)
+            trajectory = solve_section(problem.trajectory, section, progress)
+            fit = trajectory.fit
+            # A start near to the value says that the person expects it, whatever the set has.
+            starts = {number.free.name: number.free.start * FAR_FROM_SET for number in fit.numbers}
+            known = {
+                path: value if value < starts[path] < value * FAR_FROM_SET**2 else number_in_si(current, path)
+                for path, value in fit.values.items()
+            }
+            recordings = [experiment.recording for experiment in fit.problem.experiments]
+            estimates_of_fit = with_wrong_units(fit.estimates, known, recordings)
+            trajectory = replace(trajectory, fit=replace(fit, estimates=estimates_of_fit))
             estimates += trajectory.fit.estimates
         new_set = with_estimates(before, estimates, valve)
         identification = Identification(problem.name, tuple(results), trajectory, before, new_set)
@@ -92,23 +102,8 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         return replace(identification, new_set=described)
 
 
-def _with_wrong_units(outcome: TrajectoryOutcome, parameter_set: ParameterSet) -> TrajectoryOutcome:
-    """Return a trajectory fit whose values have the verdict of a wrong unit where such a mistake explains them.
-
-    The start of a number, which a person may give, is expected like the value of the set: the nearer of both counts.
-    """
-    fit, known = outcome.fit, dict[str, float | None]()
-    starts = {number.free.name: number.free.start for number in fit.numbers if not number.is_logarithm}
-    for path, value in fit.values.items():
-        expected = [item for item in (number_in_si(parameter_set, path), starts.get(path)) if item and item > 0.0]
-        ratios = {max(item / value, value / item): item for item in expected if value > 0.0}
-        known[path] = ratios[min(ratios)] if ratios else None
-    recordings = [experiment.recording for experiment in fit.problem.experiments]
-    return replace(outcome, fit=replace(fit, estimates=with_wrong_units(fit.estimates, known, recordings)))
-
-
 _ROW_TIMES = dict.fromkeys(("static-torque", "open-valve-flow", "valve-map"), 1.0)
-"""Time between rows without a time column [s], by procedure: those whose laws do not depend on time."""
+"""Time between rows of a table without a time column [s], for procedures whose laws do not depend on time."""
 
 
 def _sources(
@@ -141,7 +136,7 @@ def _sources(
 def _experiment_source(
     problem: ProblemFile, folder: Path, file: str, parameter_set: ParameterSet, experiment: ExperimentSection
 ) -> RecordingSource:
-    """Return the recording of an experiment; IdentificationError for a file with several."""
+    """Return the recording of an experiment; IdentificationError for a file with several recordings."""
     recording, columns = experiment.recording, experiment.columns
     source, *others = _sources(problem, folder / recording, file, columns, parameter_set)
     if others:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # Range of validity of a linear model: steps of the command from the steady state, on the runs and of the model.
 
 DURATION, INTERVAL = 1.0, 1.0e-3
-"""Duration of a run after a step of the command, and its sample time [s]."""
+"""Duration of a run after a step of the command, and sample time of its output [s]."""
 SHARES = tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
 """Step heights of the command divided by the steady command [-]: three decades."""
 _LARGEST_COMMAND = 0.7
@@ -117,11 +117,11 @@ def _torque(model: LinearModel, command: float) -> Floats:
 
 _POINTS = 400
 _LOWEST_SHARE = 0.1
-"""Lowest frequency of the plot divided by the frequency of the slowest pole [-]."""
+"""Lowest frequency of the frequency response plot, divided by the frequency of the slowest pole [-]."""
 _HIGHEST_FREQUENCY = 100.0
-"""Highest frequency of the plot [Hz]."""
+"""Highest frequency of the frequency response plot [Hz]."""
 _LOOP_POINTS = slice(None, None, -20)
-"""Points of the open loop that are plotted, its last one included."""
+"""Points of the open loop that are plotted: every twentieth, counted back from the last."""
 _DRAWN_STEPS = (-5, -1)
 """Indices of the steps plotted over time: the middle of the three decades, and the largest step."""
 _REAL = 1.0e-6

@@ -12,23 +12,22 @@ from ppafo.model.controlled import error_functions
 PID_LAWS = ("pid", "pid_feedforward")
 """Controllers whose feedback is a PID: their loop is linear while the command is not clipped."""
 _POINTS = 20_000
-"""Number of frequencies at which a loop is computed, evenly spaced on a logarithmic scale."""
+"""Number of frequencies at which a loop is computed, equally spaced on a logarithmic scale."""
 _BELOW_POLES = 1.0e-3
-"""Lowest of them, divided by the frequency of the slowest pole or corner that is no integrator [-]."""
+"""Lowest frequency of a loop, relative to the frequency of the slowest pole or corner that is no integrator [-]."""
 _INTEGRATOR = 1.0e-9
 """Magnitude [1/s] up to which a pole counts as an integrator."""
 _ROUNDING = 1.0e-9
-"""Rounding of a delay in sample periods [-]."""
+"""Tolerance for the rounding of a delay in sample periods [-]."""
 _HALF_POWER = float(np.sqrt(0.5))
 
 
 def open_loop(model: LinearModel) -> tuple[Floats, NDArray[np.complex128]] | None:
-    """Frequencies [Hz] up to half the sample rate, and the loop of a linear model with the scenario's PID there.
+    """Return frequencies [Hz] up to half the sample rate, and the open-loop response of PID and plant at each.
 
-    The loop, cut at the command, is the sampled one, exact at the samples: the PID with its sum of rectangles and
-    filtered difference, a held command, the delays that the model omits and the bandwidth of the sensors; without noise
-    and resolution. None without such a loop: another controller, a command that is clipped or has no effect, a
-    controlled quantity at rest.
+    The sampled loop is cut at the command. It has the PID with rectangular integration and filtered difference, a
+    zero-order hold, the delays that the model omits and the bandwidths of the sensors, but no noise or resolution.
+    None for a controller without PID, a command that is clipped or has no effect, or a controlled quantity at rest.
     """
     scenario, gains, period = model.scenario, model.scenario.controller.settings, model.scenario.controller.period
     command, outputs = abs(model.inputs[0].value), [signal.name for signal in model.outputs]
@@ -54,7 +53,7 @@ def open_loop(model: LinearModel) -> tuple[Floats, NDArray[np.complex128]] | Non
 
 
 def loop_margins(model: LinearModel) -> LoopMargins | None:
-    """Return the margins of the loop that the scenario's PID closes around a linear model; None without one."""
+    """Return the margins of the loop that the scenario's PID closes around a linear model; None without a loop."""
     found = open_loop(model)
     if found is None:
         return None
@@ -85,7 +84,7 @@ def loop_margins(model: LinearModel) -> LoopMargins | None:
 
 
 def _sampled_plant(model: LinearModel, row: Floats, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return the response at ``z`` of a row of the states, as the sensors show them, to a command held for a period."""
+    """Return the sampled response at ``z`` of measured states, weighted by ``row``, to a command held for a period."""
     from scipy.linalg import expm
 
     count, period, sensors = len(model.states), model.scenario.controller.period, model.scenario.sensors

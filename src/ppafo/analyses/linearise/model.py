@@ -114,12 +114,12 @@ class LinearModel:
 
     @property
     def is_steady(self) -> bool:
-        """True if the operating point is a steady state."""
+        """True if the operating point of the model is a steady state."""
         return self.time is None
 
     @property
     def poles(self) -> NDArray[np.complex128]:
-        """Poles [1/s], the slowest first."""
+        """Poles of the linear model [1/s], the slowest first."""
         eigenvalues = np.linalg.eigvals(self.a).astype(np.complex128)
         return eigenvalues[np.argsort(np.abs(eigenvalues))]
 

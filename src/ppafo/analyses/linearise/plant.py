@@ -46,7 +46,7 @@ _SIZES = {"Pa": 1.0e5, "K": 300.0}
 
 
 def size_of(name: str) -> float:
-    """Reference size of a state or an input [SI], by which difference steps are scaled."""
+    """Return the reference size of a state or an input [SI], by which steps of finite differences are scaled."""
     return _SIZES.get(UNITS.get(name, ""), 1.0)
 
 
@@ -59,7 +59,7 @@ class _PlantValues(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LinearisedPlant:
-    """Plant of a run without controller and sensors.
+    """Plant of a run without controller and sensors, as a function of states and inputs.
 
     ``direction``: direction of a free vane, 0 if friction or a stop holds it; None if the ankle is prescribed, so that
         angle and angular velocity are inputs
@@ -74,7 +74,7 @@ class LinearisedPlant:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs."""
+        """Names of the inputs of the linear model."""
         more = (
             ("angle", "angular_velocity") if self.direction is None else ("external_torque",) if self.direction else ()
         )
@@ -193,7 +193,7 @@ ORDERS = 5
 
 
 def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float, size: float) -> tuple[Floats, Floats]:
-    """Slopes of a function (rows,) at a value towards one ``side`` (1 or -1), and estimates of their errors.
+    """Return the one-sided slopes of a function (rows,) towards ``side`` (1 or -1), and estimates of their errors.
 
     Finite differences on that side, with steps from a hundredth to a millionth of ``size``, are extrapolated to zero
     step by Ridders' method (Adv. Eng. Softw. 4, 1982). For each row, the extrapolation with the smallest estimated
@@ -214,7 +214,7 @@ def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float
 
 
 def side_of(name: str, values: Mapping[str, float], direction: float | None) -> float:
-    """Side of a value (1 or -1) for which a linear model holds.
+    """Return the side of a value (1 or -1) for which a linear model holds.
 
     The command and the valve opening increase, or decrease from full opening. Angle, pressure 1 and its supply
     increase; the angular velocity changes in the direction of motion; all other values decrease.

@@ -44,7 +44,7 @@ _MOST_STEPS = 60
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Operating point of the plant.
+    """Operating point of a plant: values of all states and inputs.
 
     ``time``: time [s] in the run; None for a steady state
     ``values``: all states and inputs by name [SI]
@@ -173,7 +173,7 @@ def _steady(
     quantity: ControlledQuantity,
     level: float | None,
 ) -> dict[str, float] | None:
-    """Return a steady state with a level of a quantity [SI], or with the present command; None if none is found."""
+    """Return a steady state at a level of a quantity [SI], or at the present command; None if the search fails."""
     # Where the search begins: at the end of the run, then about the pressures that have the level.
     starts = [dict(values)]
     lowest = run.plant.atmospheric_pressure
@@ -189,7 +189,7 @@ def _steady(
     names = [*plant.at(values).rates, *([] if level is None else ["command"])]
 
     def imbalance(values: Mapping[str, float]) -> Floats:
-        """Time derivatives divided by the size of their states [1/s], and the error of the level by its size [-]."""
+        """Return time derivatives relative to the size of the states [1/s], and relative error of the level [-]."""
         state = plant.at(values)
         # So that pascals and openings count alike.
         rates = [rate / size_of(name) for name, rate in state.rates.items()]
@@ -203,7 +203,7 @@ def _steady(
 
 
 def opening_names(values: Mapping[str, float]) -> list[str]:
-    """Return the names of the valve openings among some values."""
+    """Return the names of the valve openings among named values."""
     return [name for name in values if name in (f"{VALVE}requested", f"{VALVE}opening")]
 
 
@@ -216,7 +216,7 @@ def _newton(
     residual = function(values)
 
     def slopes_of(name: str) -> Floats:
-        """Slopes of the function with respect to a value (rows,)."""
+        """Return the slopes of the function with respect to a named value (rows,)."""
         side, size = side_of(name, values, None), size_of(name)
         return one_sided_slopes(lambda value: function({**values, name: value}), values[name], side, size)[0]
 

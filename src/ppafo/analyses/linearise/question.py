@@ -1,4 +1,4 @@
-"""The question what a plant is near one point: its arguments."""
+"""Public function ``linearise``: linear model of a plant near an operating point."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def linearise(
 ) -> Finding[LinearModel]:
     """Make a linear model of the plant near one point, for control design.
 
-    The equilibrium is the steady state whose torque is the last value of the reference, or, where the controller is a
-    constant command, whose command is that one; the ankle stands where the run leaves it. Derivatives
-    are differences of the plant's own equations, good to 1e-6 of the largest of their row.
-    ScenarioError for a time outside the run, where there is no equilibrium, and for a valve that is on or off.
+    The equilibrium is the steady state with the torque of the last reference value or, for a controller with constant
+    command, with this command; the ankle stays at its angle at the end of the run. Derivatives are finite differences
+    of the equations of the plant, accurate to 1e-6 of the largest in their row. Raises ScenarioError for a time outside
+    the run, a scenario without equilibrium, and an on/off valve.
 
     at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value of
         the reference

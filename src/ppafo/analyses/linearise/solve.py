@@ -36,11 +36,11 @@ ON_THE_EDGE = 1.0e-6
 Without a kink, the finite differences agree to about 1e-9.
 """
 ZERO = 1.0e-9
-"""Slope divided by the largest slope of its row, below which it is 0: rounding of the differences and of the point."""
+"""Slope divided by the largest slope of its row, below which the slope counts as 0 (rounding)."""
 
 
 def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
-    """Return in words the side of each limit at the operating point, by component; ``joint`` names the joint."""
+    """Return the side of each limit at the operating point, in words, by component; ``joint`` names the joint."""
     at, plant = point.values, run.plant
     openings = valve_at(run, functions_in(run), at).openings
     atmosphere, pressure_1, pressure_2 = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]

@@ -10,7 +10,7 @@ from ppafo.report.finding import Finding, columns_of
 from ppafo.report.kind import Kind
 
 _WIDTH = 110
-"""Line length of the notes of a catalogue, in characters."""
+"""Line length of the printed notes of a catalogue [characters]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Parts:
 
 
 def finding_of_catalogue(catalogue: Catalogue) -> Finding[Parts]:
-    """Return a table for each group of a catalogue, with mass and doubtful or unknown figures of each part."""
+    """Return a catalogue as a finding: a table for each group, with mass, doubtful and unknown figures of each part."""
     # Notes are written over several lines of a file: how they were broken there means nothing.
     notes = "\n".join(textwrap.wrap(" ".join(catalogue.notes.split()), _WIDTH))
     head = ("part", "maker and model", ("mass", Kind(quantity="part mass")), "figures to check", "not known")
@@ -67,7 +67,7 @@ def finding_of_catalogue(catalogue: Catalogue) -> Finding[Parts]:
 
 
 def finding_of_part(catalogue: Catalogue, part: Part) -> Finding[Parts]:
-    """Return a table of all figures of a part, each as stated, with origin and source."""
+    """Return a part as a finding: a table of all figures as stated, with origin and source."""
     kind = f", {part.kind}" if part.kind else ""
     figures = [
         (name, f"{figure.value:.4g} {figure.unit}".rstrip(), figure.origin, figure.source)

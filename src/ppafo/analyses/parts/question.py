@@ -1,4 +1,4 @@
-"""The question what a device can be built from: its arguments."""
+"""Public function ``parts``: catalogue of real parts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def parts(
 ) -> Finding[Parts]:
     """List real parts with the origin of every figure.
 
-    ParameterError for bad input.
+    Raises ParameterError for an unknown part or a catalogue that cannot be used.
 
     part: name of a part, for all its figures and their sources
     catalogue: a .toml file; default: the catalogue of the package

@@ -88,7 +88,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
 
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
-    """Return in words the range of values that agrees with a claim."""
+    """Format the range of values that agrees with a claim as text."""
     if low is not None and high is not None:
         return f"{low:g} to {high:g} {unit}".rstrip()
     if low is not None:
@@ -103,8 +103,8 @@ def _paper_rows(reproduction: Reproduction) -> list[tuple[str, str, str, str]]:
 def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     """Return the paper's claims as a finding.
 
-    It has not passed if a value is outside its window although no value was overridden. Figure 3 needs the simulated
-    test bench.
+    The finding has not passed if a value is outside its window although no value was overridden. Figure 3 needs the
+    simulated test bench.
     """
     sentences, missed, rows = [NOTHING_CONFIRMED], reproduction.missed, reproduction.readings_of_u
     if reproduction.overrides:
@@ -140,7 +140,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
 
 
 def _figures(reproduction: Reproduction) -> list[Section]:
-    """Return the figures of the page, each drawn on demand."""
+    """Return the figures of the reproduction page as sections, each drawn on demand."""
     supply = reproduction.step.scenario.device.supply
     levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
     stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}

@@ -1,6 +1,6 @@
-"""Assumptions of the simulations, and synthetic recordings of the same experiments for the figures.
+"""Assumed values of the paper's experiments, and synthetic recordings of these experiments for the figures.
 
-A synthetic recording contains no information on the paper's device, so no claim rests on one.
+A synthetic recording contains no information on the paper's device, so no claim rests on it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,7 @@ _ONLY_FOR_A_FREE_VANE = frozenset({"actuator.restitution", "foot_plate.gravity_t
 
 @dataclass(frozen=True, slots=True)
 class AssumedValue:
-    """Value of a simulation that the paper does not print in this form.
+    """Value of a simulation that is assumed or derived, because the paper does not print it in this form.
 
     ``path``, ``meaning``, ``value``: dotted path, description, and value with unit
     ``origin``: kind of origin
@@ -44,7 +44,7 @@ class AssumedValue:
     used_by: tuple[str, ...]
 
     def sentence(self) -> str:
-        """Return value and reason on one line."""
+        """Format the assumed value and its reason as one line."""
         source = f" ({self.source})" if self.source else ""
         return f"{self.path} = {self.value}: {self.reason}{source}"
 
@@ -99,7 +99,7 @@ RIG_SEED = 1
 BENCH_PRESET = "paper-bench"
 """Preset of a bench similar to the paper's, for figures 3 and 7."""
 TASK_PRESET = "ideal-laboratory"
-"""Preset with the paper's physics and noisy sensors: on ``paper-bench`` the proportional valve's task takes 6 s."""
+"""Preset with the paper's physics and noisy sensors for the torque tasks, which take 6 s on ``paper-bench``."""
 
 
 @dataclass(frozen=True, slots=True)

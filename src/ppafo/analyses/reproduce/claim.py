@@ -16,7 +16,7 @@ Verdict = Literal[
     "not_testable",
 ]
 VERDICTS: dict[Verdict, str] = {verdict: verdict.replace("_", " ") for verdict in get_args(Verdict)}
-"""Verdicts in words. Only the first two follow from reported numbers alone."""
+"""Verdicts on a claim, in words; only the first two follow from reported numbers alone."""
 MEANINGS: dict[Verdict, str] = {
     "consistent": "the reported numbers agree with each other",
     "inconsistent_as_reported": "the reported numbers do not agree with each other",
@@ -29,7 +29,7 @@ MEANINGS: dict[Verdict, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Claim of the paper with our value and the verdict, a row of the comparison.
+    """Claim of the paper, with the value computed by this package and the verdict.
 
     ``paper``, ``value``: published value and our value, both in ``unit``; None if not a single number
     ``words``, ``found``: text displayed in place of ``paper`` and ``value``; empty if not needed
@@ -56,12 +56,12 @@ class Claim:
 
     @property
     def published(self) -> str:
-        """Published value as displayed text."""
+        """Published value of the claim as displayed text."""
         return self.words if self.paper is None else format_reported_quantity(self.paper, self.unit)
 
     @property
     def ours(self) -> str:
-        """Our value as displayed text."""
+        """Value computed by this package for the claim, as displayed text."""
         return self.found or quantity(self.value, self.unit, 3)
 
     @property
@@ -108,7 +108,7 @@ def stated_claim(
     window: tuple[float, float] | None = None,
     found: str = "",
 ) -> Claim:
-    """Return the claim of an entry of the paper's file, with our value and the verdict."""
+    """Build the claim of an entry of the paper's file, with the computed value and the verdict."""
     entry = paper_entries()[identifier]
     return Claim(
         id=identifier,

@@ -19,7 +19,7 @@ PHASES = 20
 _TIE = 1.0e-3
 """Reference [N m] that is large enough to determine the first decision."""
 _STEP = 0.5e-3
-"""Time step and output interval [s], which divide every phase."""
+"""Time step and output interval of the runs [s], which divide every phase."""
 
 
 def phased_runs(solenoid: Result) -> tuple[Floats, Floats]:

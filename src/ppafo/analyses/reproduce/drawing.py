@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _SIZE = (9.2, 4.85)
 """Size of the drawing [inches]; its coordinates have the same unit, with the origin at the lower left."""
 _MIDDLE = 2.4
-"""Height of the proportional valve and of the shaft."""
+"""Height of the proportional valve and of the shaft above the lower edge [inches]."""
 _UPPER, _LOWER = 3.9, 0.9
 _BRANCHES = (
     ("plantarflexion", "valve A, 3/2", CHAMBER_1.colour, _UPPER),
@@ -23,9 +23,9 @@ _BRANCHES = (
 )
 """Direction, its solenoid valve, colour and height of the two branches of the circuit."""
 _BOX, _HALF = 0.42, 0.21
-"""Side length of the square of a symbol."""
+"""Side length of the square of a valve symbol, and half of it [inches]."""
 _REGULATED, _TO_ACTUATOR = 2.25, 4.75
-"""Horizontal positions of the couplings between regulators and valves, and between valves and actuator."""
+"""Horizontal positions [inches] of the couplings between regulators and valves, and between valves and actuator."""
 
 
 def device_figure() -> "Figure":

@@ -18,7 +18,7 @@ from ppafo.walking.task_sequence import TaskSegment, TaskSequence
 WEARERS = {"healthy": ("wearer.keeps_gait=1",), "impaired": ("wearer.keeps_gait=0",)}
 """Overrides of a wearer whose muscles keep the measured gait, and of the walk file's wearer, who has drop foot."""
 LONGEST = 60.0
-"""Longest time [s] of a walk."""
+"""Longest simulated time [s] of a walk."""
 SETTLED = 6.0
 """Time [s] after which events count, when the stride estimate has settled."""
 UNEVEN_STRIDES = 24

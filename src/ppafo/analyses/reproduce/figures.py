@@ -38,9 +38,9 @@ _SHOWN_BEFORE_STEP = 0.03
 _SHOWN_AFTER_STOP = 0.8
 """Fraction of the time until the stop that is shown after the stop; the vane then rests."""
 _ENLARGED = 40.0
-"""First milliseconds after the step, shown enlarged."""
+"""Time after the step that is shown enlarged [ms]."""
 _BIN = 3.0
-"""Interval [ms] over which the band of a measurement reaches from the smallest to the largest reading."""
+"""Interval [ms] for the band from the smallest to the largest reading of a measurement."""
 _CURVES = (
     ("Vane angle", "Angle", "deg", ACTUAL.colour, (0.66, 0.36, 0.31, 0.34)),
     ("Pressure difference, $P_1 - P_2$", "Difference", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),
@@ -107,7 +107,7 @@ def step_response_figure(
 
 
 def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
-    """Return the curves of the panels, in their order and units."""
+    """Return the curves of the panels of figure 7, in the order and units of ``_CURVES``."""
     first, second = recording["pressure_1"], recording["pressure_2"]
     gauge = ((pressure - levels.atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
     return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)

@@ -58,7 +58,7 @@ _TASK_METRICS = (
 
 
 def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes:
-    """Return the page as HTML.
+    """Return the page of a reproduction as HTML.
 
     ``drawn`` are the figures as SVG by file name; they become part of the page.
     """
@@ -109,7 +109,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
 
 
 def _set_values(reproduction: Reproduction) -> dict[str, Any]:
-    """Return template values on both parameter sets: findings of the printed set, and remaining ones of the other."""
+    """Return template values on both parameter sets: findings of the printed set, remaining findings of the other."""
     severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
     groups: dict[tuple[str, ...], list[AssumedValue]] = {}
     for value in reproduction.assumed:

@@ -27,16 +27,16 @@ from ppafo.wording import argument_text, nearest_name
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5
-"""Minutes of a walk; without noise the strides repeat, so that longer walks give the same result."""
+"""Duration of a walk [min]; without noise the strides repeat, so that longer walks give the same result."""
 PAIR, RECYCLING = "solenoid", "solenoid-recycling"
 """Names of the walks with direct event control and with recycling."""
 KEEPS_GAIT = "wearer.keeps_gait=1"
-"""Override for a nondisabled wearer, whose muscles keep the measured ankle angle."""
+"""Override of a walk for a nondisabled wearer, whose muscles keep the measured ankle angle."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Computation:
-    """Computation of a value: SI unit, arguments with their SI units, and function."""
+    """Computation of the value of a claim: SI unit, arguments with their SI units, and function."""
 
     unit: str
     arguments: Mapping[str, str]
@@ -46,7 +46,7 @@ class _Computation:
 # Several claims rest on one walk, which takes seconds.
 @lru_cache(maxsize=16)
 def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
-    """Return a shipped walk.
+    """Run a shipped walk with overrides.
 
     Raises SimulationError if the walk does not reach its end with help in most strides.
     """
@@ -59,7 +59,7 @@ def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
 
 
 def _nondisabled(name: str, holding_time: float | None = None) -> WalkResult:
-    """Return a shipped walk of a nondisabled wearer; a valve between the chambers holds for a time [s]."""
+    """Run a shipped walk of a nondisabled wearer; a valve between the chambers is held open for a time [s]."""
     holding = () if holding_time is None else (f"valve.holding_time={holding_time!r} s",)
     return _walked(name, (KEEPS_GAIT, *holding))
 
@@ -99,7 +99,7 @@ def recycling_saving(holding_time: float) -> float:
 
 
 def recycling_work(holding_time: float) -> float:
-    """Net work of the actuator on the ankle in a stride, with the valve between the chambers divided by without [-].
+    """Ratio of the net work of the actuator in a stride with and without the valve between the chambers [-].
 
     The work is a mean over the strides with help; without the valve, control is event-based.
     """
@@ -135,7 +135,7 @@ COMPUTATIONS: dict[str, _Computation] = {
 
 @dataclass(frozen=True, slots=True)
 class _PublishedClaim:
-    """Claim with a known computation; ``arguments`` in SI."""
+    """Claim of a publication with its computation, None if it cannot be tested; ``arguments`` in SI."""
 
     entry: ClaimEntry
     computation: _Computation | None
@@ -215,12 +215,12 @@ def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict
 
 
 SEED, ALL = PAPER, "all"
-"""Name of the study of the paper behind this package, and name for all studies in turn."""
+"""Name of the study of the paper behind this package, and name for all studies together."""
 
 
 @dataclass(frozen=True, slots=True)
 class JudgedClaim:
-    """Claim of a publication with the verdict and our value in its unit; None if nothing is computed."""
+    """Claim of a publication with the verdict and the computed value in its unit, None if it cannot be computed."""
 
     claim: _PublishedClaim
     value: float | None
@@ -240,7 +240,7 @@ class JudgedClaim:
 
     @property
     def note(self) -> str:
-        """Reason of the verdict."""
+        """Reason for the verdict, or reason why the claim cannot be tested."""
         return self.claim.entry.note or self.claim.entry.not_testable
 
     def document(self, study: str) -> dict[str, Any]:
@@ -290,7 +290,7 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
 
 
 def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]:
-    """Return the judged claims of one study, or of all studies but the paper's.
+    """Run one study, or all studies but the paper's; returns each publication with its judged claims.
 
     Raises ScenarioError for an invalid study, SimulationError if a walk fails.
     """
@@ -305,7 +305,7 @@ def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[Ju
 
 
 def judge(claim: _PublishedClaim) -> JudgedClaim:
-    """Return a claim with our value and the verdict; SimulationError if a walk fails."""
+    """Compute our value for a claim and judge it; SimulationError if a walk fails."""
     entry, computation = claim.entry, claim.computation
     if computation is None:
         return JudgedClaim(claim, None, "not_testable")

@@ -1,4 +1,4 @@
-"""The question whether the paper's experiments come out again: its arguments."""
+"""Public function ``reproduce``: experiments of the paper and claims of other publications, computed again."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def reproduce(
 ) -> Finding[Reproduction] | Finding[Studies]:
     """Reproduce the paper's experiments and check its claims.
 
-    ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario reaches those that
-    have it, a path of the device all of them. SimulationError where a run diverges, ScenarioError for a study that is
-    none.
+    ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario applies to the
+    experiments that have it, a path of the device to all. Raises SimulationError for a run that diverges, ScenarioError
+    for an unknown study.
 
     study: publication to run again: a name, a .toml file of claims, or 'all'; default ppafo-2011, the paper
     plugins: modules of your own, files or names, whose objects files may name

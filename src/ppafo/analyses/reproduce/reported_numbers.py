@@ -1,4 +1,4 @@
-"""Claims of the paper that its reported numbers decide by arithmetic, and those that nothing published decides."""
+"""Claims of the paper that its reported numbers decide by arithmetic, and claims that no published data decide."""
 
 from dataclasses import dataclass
 from typing import TypeVar
@@ -24,7 +24,7 @@ _RATES = {
     "friction.viscous_damping": "reported.velocity_over_acceleration",
     "friction.dynamic_torque": "reported.stopping_deceleration",
 }
-"""Reported rate [1/s] or [1/s^2] by which the inertia is multiplied, for each product."""
+"""Path of the reported rate [1/s] or [1/s^2] that gives each friction parameter when multiplied by the inertia."""
 NOT_PUBLISHED = (
     "k_actuator",
     "static_friction",
@@ -34,7 +34,7 @@ NOT_PUBLISHED = (
     "unmodelled_dynamics",
     "temperature_would_help",
 )
-"""Statements that could be tested only with recordings or masses, neither of which is published."""
+"""Statements that only unpublished recordings or masses could test."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class ReportedSet:
         return self._known(path, self.parameter_set.numbers.get(path))
 
     def quotation(self, path: str) -> str:
-        """Return number and unit for use in a sentence, for example ``8.4 g m^2``."""
+        """Return reported number and unit for use in a sentence, for example ``8.4 g m^2``."""
         entry = self.entry(path)
         return f"{entry.value:g} {entry.unit}".rstrip()
 
@@ -70,7 +70,7 @@ class ReportedSet:
         return self._known(path, self.evidence.magnitude(path))
 
     def gas(self) -> Gas:
-        """Return the reported gas."""
+        """Return the gas properties as reported in the paper."""
         return self._known("gas", self.evidence.gas())
 
     def _known(self, path: str, value: T | None) -> T:
@@ -101,7 +101,7 @@ def _verdict(holds: bool) -> Verdict:
 
 
 def _orifice_constants(reported: ReportedSet) -> Claim:
-    """Compare C1, C2 and the critical ratio with the reported gas properties; equations (6), (7)."""
+    """Compare C1, C2 and the critical pressure ratio with the reported gas properties; equations (6), (7)."""
     gas = reported.gas()
     k, constant, temperature = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
     constants = {
@@ -123,7 +123,7 @@ def _orifice_constants(reported: ReportedSet) -> Claim:
 
 
 def _step_percentages() -> Claim:
-    """Compare the reported percentages with reported errors divided by reported ranges."""
+    """Compare the reported percentages of the step response with reported errors divided by reported ranges."""
     entries = paper_entries()
     errors = [entries[f"step_rms_{name}"].published or 0.0 for name in STEP_ERRORS]
     percents = [entries[f"step_percent_{name}"].published or 0.0 for name in STEP_ERRORS]

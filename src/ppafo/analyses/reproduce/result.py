@@ -98,7 +98,7 @@ def reading_rows(rows: Sequence[InterpretationOfU]) -> list[tuple[str, str, str,
 
 
 def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
-    """Return the conclusion from the interpretations of U as a sentence; empty if they do not support it."""
+    """Return the conclusion from the interpretations of U as a sentence; empty if the numbers do not support it."""
     entries = paper_entries()
     error, saving = entries["torque_rms_improvement"], entries["co2_saving"]
     low, high, least = error.at_least or 0.0, error.at_most or 0.0, saving.at_least or 0.0

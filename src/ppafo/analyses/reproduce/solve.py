@@ -60,7 +60,7 @@ def torque_task_claims(
 
 
 def _claim_over_phases(identifier: str, values: Floats, decimals: int, note: str, rests_on: tuple[str, ...]) -> Claim:
-    """Return a claim on the median of values (runs,), in its unit, with the window of the task as criterion."""
+    """Return a claim on the median of values (runs,), in the unit of the claim, judged by the window of the claim."""
     entry = paper_entries()[identifier]
     assert entry.at_least is not None, f"{identifier} has a window"
     assert entry.at_most is not None, f"{identifier} has a window"
@@ -140,7 +140,7 @@ TUNED = (
     "controller.derivative_filter=3.1 ms",
     "controller.anti_windup=4.8 1/s",
 )
-"""PID gains found by a search for the least error and gas, on an ideal valve and on a slow, late and noisy one."""
+"""PID gains found by a search for least error and gas, on an ideal valve and on a slow, delayed and noisy valve."""
 DEAD_ZONE = (
     "controller.kind=on_off_dead_zone",
     "controller.rate=20 Hz",
@@ -148,14 +148,14 @@ DEAD_ZONE = (
     "controller.release=0.05 N m",
     "controller.opening=1",
 )
-"""On-off law with a dead zone narrower than the torque resolution of the solenoid pair within one sample."""
+"""Overrides for an on-off law with a dead zone narrower than the torque change of the solenoid pair in one sample."""
 FASTER = ("controller.rate=100 Hz", "valve.switching_interval=10 ms")
-"""Five times the switching rate; in the set, the printed 20 Hz of the component limits the switching interval."""
+"""Overrides for five times the printed switching rate of 20 Hz, which limits the switching interval in the set."""
 _RESTS_ON = ("the torque task as completed here",)
 
 
 def control_claims(solenoid: Result, proportional: Result, pair_errors: Floats) -> list[Claim]:
-    """Return the claims on switching rate, gains, dead zone and improved control, all of them undetermined here.
+    """Return the claims on switching rate, gains, dead zone and improved control, all with the verdict undetermined.
 
     ``pair_errors`` are the RMS errors [N m] of the solenoid pair over the unknown phase of its decisions.
     """
@@ -271,12 +271,12 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
 
 
 def _used_by(assumed: Iterable[AssumedValue], *experiments: str) -> tuple[str, ...]:
-    """Return the assumptions of some experiments beyond the paper, a sentence for each."""
+    """Return the assumptions beyond the paper that the named experiments use, a sentence for each."""
     return tuple(value.sentence() for value in assumed if not set(experiments).isdisjoint(value.used_by))
 
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
-    """Return the experiments, each with the applicable overrides."""
+    """Load the scenarios of the paper's experiments, each with the overrides that apply to it."""
     applied: dict[str, list[Override]] = {name: [] for name in EXPERIMENTS}
     by_path = override_set(read_overrides(overrides, ScenarioError), ScenarioError)
     # Kinds come first, outer ones before inner ones: they decide which numbers there are.

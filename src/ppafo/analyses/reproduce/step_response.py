@@ -16,7 +16,7 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
 RESOLUTION = 1.0e-6
-"""Smallest fraction of the travel that counts as motion in a simulated recording; a measured one needs more."""
+"""Smallest fraction of the travel that counts as motion in a simulated recording; measured recordings need more."""
 _SMALLEST_TRAVEL = 1.0e-3
 _FIRST_ANGLE, _LAST_ANGLE, _SAME_ANGLE = 20.0, 130.0, 0.5
 """First and last angle of figure 7, and the tolerance for the same angle [deg]."""
@@ -25,7 +25,7 @@ _CLEAR, _SAME = 0.05, 0.01
 _NOTABLE_TIME = 2.0e-3
 """Shortest time [s] between a full chamber 1 and breakaway that is noted as a difference."""
 _SLOWED = 0.5
-"""Ratio of a slow rate of fall to the steepest rates before and after, up to which the fall has slowed."""
+"""Largest ratio of the slowest rate of fall to the steepest rates before and after that counts as slowed [-]."""
 _LARGEST_RISE = 1.0 * PASCALS_PER_PSI
 """Largest rise [Pa] that still counts as a slowed fall; the text mentions no rise."""
 _SETS_OFF = 0.02
@@ -92,7 +92,7 @@ def step_observations(recording: Recording, levels: SupplyLevels, events: StepEv
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """Recording, supply levels and events with which the statements are compared."""
+    """Recording, supply levels and events of a step response, against which the statements of the text are tested."""
 
     recording: Recording
     levels: SupplyLevels
@@ -144,7 +144,7 @@ def _rises(step: _Step) -> tuple[bool, str, str]:
 def _falls_in_motion(step: _Step) -> tuple[bool, str, str]:
     """Test the fall of pressure 1 during motion, from the peak near breakaway to the minimum.
 
-    In the text the pressure falls until the stop.
+    In the paper's text the pressure falls until the stop.
     """
     pressure, angle = step.recording["pressure_1"], step.recording["angle"]
     # Chamber 1 still fills while the vane sets off, so that the peak lies behind breakaway.

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _NEGLIGIBLE = 0.01
-"""Fraction of the largest index below which a value counts as negligible."""
+"""Fraction of the largest index below which the influence of a value counts as negligible."""
 _INCHES_OF_A_BAR = 0.27
-"""Height of the bars of one value."""
+"""Height of the row of a varied value in a panel [inches]."""
 _MAXIMUM_LINES = 5
-"""Number of values whose indices are plotted over the sample size."""
+"""Number of varied values whose indices are plotted over the sample size."""
 _TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
 _CAPTION = (
     "Left: the indices with their bands, {filled} filled{open}. Right: the largest of them, in the colours and markers "

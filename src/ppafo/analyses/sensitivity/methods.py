@@ -19,11 +19,11 @@ from ppafo.studies.intervals import jackknife_reach
 SCRAMBLES = 8
 """Number of independent scrambles of the Sobol sequence, to which base points are assigned in turn."""
 _INNER = 3
-"""Number of draws of the free values for a conditional variance (Song, Nelson and Staum, 2016)."""
+"""Number of draws of the free values for each conditional variance (Song, Nelson and Staum, 2016)."""
 _SMALLEST = 2.0**-53
-"""Smallest fraction of a draw, for which the normal scores of it and of 1 minus it are finite."""
+"""Smallest fraction of a draw; normal scores are finite from this fraction to 1 minus this fraction."""
 _ONE = 0.6827
-"""Confidence level of one standard deviation."""
+"""Confidence level of an interval of plus and minus one standard deviation."""
 _NEAREST = 0.2
 """Fraction of the runs, nearest to an end of a value, to which the parabola is fitted."""
 
@@ -222,11 +222,11 @@ The values are added in random orders: each value gets its increase of the varia
 values of the order are fixed (Song, Nelson and Staum, 2016). Fixed values are drawn from the Gaussian copula.
 """
 METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
-"""Methods by name. To add a method: its design, its indices, and its entry here."""
+"""Methods of sensitivity analysis by name; a new method needs a design, indices, and an entry here."""
 
 
 def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floats]:
-    """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and the half band.
+    """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and its half band.
 
     The change has the unit of the metric and is positive if the metric grows with the value; it is nan for noise. It is
     the difference between two conditional means of the metric, with the value at either quantile and all other values
@@ -255,7 +255,7 @@ def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floa
 
 
 def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], nearest: float) -> Floats:
-    """Return the mean of the metric with a value at an end: from all parts, then without each part (parts + 1,).
+    """Return the mean metric at the value ``end`` of an input: from all parts, then without each part (parts + 1,).
 
     ``nearest`` is the fraction of the runs, nearest to the end, to which the parabola is fitted.
     """

@@ -1,4 +1,4 @@
-"""The question which uncertain value matters: its arguments."""
+"""Public function ``sensitivity``: influence of uncertain values on metrics."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def sensitivity(
 ) -> Finding[Influences]:
     """Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.
 
-    Noise of the sensors is one of the values. StudyError for bad input, and where more than the fraction
-    ``maximum_failed`` of the runs fails; of fewer, whole blocks are left out and counted.
+    Sensor noise counts as one of the values. Raises StudyError for bad input, and if more than the fraction
+    ``maximum_failed`` of the runs fails; otherwise blocks with failed runs are left out and counted.
 
     method: default: sobol, or shapley if values are correlated
     metrics: metric to analyse, may be repeated; default: the metrics of the study

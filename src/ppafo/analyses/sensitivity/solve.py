@@ -24,7 +24,7 @@ from ppafo.study.runs import Runs, tracking_violation
 from ppafo.wording import argument_text
 
 _ENDS = (0.05, 0.95)
-"""Quantile fractions of a value between which the change of a metric is taken."""
+"""Quantiles of a varied value between which the change of a metric is computed."""
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
 """Default number of blocks by method: tens of thousands of runs for a few values."""
 _FEWEST_WHOLE = 4
@@ -79,7 +79,7 @@ class MetricSensitivity:
 
     @property
     def indices(self) -> Indices:
-        """Sensitivity indices from all blocks."""
+        """Sensitivity indices of the metric from all blocks."""
         last = self.settling[-1]
         values, bands = (
             {name: np.array(numbers) for name, numbers in by_name.items()} for by_name in (last.indices, last.bands)
@@ -88,7 +88,7 @@ class MetricSensitivity:
 
     @property
     def dropped_blocks(self) -> int:
-        """Number of blocks left out."""
+        """Number of blocks left out because of a failed run."""
         return self.settling[-1].blocks - self.settling[-1].used
 
 

@@ -31,12 +31,12 @@ class AuditedSet:
     overrides: tuple[str, ...] = ()
 
     def __iter__(self) -> Iterator[AuditFinding]:
-        """Iterate over the findings."""
+        """Iterate over the findings of the audit."""
         return iter(self.findings)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of findings by severity."""
+        """Number of findings of the audit by severity."""
         return {name: sum(finding.severity == name for finding in self.findings) for name in _SEVERITIES}
 
     def json_document(self) -> dict[str, Any]:

@@ -46,7 +46,7 @@ class _Described(BaseModel, strict=True):
 
 
 class _Failure(BaseModel, strict=True):
-    """Failed run, with the reason."""
+    """Failed run of a study in its summary, with the reason of the failure."""
 
     run: _Count
     configuration: str
@@ -54,7 +54,7 @@ class _Failure(BaseModel, strict=True):
 
 
 class _Summary(BaseModel, strict=True):
-    """Guaranteed fields of a study summary."""
+    """Study summary as read from a folder: required fields."""
 
     completed: _Count
     diverged: _Count
@@ -114,7 +114,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
 
 
 def _useless_runs(results: StudyResults) -> list[str]:
-    """Return sentences on failed, oscillating and not following runs, the latter two by configuration."""
+    """Return sentences on failed runs, and by configuration on runs that oscillate or do not follow the reference."""
     summary, runs = results.summary, results.document["runs"]
     sentences = [
         f"{runs - summary['completed']:,} of {runs:,} runs failed and have no metrics; the first is run "

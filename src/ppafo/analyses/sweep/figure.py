@@ -29,20 +29,20 @@ MOST_METRICS = 9
 MAXIMUM_DRAWN = 4_000_000
 """Largest number of runs in a figure, spread evenly over all; printed statistics use all runs."""
 _COLUMNS = 2
-"""Number of panels side by side."""
+"""Number of panels side by side in a figure."""
 _PANEL, _COMPARED_PANEL = (2.9, 2.4), (2.7, 2.3)
 """Width and height of a panel [inches], and of a panel in a row that compares configurations."""
 _HISTOGRAM_BINS = 60
-"""Largest number of bins of a histogram."""
+"""Largest number of bins in the histogram of a metric."""
 _MAXIMUM_POINTS = 3000
 """Largest number of runs in a curve or in the points of a panel."""
 _MEDIAN = 0.5
 _OPACITIES = (0.18, 0.32, 0.45)
 """Opacities of the bands of one channel, from the outermost to the innermost."""
 _GRIDDED = ("grid", "list")
-"""Types of ``[[vary]]`` entries that form a full grid with each other."""
+"""Kinds of ``[[vary]]`` entries that form a full grid with each other."""
 _NAMED = 3
-"""Number of varied values in a title."""
+"""Largest number of varied values named in the title of a figure."""
 _CAPTION = (
     "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
 )
@@ -96,7 +96,7 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
 
 
 def _differing(results: StudyResults, metrics: Sequence[str]) -> list[str]:
-    """Return the metrics that differ between the runs by more than their accuracy, and from every metric before."""
+    """Return the metrics that differ between runs in their displayed digits, each set of equal metrics once."""
     chosen: dict[str, str] = {}
     for metric in metrics:
         kind = metric_kind(results, metric)
@@ -129,7 +129,7 @@ def _panels(
 
 
 def _kind(results: StudyResults, path: str) -> Kind:
-    """Return label, unit and format of the values of a varied path."""
+    """Return label, unit and number format of the values of a varied path."""
     varied = results.document["varied"][path]
     return of_path(path, varied["unit"].removeprefix("-"), given=varied.get("given", ""))
 

@@ -1,4 +1,4 @@
-"""The questions what many runs come to, and what a statistic of them is: the arguments."""
+"""Command ``sweep``: arguments of a study with results in a folder, or of a statistic over draws."""
 
 from __future__ import annotations
 

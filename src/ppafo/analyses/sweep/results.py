@@ -24,13 +24,13 @@ SUMMARY = "summary.json"
 BANDS = "bands.parquet"
 _OF_BANDS = ("configuration", "channel", "time", "runs")
 _QUANTILE = re.compile(r"q[0-9]*\.?[0-9]+(e-[0-9]+)?")
-"""Name of the column of a quantile of bands, such as q0.05."""
+"""Pattern of the column name of a quantile in the bands file, such as q0.05."""
 Columns = dict[str, np.ndarray[Any, Any]]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class StudyResults:
-    """Results of a study.
+    """Results of a study in a folder, from which rows are read on demand.
 
     ``folder``: folder of the results
     ``document``, ``summary``: content of ``study.json`` and of ``summary.json``
@@ -58,12 +58,12 @@ class StudyResults:
 
     @property
     def configurations(self) -> tuple[str, ...]:
-        """Names of the configurations."""
+        """Names of the configurations of the study."""
         return tuple(configuration["name"] for configuration in self.document["study"]["configurations"])
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Paths of the varied values."""
+        """Paths of the varied values of the study."""
         return tuple(self.document["varied"])
 
     @property

@@ -61,7 +61,7 @@ QUANTILE_DEFINITION = (
     "value at place (n - 1) q of the n sorted values, on a line between neighbours (Hyndman and Fan 1996, definition 7)"
 )
 MAXIMUM_IN_MEMORY = 16_000_000
-"""Number of samples of a channel from which bands are computed at once."""
+"""Largest number of samples of a channel in memory when quantile bands are computed."""
 Parts = Callable[[], Iterator[Floats]]
 """Function that yields the finite values of a column, in parts of constant order at every call."""
 
@@ -195,7 +195,7 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
 
 
 LOG = "log.jsonl"
-"""Log file, the only one with date, machine and speed; all other files are the same on any machine."""
+"""Name of the log file, the only file with date, machine and speed; all other files are equal on any machine."""
 INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
 INTERRUPTED_AT_ONCE = "interrupted; nothing was kept yet, and the same command begins anew"
 
@@ -224,7 +224,7 @@ def sweep(
         draws: number of draws in place of the file's
         seed: random seed in place of the file's
         threads: threads of this process; default: all cores
-        out: a folder, where a study that was begun resumes; default: a temporary one that lives as long as the
+        out: a folder, where an interrupted study resumes; default: a temporary folder that exists as long as the
             returned object
         agreed: consent to a folder that takes much of the disk
         plugins: modules of your own, files or names, whose objects files may name
@@ -234,7 +234,7 @@ def sweep(
         a Finding whose ``found`` is the StudyResults: columns by name, and ``summary``
 
     Raises:
-        StudyError: a study that cannot be used or does not fit onto the disk, and a folder with results of another one
+        StudyError: a study that cannot be used or does not fit onto the disk, and a folder with another study's results
         DataError: a folder that cannot be used
 
     >>> import ppafo

@@ -31,13 +31,13 @@ from ppafo.units.shown import shown_in
 from ppafo.wording import argument_text
 
 DEFAULT_WIDTH = "1 %"
-"""Default width of an interval, as a fraction of the value."""
+"""Default target width of the confidence interval, as a fraction of the value."""
 PROBABILITY_WIDTH = "0.02"
-"""Default width of the interval of a probability [-]."""
+"""Default target width of the confidence interval of a probability [-]."""
 FIRST_DRAWS = 256
-"""Number of draws before the first look."""
+"""Number of draws before the first interim estimate."""
 MOST_DRAWS = 2**20
-"""Default maximum number of draws."""
+"""Default of the maximum number of draws for a statistic."""
 
 
 @checked
@@ -59,7 +59,7 @@ def estimate(
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[StatisticEstimate]:
-    """Statistic of a metric over the distributions of a study, drawn until its confidence interval is narrow enough.
+    """Estimate a statistic of a metric over the distributions of a study, to a target width of its confidence interval.
 
     The sampling method of the study is not used: a mean takes randomised Sobol replicates, other statistics take
     independent draws.
@@ -120,7 +120,7 @@ def draw_until(
     seed: int,
     also: Sequence[str] = (),
 ) -> Finding[StatisticEstimate]:
-    """Draw from one stream until the stopping rule is met or its last look is reached.
+    """Draw from one stream until the stopping rule is met or its maximum number of draws is reached.
 
     A narrow interval from few draws is not sufficient. For a mean, drawing continues until an event of one run in 3,300
     would have been drawn, and until rarer events within 100 standard deviations of the mean cannot change the interval

@@ -1,4 +1,4 @@
-"""Report of an estimated statistic: table and trace of the looks, histogram of the values."""
+"""Report of an estimated statistic: table and plot of the interim estimates, histogram of the values."""
 
 import math
 from functools import partial
@@ -64,7 +64,7 @@ def remarks_on(
 
 
 def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: StoppingRule) -> Finding[StatisticEstimate]:
-    """Return an estimate as a finding: sentence, table of the looks, trace and histogram of the values."""
+    """Return an estimate as a finding: sentence, table and plot of the interim estimates, histogram of the values."""
     kind, looks = kind_of(estimated.metric, statistic), estimated.looks
     unit = kind.shown_unit if kind.quantity else ""
     ending = ""
@@ -126,7 +126,7 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
 
 
 def _panels(estimated: StatisticEstimate, kind: Kind, rule: StoppingRule, threshold: float | None) -> list[Panel]:
-    """Return panels of estimate, interval and target width at each look, and of the values of all draws.
+    """Return panels of the interim estimates with intervals and target width, and of the values of all draws.
 
     The histogram marks the estimate, or for a probability its ``threshold`` [SI].
     """

@@ -101,7 +101,7 @@ def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:
 def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statistic:
     """Return the statistic of a metric from its text; StudyError for an unknown statistic.
 
-    A gauge pressure refers to ``atmosphere`` [Pa absolute], as in ``studies.draws.level_of``.
+    A gauge pressure refers to ``atmosphere`` [Pa absolute], as in ``studies.limits.level_of``.
     """
     words, unit = text.strip(), METRICS[metric].unit
     if words == "mean":

@@ -1,8 +1,8 @@
 """Stopping rule for a statistic, interim estimates, and the final estimate.
 
-Repeated looks with a stop at a favourable interval make an ordinary interval too narrow. Here the number of looks is
-limited before the first draw, and each look takes an equal part of the allowed error (Bonferroni's inequality): with
-the stated confidence all intervals of the trace hold at the same time, including the last one.
+An ordinary interval is too narrow if interim estimates are repeated until an interval happens to be favourable. Here
+the number of interim estimates is limited before the first draw, and each takes an equal part of the allowed error
+(Bonferroni's inequality): with the stated confidence, all their intervals hold at the same time, including the last.
 """
 
 import math
@@ -22,13 +22,13 @@ from ppafo.units import number_text, parse_quantity
 
 @dataclass(frozen=True, slots=True)
 class StoppingRule:
-    """Rule for the end of drawing: at an interval of a target width, or after ``maximum`` draws.
+    """Stopping rule for draws: an interval of a target width, or ``maximum`` draws.
 
     ``width``: target width in the SI unit of the statistic, or as a fraction of its value
     ``is_relative``: True if ``width`` is a fraction of the value
-    ``first``: number of draws before the first look; it doubles for each later look
+    ``first``: number of draws before the first interim estimate; doubled for each later one
     ``maximum``: maximum number of draws
-    ``confidence``: joint confidence level of all looks
+    ``confidence``: joint confidence level of all interim estimates
     ``maximum_failed``: fraction of failed draws above which the estimate is refused
     """
 
@@ -53,7 +53,7 @@ class StoppingRule:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Numbers of draws at the looks, up to the maximum."""
+        """Numbers of draws at the interim estimates, up to the maximum."""
         # Doubled each time: few looks have to share the allowed error, and the last takes half of all draws.
         sizes = [self.first]
         while sizes[-1] < self.maximum:
@@ -62,11 +62,11 @@ class StoppingRule:
 
     @property
     def confidence_of_look(self) -> float:
-        """Confidence level of a single look, for which all looks together keep ``confidence``."""
+        """Confidence level of a single interim estimate, for which all of them together keep ``confidence``."""
         return 1.0 - (1.0 - self.confidence) / len(self.sizes)
 
     def is_narrow(self, look: "InterimEstimate") -> bool:
-        """Return whether an interval, widened by the effect of values not drawn, is narrow enough."""
+        """Return whether the interval, widened by the possible effect of values not drawn, is narrow enough."""
         allowed = self.width * (abs(look.interval.value) if self.is_relative else 1.0)
         return look.interval.width + look.unseen <= allowed
 
@@ -119,7 +119,7 @@ class MetricMean:
 
 @dataclass(frozen=True, slots=True)
 class StatisticEstimate:
-    """Estimate of a statistic of a metric, with interval [SI] and all looks.
+    """Estimate of a statistic of a metric, with interval [SI] and all interim estimates.
 
     ``is_met``: True if the last interval is narrow enough and rests on enough draws
     ``failed``: number of failed draws

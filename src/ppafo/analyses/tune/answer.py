@@ -1,4 +1,4 @@
-"""Report of a tuning: gains and metrics before and after, course of the search, and overrides to paste."""
+"""Report of a tuning: gains and metrics before and after, convergence of the search, and overrides to paste."""
 
 import json
 import math
@@ -61,7 +61,7 @@ def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
 
 
 def _traces(channel: str, before: GainResult, after: GainResult) -> list[Mark]:
-    """Return the marks of a channel over time, before and after."""
+    """Return the curves of a channel over time, with the gains before and after tuning."""
     style = {"linewidth": 1.3, "drawstyle": "steps-post" if channel == "command" else "default"}
     marks = []
     for setting, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):
@@ -120,7 +120,7 @@ def search_panels(
 
 
 _DIFFERENT = 0.1
-"""Difference as a fraction of the range above which two starts count as ended in different places."""
+"""Difference as a fraction of the range above which two starts count as ended at different gains."""
 _SEARCH_CAPTION = "Above: the best objective so far in each start. Below: where the gains lie between their bounds."
 
 
@@ -200,7 +200,7 @@ def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
 
 
 def _change(before: GainResult, after: GainResult) -> str:
-    """Return a sentence on the improvement by gains that satisfy all constraints."""
+    """Return a sentence on the improvement, for gains that satisfy all constraints."""
     if before.off:
         return f"the loop follows its reference, with the previous gains it did not; objective {after.objective:.4g}"
     if not before.is_feasible:
@@ -261,7 +261,7 @@ def _metric_columns(problem: Problem, before: GainResult, after: GainResult) -> 
 def remarks_of(
     problem: Problem, after: GainResult, starts: Sequence[SearchStart], runs: int, reached: Mapping[str, str]
 ) -> list[str]:
-    """Return remarks on the course of the search and on open points."""
+    """Return remarks on convergence, bounds that were reached, ambiguous gains, draws and violated constraints."""
     settled = sum(start.is_settled for start in starts)
     remarks = [
         f"{count_of(len(starts), 'start')}, {sum(start.candidates for start in starts):,} "

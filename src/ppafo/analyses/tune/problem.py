@@ -1,4 +1,4 @@
-"""Tuning problem: layout of its file, and loading from a name, a file or plain data into SI units."""
+"""Tuning problem: layout of a tuning file, and loading from a name, a file or plain data into SI units."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -29,13 +29,13 @@ from ppafo.wording import first_twice
 
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
-"""Largest number of draws for each candidate."""
+"""Largest number of draws over which each candidate of a tuning runs."""
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
 _Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_error'")]
 
 
 class SearchRange(StrictTable):
-    """Searched parameter: path, bounds with units, and linear or logarithmic spacing."""
+    """Section of a tuning file for a searched parameter: path, bounds with units, linear or logarithmic spacing."""
 
     path: Annotated[Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
     minimum: _Value
@@ -44,7 +44,7 @@ class SearchRange(StrictTable):
 
 
 class GoalSection(StrictTable):
-    """Term of the objective, which is minimised: weight times metric divided by scale.
+    """Section of a tuning file for a term of the minimised objective: weight times metric divided by scale.
 
     A metric with a negative weight is maximised.
     """
@@ -57,7 +57,7 @@ class GoalSection(StrictTable):
 
 
 class Constraint(StrictTable):
-    """Upper or lower limit of a metric."""
+    """Section of a tuning file for a constraint: upper or lower limit of a metric."""
 
     metric: _Metric
     at_most: Annotated[Text | None, Field(description="largest value with its unit")] = None
@@ -65,7 +65,7 @@ class Constraint(StrictTable):
 
 
 class Robust(StrictTable):
-    """Robust tuning: all candidates run over the same draws from a study and are judged by their unfavourable end."""
+    """Section of a tuning file for robustness: candidates run over the same draws; the unfavourable end counts."""
 
     study: Annotated[Text, Field(description="name of a study, or a path relative to this file")]
     measure: Annotated[
@@ -78,7 +78,7 @@ class Robust(StrictTable):
 
 
 class SearchEffort(StrictTable):
-    """Effort of the search.
+    """Section of a tuning file for the effort of the search.
 
     ``starts``: number of independent starts
     ``generations``: maximum number of generations of each start
@@ -93,7 +93,7 @@ class SearchEffort(StrictTable):
 
 
 class TuningFile(StrictTable):
-    """Layout of a tuning file."""
+    """Tuning file: scenario, searched parameters, objective, constraints, robustness and effort."""
 
     schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -121,7 +121,7 @@ Gains = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class SearchedParameter:
-    """Searched parameter of a tuning problem.
+    """Searched parameter of a tuning problem, with its bounds and its value before tuning.
 
     ``path``: dotted path
     ``minimum``, ``maximum``: bounds [SI]
@@ -138,12 +138,12 @@ class SearchedParameter:
     place: VariedPath
 
     def value(self, fraction: Floats) -> Floats:
-        """Return values [SI] at fractions of the range from minimum to maximum."""
+        """Return values of the parameter [SI] at fractions of its range from minimum to maximum."""
         between = LogUniformBetween if self.is_logarithmic else UniformBetween
         return between(self.minimum, self.maximum).values(fraction)
 
     def fraction(self, value: float) -> float:
-        """Return the fraction of the range at which a value lies; below 0 or above 1 beyond the bounds."""
+        """Return the position of a value [SI] in the range, from 0 to 1; below 0 or above 1 beyond the bounds."""
         if self.is_logarithmic:
             return math.log(value / self.minimum) / math.log(self.maximum / self.minimum) if value > 0.0 else -math.inf
         return (value - self.minimum) / (self.maximum - self.minimum)
@@ -167,7 +167,7 @@ class ObjectiveTerm:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Draws over which candidates are judged, and the statistic of the result.
+    """Draws over which candidates are evaluated, and the statistic of their metrics that counts.
 
     ``uncertainty``: distributions of the uncertain values
     ``study``: name of the study; empty if only sensor noise is drawn
@@ -185,7 +185,7 @@ class Spread:
 
     @property
     def measure(self) -> str:
-        """Statistic by which candidates are judged, in words."""
+        """Statistic by which candidates are evaluated, in words."""
         if self.fraction is not None:
             return f"{100.0 * self.fraction:g} % quantile"
         if self.deviations == 0.0:
@@ -265,7 +265,7 @@ class Problem:
         return {gain.path: gain.place.level(gain.place.quote(values[gain.path])) for gain in self.searched}
 
     def lines(self, gains: Gains) -> list[str]:
-        """Return gains as overrides, ``PATH=VALUE``."""
+        """Format gains as overrides, ``PATH=VALUE``."""
         return [f"{gain.path}={gain.place.quote(gains[gain.path])}" for gain in self.searched]
 
 
@@ -378,7 +378,7 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
 
 
 def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario) -> Spread | None:
-    """Return the draws over which candidates are judged: of a study, of the noise, of both; None for neither."""
+    """Return the draws over which candidates are evaluated: of a study, of sensor noise, or of both; None without."""
     robust = parsed.robust
     if robust is None:
         noise = Uncertainty(()).with_noise_of([scenario])

@@ -1,4 +1,4 @@
-"""Command and function ``tune``: arguments of a tuning."""
+"""Public function ``tune``: search for gains."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from ppafo.studies.limits import MetricLimit
 INFEASIBLE = 1.0e6
 """Lowest cost of a candidate that violates a constraint."""
 FRESH_DRAWS = 1024
-"""Number of draws outside the search, over which the result is judged."""
+"""Number of draws outside the search, over which the tuned gains are evaluated."""
 _AS_GOOD = 0.01
 """Relative excess over the best cost within which another start counts as equally good."""
 
@@ -39,10 +39,11 @@ class SearchStart:
 
 
 def agreement(starts: Sequence[SearchStart]) -> float:
-    """Return the largest difference in a fraction of the range between the best start and equally good starts.
+    """Return the largest difference of a gain between the best and equally good starts, as a fraction of its range.
 
-    Equally good is a cost within a hundredth of the best. A large difference means that very different gains reach the
-    same cost, so the objective does not determine them. ``starts`` are sorted with the best first.
+    A start is equally good if its cost is within a hundredth of the best cost. A large difference means that very
+    different gains reach the same cost, so the objective does not determine them. ``starts`` are sorted with the best
+    first.
     """
     best = starts[0]
     # Of an infeasible cost only what the violation adds is compared: a hundredth of the offset would take in all.
@@ -68,12 +69,13 @@ class GainResult:
     """Gains [SI] with their metrics and the violation of constraints.
 
     ``values``: metrics of the search [SI]: of the nominal device, or at their unfavourable end over the draws
-    ``fresh``: the same over draws that the search did not use; empty without draws
+    ``fresh``: metrics over draws that the search did not use [SI]; empty without draws
     ``judged``: metrics compared with the constraints over fresh draws; for a loop that swings in the second half
         of the hold, the error at a single instant does not count
     ``objective``, ``violation``, ``share_without_value``: objective, violation, and fraction of runs without a value,
         in the search
-    ``fresh_violation``, ``fresh_share_without_value``: the same over fresh draws, or in the search without draws
+    ``fresh_violation``, ``fresh_share_without_value``: violation and fraction over fresh draws, or in the search
+        without draws
     ``off``: fraction by which the runs exceed the tracking limits; 0 if they follow their reference
     ``torque_ceiling``: draws in which the reference is out of reach
     ``share_of_noise``: fraction of the variance over fresh draws that is due to sensor noise, by metric
@@ -115,7 +117,7 @@ class GainResult:
 
 @dataclass(frozen=True, slots=True)
 class Tuned:
-    """Result of a tuning, in SI units.
+    """Result of a tuning: gains before and after, starts of the search, and remarks; numbers in SI units.
 
     ``overrides``: overrides that turn the scenario of the tuning file into the tuned one
     ``bounds_reached``: gains that ended at a bound, with the bound; a better value may lie beyond

@@ -51,13 +51,13 @@ _SIMPLEX_SIZES = (0.01, 0.1)
 MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
 """Error metrics that cannot be smaller than the torque shortfall of the supply at the largest reference."""
 _NOISE_CONFIDENCE = 0.95
-"""Confidence level of the interval of the noise share."""
+"""Confidence level of the interval of the fraction of the variance due to sensor noise."""
 Costs = Callable[[Floats], Floats]
 """Function from fractions of the ranges (candidates, gains) to costs (candidates,)."""
 
 
 def solve_tuning(problem: Problem, threads: int | None, progress: Report | None) -> Tuned:
-    """Return the result of a tuning: search, and evaluation of the gains before and after."""
+    """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
     spread = problem.spread
     metrics = with_companions(problem.metrics, problem.scenario)
     runs = scenario_runs(
@@ -159,7 +159,7 @@ class _CandidateScores:
 
 
 def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float]) -> _CandidateScores:
-    """Return objective and violation of candidates; ``scales`` are the scales of the goals by metric [SI]."""
+    """Score candidates by objective, constraints and tracking; ``scales`` are scales of the goals by metric [SI]."""
     failing = runs.without_value
     # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
     known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.judged.items()}

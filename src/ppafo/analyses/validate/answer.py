@@ -26,16 +26,16 @@ MILLISECONDS = 1.0e3
 """Milliseconds per second."""
 _LOOKS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
 _NEAR_LIMIT = 0.25
-"""Ratio of the largest residual to the RMS limit above which the panel shows the limit; else it would be flat."""
+"""Least ratio of the largest residual to the RMS limit at which the panel shows the limit; else it would be flat."""
 _SHORT = 3.0
 """Duration [s] below which the time axis is in milliseconds."""
 
 _HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at", "verdict")
 """Column heads of the table of errors, in the order of ``channel_cells``."""
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
-"""Characters replaced in file names."""
+"""Pattern of characters that are replaced in file names."""
 _WRITTEN_AS_ZERO = 5.0e-4
-"""Absolute value below which a number is written as 0."""
+"""Absolute value below which a number in the table of errors is written as 0."""
 
 
 def panels_across(agreement: RecordingAgreement) -> int:
@@ -182,5 +182,5 @@ def _error(channel: ChannelAgreement, value: float) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number as text with three digits, or 0."""
+    """Format a number with three digits, or as 0."""
     return "0" if abs(value) < _WRITTEN_AS_ZERO else f"{value:.3g}"

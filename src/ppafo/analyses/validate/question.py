@@ -1,4 +1,4 @@
-"""The question whether a parameter set agrees with recordings: its arguments."""
+"""Public function ``validate``: comparison of a parameter set with recordings."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def validate(
     """Compare a parameter set with recordings, channel by channel.
 
     The model is run on the recorded command, supply pressure and external torque; residuals are measured - model.
-    With no threshold an RMS error may be 3 % of full range, and less where that is over half of the variance of a
-    signal, beside noise and the usual zero of a sensor; a cause is named whether it passes or not.
+    Without thresholds, an RMS error may be 3 % of full range, or less if that is over half of the variance of the
+    signal, in addition to noise and the usual zero error of the sensor. A cause of the residual is named in any case.
 
     Arguments:
         parameter_set: name of a parameter set, or a .toml file

@@ -16,12 +16,12 @@ from ppafo.version import __version__
 from ppafo.wording import argument_text
 
 _EXPLAINS = 0.5
-"""Ratio of the residual with the nearest cause to the residual without any, up to which this cause is named."""
+"""Largest ratio of the residual with the nearest cause to the residual without a cause at which a cause is named."""
 
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """Validation of a parameter set against recordings.
+    """Result of the validation of a parameter set against recordings.
 
     ``device``: device of the set after the ``overrides``
     ``settings``: settings of the replay
@@ -38,7 +38,7 @@ class Validation:
 
     @property
     def passes(self) -> bool:
-        """True if every error is within its limit; causes do not affect the verdict."""
+        """True if every RMS error is within its limit; causes of the residual do not affect the verdict."""
         return all(recording.passes for recording in self.recordings)
 
     def json_document(self) -> dict[str, Any]:
@@ -92,7 +92,7 @@ def verdict(validation: Validation) -> str:
 
 
 def _why(causes: Diagnosis, without: float, passes: bool) -> str:
-    """Return the cause of a residual, or the nearest one; empty if only noise is left.
+    """Return the cause of a residual in words, or the nearest cause; empty if only noise is left.
 
     ``without`` is the largest error divided by noise [-] without any cause. A nearest cause is named if it at least
     halves this error, or if it concerns wrong samples, which are detectable whatever else is wrong.
@@ -147,7 +147,7 @@ def _cause_data(cause: ResidualCause | None) -> dict[str, Any] | None:
 
 
 def kind_of_channel(channel: ChannelAgreement) -> Kind:
-    """Return unit and format of the errors of a channel, which are differences."""
+    """Return display unit and number format of the errors of a channel, which are differences."""
     return Kind("", "", COMPARED[channel.channel].quantity)
 
 

@@ -166,7 +166,7 @@ _NUMBERS = (
     ),
     ShownNumber(name="counted_strides", title="Strides with these means", quantity="", digits=0),
 )
-"""Metrics in the table of a walk."""
+"""Rows of the table of metrics of a walk."""
 _EXPLAINED = (
     "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
     "'Healthy' is the gait itself. The swing has no ground: of toes that reach it only that they would drag is known. "
@@ -195,7 +195,7 @@ _LIMITS = (
 
 @in_units(lambda comparison: comparison.with_device.scenario.device.shown)
 def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
-    """Return the report of a walk with and without the device.
+    """Return the comparison of a walk with and without the device as a finding.
 
     A walk that diverged has numbers but no figures, and the report has not passed.
     """

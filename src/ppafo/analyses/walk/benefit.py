@@ -1,4 +1,4 @@
-"""Verdict on a walk: benefit of the device, compared with the same walk without it, and a remedy if it has none."""
+"""Verdict on a walk: benefit of the device against the same walk without it, and a remedy if it does not help."""
 
 import contextlib
 
@@ -24,23 +24,23 @@ _LAWS = (
     ("controller.kind=event_proportional",),
     ("controller.kind=event_proportional", "device.valve=proportional"),
 )
-"""Controller tried for a walk without one, and the valve that it needs."""
+"""Overrides that are tried for a walk without a controller: the controller alone, and with the valve it needs."""
 _PRESSURES = (1.2, 1.4, 1.7, 2.0, 3.0, 5.0)
-"""Factors on the gauge pressures of supply that are tried for toes that would drag."""
+"""Factors on the gauge pressures of the supplies that are tried if the toes would drag."""
 _HIGHEST_PRESSURE = 1.0e6
 """Highest gauge pressure [Pa] that is tried: ten bar, the rating of most small pneumatic parts."""
 _STIFFER = (2.0, 4.0)
-"""Factors on the stiffness with which a controller lifts the foot that are tried where its request is too small."""
+"""Factors on the stiffness with which a controller lifts the foot, tried if the requested torque is too small."""
 _NEARLY = 0.95
 """Ratio of a torque to its limit from which the limit counts as reached [-]."""
 _MINUTES = 0.15
-"""Minutes of a walk with a remedy: a few strides after the transient."""
+"""Duration of a walk with a remedy [min]: a few strides after the transient."""
 
 
 def benefit_sentence(comparison: WalkComparison) -> str:
-    """Return whether the device helps, with the numbers of the walks with and without it; "" for a walk that diverged.
+    """Return a sentence on whether the device helps, with the numbers of both walks; "" for a walk that diverged.
 
-    Helpful are net work in push-off, toes above the ground, and an ankle closer to the healthy one.
+    The device helps by net work in push-off, toes above the ground, and an ankle closer to the healthy angle.
     """
     worn, bare = comparison.with_device, comparison.without_device
     if not comparison.is_completed or "net_push_off_work" not in worn.metrics:
@@ -73,7 +73,7 @@ def benefit_sentence(comparison: WalkComparison) -> str:
 
 
 def _remedied(worn: WalkResult, drags: bool) -> str:
-    """Return the cause of missing help and the first remedy with work in push-off and toes above the ground."""
+    """Return a clause on the cause of missing help and the first remedy with push-off work and clear toes."""
     scenario = worn.scenario
     if walk_of(scenario).bottle is not None or not worn.is_helped:
         return ""
@@ -127,9 +127,9 @@ def _raised_pressures(scenario: Scenario) -> list[dict[str, float]]:
 
 
 def _lifting_torques(worn: WalkResult) -> tuple[float, float]:
-    """Return the torques [N m] in dorsiflexion at the lowest toes in mid-swing: of the request, and the most given.
+    """Return the dorsiflexion torques [N m] at the lowest toes in mid-swing: requested, and largest of the actuator.
 
-    Both are 0 without a request. What limits is the request where it is the smaller one, and else the actuator.
+    Both are 0 without a request. The smaller torque limits the height of the toes.
     """
     if "reference" not in worn.averages:
         return 0.0, 0.0

@@ -60,7 +60,7 @@ class ShownNumber(NamedTuple):
 
 
 WOULD_DRAG = "would drag"
-"""Text for toes that would penetrate the ground."""
+"""Text in tables for toes that would penetrate the ground."""
 
 
 def number_texts(shown: ShownNumber, values: Iterable[float | str | None]) -> tuple[str | None, ...]:

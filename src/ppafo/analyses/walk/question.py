@@ -1,4 +1,4 @@
-"""Arguments of the analysis ``walk``: walking with the device, without it, and healthy."""
+"""Command ``walk``: walking with the device, without it, and healthy."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def walk_with_and_without(
 ) -> Finding[Any]:
     """Simulate walking with the device, without it, and healthy.
 
-    ScenarioError for bad input; a walk that diverges is a finding that has not passed, and with ``check`` one whose
-    torque loop oscillates.
+    Raises ScenarioError for bad input. The finding has not passed if a walk diverges or, with ``check``, if the torque
+    does not follow its request.
 
     scenario: name of a walk configuration, or a .toml file; default solenoid
     gait: name of a gait, or a gait file; default: the gait of the configuration

@@ -28,7 +28,7 @@ _NUMBERS = (
     ShownNumber(name="flat_push", title="push, heel loaded", quantity="torque", digits=1),
     ShownNumber(name="safe_time", title="less help at", quantity="time", digits=2),
 )
-"""Numbers of a segment in the table, and lowest toes without the device."""
+"""Columns of the table of segments: numbers of a segment, and lowest toes without the device."""
 _CAPTION = (
     "The task sequence over time. Grey: every other segment. 'Without' is the same task sequence without a device."
 )

@@ -24,7 +24,7 @@ from ppafo.walking.variation import (
 )
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Quantiles in the table, as fractions of the wearers."""
+"""Quantiles in the table of wearers, as fractions of the wearers."""
 WEARERS_FORMAT = "ppafo wearers"
 WEARERS_SCHEMA_VERSION = 1
 _WEARERS_CAPTION = (
@@ -75,7 +75,7 @@ def wearers_finding(population: Population) -> Finding[dict[str, Any]]:
 
 
 def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, tuple[str, str]]) -> dict[str, dict[str, object]]:
-    """Return the quantiles of every number in SI units, with unit and meaning."""
+    """Return mean and quantiles over the wearers of every number in SI units, with unit and meaning."""
     return {
         name: {
             "unit": unit,

@@ -1,1 +1,1 @@
-"""Functions of the commands: typed and documented, importing their implementation only when called."""
+"""Command functions: typed and documented, with implementations imported only when called."""

@@ -1,4 +1,4 @@
-"""Bench commands: recordings of a real or simulated bench, parameter sets from them, and their agreement with a set."""
+"""Commands for test benches: simulated experiments, and recording of a bench over a link."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def rig_record(
 
 
 def list_rig() -> CommandOutput:
-    """Return the lists of experiments and presets with their descriptions."""
+    """List experiments and presets of the simulated bench with descriptions."""
     from ppafo.cli.output import CommandOutput
     from ppafo.rig.experiments import overview
 

@@ -1,4 +1,4 @@
-"""Commands on the user's device: parameter sets and parts."""
+"""Commands on parameter sets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Export commands for a scenario or walk: C library or functional mock-up unit."""
+"""Export commands for a scenario or walk: C library, and functional mock-up unit."""
 
 from __future__ import annotations
 

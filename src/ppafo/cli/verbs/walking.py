@@ -1,4 +1,4 @@
-"""Commands on walking with the device, and on gaits."""
+"""Commands on gaits: list, display, import and recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Columns of a curve in the tables of a walk: found by name, summed in SI units, and missed by name."""
+"""Columns of recorded tables that form a curve: lookup by name, sum in SI units, message for missing columns."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -18,9 +18,9 @@ from ppafo.wording import one_line
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
 _MOST_NAMES, _LONGEST_TEXT = 12, 160
-"""Limits of a message: number of column names, and characters of the names and of a remark."""
+"""Limits of an error message: number of column names, and characters of the names and of a remark."""
 _COORDINATES = (".x", ".y", ".z")
-"""Ends of the names of the coordinates of a marker."""
+"""Suffixes of the column names of a marker's coordinates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +54,7 @@ class CurveColumns:
         values = self.table.columns[name]
         if not unit:
             gait_map = f"a gait map ({setting_text('columns')})"
-            raise DataError(f"{where}: the file does not state its unit; give {self.unit_key} in {gait_map}")
+            raise DataError(f"{where} has no unit in the file; give {self.unit_key} in {gait_map}")
         parsed_unit = "" if unit == "-" else unit
         problem = ""
         for si_unit in si_units:
@@ -98,8 +98,8 @@ def find_columns(
 def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTable]) -> str:
     """Return a message on the missing columns of curves; ``names`` are the unsigned columns of each curve.
 
-    It has the nearest name of each, and the columns and remarks of the files, shortened. Raises DataError for columns
-    that a file has more than once.
+    The message has the nearest name for each missing column, and the columns and remarks of the files, shortened.
+    Raises DataError for a column name that a file has more than once.
     """
     known, reasons = [name for table in tables for name in table.columns], []
     files = ", ".join(table.file for table in tables)
@@ -113,16 +113,16 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
                 f"map ({setting_text('columns')})"
             )
         reason = f"there is no column {missing!r}{nearest_column(missing, known)}"
-        reasons.append(f"{curve}: {'no file has all of its columns' if missing in known else reason}")
+        reasons.append(f"{curve}: {'no file has all columns of this curve' if missing in known else reason}")
     # A marker counts once, not by its coordinates.
     markers = list(dict.fromkeys(one_line(_marker(name)) for name in known))
     first_names = ", ".join(markers[:_MOST_NAMES]) + (", ..." if len(markers) > _MOST_NAMES else "")
     texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
     listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
-    schema = f"a gait map ({setting_text('columns')}), 'ppafo doctor --schema gait-map'"
+    schema = f"a gait map ({setting_text('columns')}; format: 'ppafo doctor --schema gait-map')"
     return f"{'; '.join(reasons)} ({files}: {listed}); name the columns in {schema}"
 
 
 def _marker(name: str) -> str:
-    """Return the marker of a coordinate; any other column name is returned unchanged."""
+    """Return the marker of a coordinate column; any other column name is returned unchanged."""
     return name[:-2] if name[-2:] in _COORDINATES else name

@@ -1,4 +1,4 @@
-"""Contacts of a foot with the ground: heel strike and toe-off in a vertical force, and the plates of one foot."""
+"""Contacts of a foot with the ground: heel strike and toe-off from a vertical force, and force plates of one foot."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -82,14 +82,14 @@ def force_of_plates(
                 total = Signal(table.file, table.time, force + other_plates)
                 chosen.append(f"'{name}' ({len(contacts)})")
     if total is None:
-        return None, ["vertical force: no plate is under this foot, going by the lean of its shank"] if names else []
+        return None, ["vertical force: no plate measured this foot, judged by the lean of the shank"] if names else []
     return total, [
-        f"vertical force: the contacts of this foot, going by the lean of its shank, summed over {', '.join(chosen)}"
+        f"vertical force: sum of the contacts of this foot, judged by the lean of the shank, on {', '.join(chosen)}"
     ]
 
 
 def _is_of_foot(start: float | None, end: float | None, plate: Signal, shank: Signal) -> bool:
-    """Return whether the shank leans forward over a contact, as it does over a contact of its own foot."""
+    """Return whether the shank leans forward over a contact, which shows a contact of the same foot."""
     least = _LEAST_LEAN_OF_PART if start is None or end is None else _LEAST_LEAN
     first = max(float(plate.time[0] if start is None else start), float(shank.time[0]))
     last = min(float(plate.time[-1] if end is None else end), float(shank.time[-1]))

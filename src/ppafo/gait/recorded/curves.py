@@ -16,15 +16,15 @@ from ppafo.gait.recorded.signal import Signal
 from ppafo.signals.recording import Floats
 
 SAMPLES = 101
-"""Samples of a time-normalised curve, both ends of the stride included."""
+"""Number of samples of a time-normalised curve, both ends of the stride included."""
 PHASES = np.linspace(0.0, 1.0, SAMPLES)
 """Phases [strides] of a time-normalised curve, from 0 to 1."""
 REMARKED_SPREAD, REFUSED_SPREAD = 0.1, 0.25
-"""Standard deviation between strides relative to the range, for a remark and for rejection; steady: 0.004 to 0.06."""
+"""Standard deviation between strides relative to the range [-] for a remark and for rejection; usual: 0.004 to 0.06."""
 REMARKED_MISFIT, REFUSED_MISFIT = 0.03, 0.1
 """RMS residual of the series relative to the range [-] for a remark, and for rejection; correct curves: below 0.01."""
 _UNLOADED_PHASE = 0.02
-"""Interval at both ends of the stance [strides] with too little force for a centre of pressure."""
+"""Duration at both ends of the stance [strides] with too little force for a centre of pressure."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,19 +102,19 @@ def _scatters(
         if spread > most_spread or misfit > most_misfit:
             yield (
                 name,
-                f"{name} differs between strides by {100.0 * spread:.0f} % of its range and its series misses "
-                f"{100.0 * misfit:.1f} % (standard deviation, root mean square)",
+                f"{name} has, relative to its range, a standard deviation between strides of {100.0 * spread:.0f} % "
+                f"and an RMS error of its Fourier series of {100.0 * misfit:.1f} %",
             )
 
 
 def _remedy() -> str:
-    return f"smooth the recording ({setting_text('low_pass', 6.0, '6 Hz')}), or give better or more strides"
+    return f"smooth the recording ({setting_text('low_pass', 6.0, '6 Hz')}), or record more or steadier strides"
 
 
 def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> list[str]:
     """Return a remark on each curve with unusual scatter between strides or an unusual misfit of its series."""
     scatters = _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
-    return [f"{message}: that is noise, or the walk is not steady; {_remedy()}" for _, message in scatters]
+    return [f"{message}: the data are noisy, or the walk is not steady; {_remedy()}" for _, message in scatters]
 
 
 def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Floats:

@@ -12,7 +12,7 @@ from ppafo.gait.recorded.signal import Signal
 _RATE = 200.0
 """Sampling rate [Hz] for the comparison of the ends of a cycle."""
 _SHORTEST = 0.5
-"""Shortest stride [s]."""
+"""Shortest plausible stride time [s]."""
 LONGEST = 1.5
 """Largest length of a record of one cycle [strides]; strides are counted in a longer record."""
 _MISFIT = 0.06

@@ -15,7 +15,7 @@ from ppafo.storage.files import read_bytes
 from ppafo.storage.text_table import doubled, number_in, said_of_doubled, told_apart, without_copies
 
 UNSEEN = ("", "nan", "-nan", "n/a", "na", "null")
-"""Cells of a missing value, in lower case."""
+"""Cell texts of a missing value, in lower case."""
 
 
 class NumberBlock(NamedTuple):
@@ -98,11 +98,11 @@ def table_of(
     noun: str = "columns",
     kind: str = "measured",
 ) -> MotionTable:
-    """Return the motion table of a block.
+    """Return the motion table of a block of numbers.
 
-    ``names`` and ``units`` are of all columns in their order: the name is "" for a column that is skipped, the unit if
-    the file does not state it. ``clock`` is the name of the time column, whose unit is ``seconds`` [s], or with a
-    ``frame_rate`` [Hz] of the column of frames from 1, "" for one frame in each row.
+    ``names`` and ``units`` cover all columns in order: an empty name skips a column, an empty unit is not stated in the
+    file. ``clock`` names the time column, in units of ``seconds`` [s]; with a ``frame_rate`` [Hz] it names the column
+    of frame numbers from 1, or is empty for one frame per row.
     Duplicate column names are allowed. Raises DataError, with file, line and column, for values that cannot be read.
     """
     written = [name for name in names if name]

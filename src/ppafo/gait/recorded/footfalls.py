@@ -22,17 +22,17 @@ from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.wording import count_of
 
 FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
-"""Sources of strides."""
+"""Names of the sources of strides: vertical force, shank angle, and events stored in the file."""
 LEAST_STRIDES = 2
-"""Default of the least number of strides; it is 1 for a walk past a plate and for one cycle."""
+"""Default of the smallest number of strides; 1 for a walk across a force plate and for a single cycle."""
 _SMOOTH = 6.0
 """Cut-off frequency [Hz] of the low pass for the shank angle before events are searched."""
 _SHORTEST_STRIDE = 0.5
 """Shortest time between two heel strikes of one foot [s]."""
 _TOP = 0.35
-"""Heel strikes lie in this upper fraction of the range of the shank angle."""
+"""Upper fraction of the range of the shank angle in which heel strikes lie [-]."""
 _DEEPEST = np.radians(-15.0)
-"""Shank angle [rad] that the backward lean before the swing must exceed."""
+"""Shank angle [rad] below which the shank must lean backwards before the swing."""
 _NEAR = 0.15
 """Largest time difference [s] between an event found from the shank and the same event on a plate."""
 _ABOUT_STANCE = 0.05
@@ -64,7 +64,7 @@ class Stride:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Footfalls:
-    """Strides of a walk.
+    """Strides found in a walk, with their source.
 
     ``walk`` holds the signals by name, ``events`` names the source of the strides. ``is_overground`` is True if some
     strides are off the plates, ``is_one_cycle`` if the record is one cycle that was repeated.
@@ -103,14 +103,14 @@ def find_footfalls(
         return footfalls
     span = walk[SHANK].time[-1] - walk[SHANK].time[0]
     remark = (
-        f"one cycle that wraps around: {span:.3g} s of data around a stride of {period:.4g} s, whose start and "
-        f"end differ by {100.0 * misfit:.1f} % of the ranges; how much strides differ is not known"
+        f"the recording is one cycle: {span:.3g} s of data were closed to a stride of {period:.4g} s; start and end "
+        f"differ by {100.0 * misfit:.1f} % of the ranges, and the variation between strides is unknown"
     )
     return replace(again, walk=cycle, strides=whole[:1], remarks=(*again.remarks, remark), is_one_cycle=True)
 
 
 def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, least: int) -> Footfalls:
-    """Return the strides from the force, if it has the ``least`` number, or from the source with more strides."""
+    """Return the strides from the force, if these are at least ``least``, or from the source with more strides."""
     trials, recorded = [table.trial for table in tables if table.trial is not None], list[Stride]()
     # Events of two trials have two clocks.
     if len(trials) == 1:
@@ -149,13 +149,13 @@ def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[li
         if abs(start - stride.start) < _NEAR and abs(end - stride.toe_off) < _NEAR
     ]
     if not shifts:
-        return strides, "strides from the shank, which no plate corrects: heel strikes and toe-offs are less exact"
+        return strides, "heel strikes and toe-offs from shank_angle, less exact than from a force plate"
     # Strikes and toe-offs of the shank are early or late by one time for a person, which the plates show.
     strike, off = (float(np.mean(values)) for values in zip(*shifts, strict=True))
     moved = [Stride(stride.start + strike, stride.toe_off + off, stride.end + strike) for stride in strides]
     return moved, (
-        f"few contacts on plates: strides from the shank, its strikes moved by {1000.0 * strike:.0f} ms and its "
-        f"toe-offs by {1000.0 * off:.0f} ms as {count_of(len(shifts), 'contact')} on plates show"
+        f"few contacts on force plates: heel strikes and toe-offs from shank_angle, shifted by {1000.0 * strike:.0f} "
+        f"ms and {1000.0 * off:.0f} ms to match {count_of(len(shifts), 'plate contact')}"
     )
 
 
@@ -214,7 +214,7 @@ def heel_strikes(events: str, walk: Mapping[str, Signal]) -> list[float]:
 
 
 def usable_strides(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[Stride]:
-    """Return the strides over which both angles were recorded."""
+    """Return the strides over which both shank and ankle angle were recorded."""
     return [stride for stride in strides if all(strides_within(walk[name], [stride]) for name in REQUIRED)]
 
 

@@ -10,7 +10,7 @@ from ppafo.gait.recorded.table import MotionTable
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """Meaning of the columns of a file without a gait map.
+    """Meaning of the columns of a recorded file without a gait map.
 
     ``columns`` is the map, ``plates`` are force plate columns, to be assigned to the foot by its motion, and
     ``remarks`` are sentences for the user.

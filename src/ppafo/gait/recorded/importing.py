@@ -43,7 +43,7 @@ from ppafo.wording import count_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportedGait:
-    """Result of the import of a gait.
+    """Imported gait with the strides, curves and fit errors behind it.
 
     ``strides`` are the strides used and ``left_out`` the strides rejected. ``curves`` holds the single strides by curve
     name, ``fit_errors`` the errors of the Fourier series. ``events`` is the source of the strides: ``vertical_force``,
@@ -64,7 +64,7 @@ class ImportedGait:
 def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> ImportedGait:
     """Return the mean stride of one walk of one person, from recorded files that share a clock.
 
-    The files may be of any format of ``reading.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
+    The files may be of any format of ``source.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
 
     Strides come from the vertical force if available, otherwise from events of the file or from the shank. Raises a
     DataError that lists all problems with file, column, row and remedy: after a problem with one curve, the other
@@ -90,7 +90,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
     strides = of_usual_time(usable_strides(walk, footfalls.strides), least)
     counts = [(stride, max(lost_in(walk[name], stride) for name in REQUIRED)) for stride in footfalls.strides]
-    lost = [(stride, f"{count_of(count, 'frame')} of its markers or angles lost") for stride, count in counts if count]
+    lost = [(stride, f"markers or angles lost in {count_of(count, 'frame')}") for stride, count in counts if count]
     strides = replace(strides, left_out=(*strides.left_out, *lost))
     sources = {name: walk[name] for name in (*REQUIRED, footfalls.events) if name in walk}
     with noted_in(wrong):
@@ -114,7 +114,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     }
     strides = without_odd_shapes(curves, strides)
     curves = _over_taken_strides(curves, walk, strides, wrong)
-    missing = [f"{name} is left out: no whole stride has it measured throughout the stance" for name in unmeasured]
+    missing = [f"{name} is left out: not measured throughout the stance of any stride" for name in unmeasured]
     remarks = [*source.remarks, *footfalls.remarks, *missing]
     if any(name not in curves for name in REQUIRED):
         raise_noted(wrong)
@@ -133,9 +133,9 @@ def _over_taken_strides(
             signal = walk[name]
             wrong.append(
                 DataError(
-                    f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no "
-                    f"whole stride ({strides.taken[0].start:.4g} to {strides.taken[0].end:.4g} s is the first); give a "
-                    "longer file, or leave it out"
+                    f"{signal.file}: {name}, {signal.time[0]:.4g} to {signal.time[-1]:.4g} s, covers no whole stride "
+                    f"(first stride: {strides.taken[0].start:.4g} to {strides.taken[0].end:.4g} s); give a longer "
+                    "file, or omit the file"
                 )
             )
             continue
@@ -152,7 +152,7 @@ def _finish(
     remarks: Sequence[str],
     wrong: list[PpafoError],
 ) -> ImportedGait:
-    """Return the gait of the mean curves; raises DataError if any is implausible, with all problems in ``wrong``."""
+    """Return the import result of the mean curves; raises DataError, with all problems, if a curve is implausible."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
     share, time = (float(np.mean([getattr(each, name) for each in taken])) for name in ("stance_share", "time"))
     means = {name: curve.mean for name, curve in curves.items()}
@@ -186,7 +186,7 @@ def _finish(
     # The reading of the file that would be neutral.
     neutral = float(np.degrees(taken_off)) + sign * tilt
     given = setting_text("ankle_neutral", math.radians(neutral), f"{neutral:.1f} deg")
-    all_remarks += zero_remarks(tilt, f"{given}, or ankle_angle.neutral in a gait map, corrects it")
+    all_remarks += zero_remarks(tilt, f"give {given}, or ankle_angle.neutral in a gait map")
     all_remarks += scatter_remarks(curves, errors)
     left_out, names = (stride for stride, _ in strides.left_out), (table.file for table in source.tables)
     unique = tuple(dict.fromkeys(all_remarks))
@@ -201,15 +201,17 @@ def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[
     spans = ", ".join(f"{name} {signal.time[0]:.4g} to {signal.time[-1]:.4g} s" for name, signal in walk.items())
     count = count_of(taken, "whole stride")
     where = FORCE if FORCE in walk else SHANK
-    events = f"{len(usable)} in the events"
+    events = f"{count_of(len(usable), 'stride')} in the events"
     if not usable:
         strikes = heel_strikes(where, walk)
         if strikes:
-            events = f"the only heel strike in {where} is at {strikes[0]:.3g} s, and a stride ends with the next one"
+            events = f"{where} has one heel strike only, at {strikes[0]:.3g} s; a stride needs two"
         elif where == FORCE and any(off is not None for _, off in contacts_of(walk[FORCE])):
-            events = f"no heel strike in {where}: the foot stands at the start, and a strike has a swing before it"
+            events = (
+                f"no heel strike in {where}: the foot is on the ground at the start, and a heel strike follows a swing"
+            )
         else:
-            events = f"no heel strikes were found in {where}: is it the right column?"
+            events = f"no heel strikes were found in {where}: check its column"
     fewer = f", or accept fewer with {setting_text('least_strides')}" if taken else ""
     # From the last sample before the longest gap to the first one after it.
     longest = max(
@@ -242,7 +244,7 @@ def _gait(
     curves: Mapping[str, Any],
     events: str,
 ) -> Gait:
-    """Return the gait with its series and its description of the source."""
+    """Build the gait from settings, source files, strides and the fitted curves."""
     origin: Origin = "measured" if all(table.kind == "measured" for table in tables) else "synthetic"
     names = ", ".join(Path(table.file).name for table in tables)
     return Gait(
@@ -277,7 +279,7 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
         if signal.rate < _COARSE_RATE:
             rates.setdefault(round(signal.rate), []).append(name)
     remarks = [
-        f"{', '.join(names)}: {rate} samples a second; heel strikes and toe-offs are known to about "
+        f"{', '.join(names)}: sampled at {rate} Hz; heel strikes and toe-offs are accurate to about "
         f"{500.0 / rate:.0f} ms"
         for rate, names in rates.items()
     ]
@@ -290,8 +292,8 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
     scatter = max((float(np.std(values)) for values in swings if values.size > 1), default=0.0)
     if scatter > _NOISY_FORCE:
         remarks.append(
-            f"the vertical force scatters by {scatter:.2g} body weights while the foot is in the air: events are found "
-            f"at 0.05 and 0.03; filter the force plate or give {setting_text('low_pass')} to detect them reliably"
+            f"vertical_force has noise of {scatter:.2g} body weights in swing, close to the thresholds of heel strike "
+            "and toe-off, 0.05 and 0.03; filter the force in the file for reliable events"
         )
     return remarks
 
@@ -308,5 +310,8 @@ def _remarks(curves: Mapping[str, CurveStatistics], strides: StrideSelection, ev
     ]
     if "vertical_force" in curves:
         return remarks + force_remarks(curves["vertical_force"].mean)
-    less = ": heel strikes and toe-offs come from the shank and are less exact" if events == SHANK else ""
-    return [*remarks, f"no vertical force{less}; a column of another name needs a gait map ({setting_text('columns')})"]
+    less = ": heel strikes and toe-offs are from shank_angle and less exact" if events == SHANK else ""
+    return [
+        *remarks,
+        f"no vertical force{less}; name its column in a gait map ({setting_text('columns')}) if there is one",
+    ]

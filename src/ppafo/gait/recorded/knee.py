@@ -1,4 +1,4 @@
-"""Knee of a recorded walk: its position from hip and thigh or from columns, its direction, and remarks."""
+"""Knee of a recorded walk: position from hip and thigh or from columns, walking direction, and remarks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -66,7 +66,7 @@ def knee_signals(
         if -height > _HIP_HEIGHT:
             raise DataError(
                 f"{found.table.file}: the hip is {height:.2f} m high ({', '.join(mapped.up)}), which is below the "
-                "ground, so its sign is reversed; correct it in the file, or change the sign of knee.up in a "
+                "ground, so its sign is reversed; correct the sign in the file, or change the sign of knee.up in a "
                 "gait map"
             )
         # The file has the hip: the knee follows by the lean of the thigh.
@@ -87,18 +87,16 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
     if mapped is None:
         return []
     if "knee_forward" not in walk:
-        missing = (
-            f"it needs a length of the thigh; give {setting_text('stature')}, or a gait map with knee.thigh_length"
-        )
+        missing = f"the thigh length is unknown; give {setting_text('stature')}, or a gait map with knee.thigh_length"
         return [f"no acceleration of the knee: {missing}"] if mapped.thigh is not None else []
     remarks = []
     if mapped.thigh is not None and mapped.thigh_length is None:
         remarks.append(
-            f"thigh of {_thigh_length(mapped, stature):.3f} m: {THIGH_FRACTION:g} of the stature (Winter 2009)"
+            f"thigh length is {_thigh_length(mapped, stature):.3f} m, {THIGH_FRACTION:g} of the stature (Winter 2009)"
         )
     if walk["knee_forward"].is_position:
         remarks.append(
-            f"acceleration of the knee from a series of {HARMONICS['knee_forward']} harmonics of its position"
+            f"acceleration of the knee from a Fourier series of its position, {HARMONICS['knee_forward']} harmonics"
         )
     return remarks
 

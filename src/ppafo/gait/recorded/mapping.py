@@ -32,7 +32,7 @@ _Flexion = Literal["plantarflexion", "dorsiflexion"]
 
 
 class ShankMap(StrictTable):
-    """Shank angle: a sum of columns, or computed from two markers and the laboratory axes."""
+    """Entry of a gait map for the shank angle: a sum of columns, or two markers and the laboratory axes."""
 
     terms: _Terms | None = None
     unit: _Unit = None
@@ -52,7 +52,7 @@ class ShankMap(StrictTable):
 
 
 class AngleMap(StrictTable):
-    """Ankle angle: a sum of columns, or the angle between the line of two foot markers and the shank.
+    """Entry of a gait map for the ankle angle: a sum of columns, or two foot markers relative to the shank.
 
     With markers, the zero is the flat foot; ``neutral`` is subtracted in both cases.
     """
@@ -82,7 +82,7 @@ class AngleMap(StrictTable):
 
 
 class MomentMap(StrictTable):
-    """Column of the ankle moment, and its unit, N m or N m/kg."""
+    """Entry of a gait map for the ankle moment, in N m or N m/kg."""
 
     terms: _Terms
     unit: _Unit = None
@@ -90,7 +90,7 @@ class MomentMap(StrictTable):
 
 
 class ForceMap(StrictTable):
-    """Vertical ground reaction on this foot, in N, or in body weights with the unit '-'."""
+    """Entry of a gait map for the vertical ground reaction on the foot, in N, or in body weights with the unit '-'."""
 
     terms: _Terms
     unit: _Unit = None
@@ -98,7 +98,7 @@ class ForceMap(StrictTable):
 
 
 class PressureMap(StrictTable):
-    """Centre of pressure along the foot, from the ankle."""
+    """Entry of a gait map for the centre of pressure along the foot, from the ankle."""
 
     terms: _Terms
     unit: _Unit = None
@@ -106,7 +106,7 @@ class PressureMap(StrictTable):
 
 
 class KneeMap(StrictTable):
-    """Knee in the sagittal plane: position in m or acceleration in m/s^2, or hip position and lean of the thigh."""
+    """Entry of a gait map for the knee: position [m] or acceleration [m/s^2], or hip position and lean of the thigh."""
 
     forward: _Terms
     up: _Terms
@@ -128,7 +128,7 @@ class KneeMap(StrictTable):
 
 
 class GaitMap(StrictTable):
-    """Meaning of the columns of recorded files; a curve that is not listed is not imported."""
+    """Gait map: meaning of the columns of recorded files; a curve that is not listed is not imported."""
 
     schema_version: SchemaVersion = 1
     shank_angle: ShankMap
@@ -159,7 +159,7 @@ def unsaid_axes(columns: GaitMap) -> list[str]:
         if mapped.terms is None and unsaid:
             assumed_axes = " and ".join(f'{key} = "{getattr(mapped, key)}"' for key in unsaid)
             verb = "is" if len(unsaid) == 1 else "are"
-            axes.append(f"the gait map does not say {' and '.join(unsaid)} of {name}: {assumed_axes} {verb} assumed")
+            axes.append(f"the gait map does not give {' and '.join(unsaid)} of {name}: {assumed_axes} {verb} assumed")
     return axes
 
 
@@ -167,7 +167,7 @@ Side = Literal["right", "left"]
 
 
 def package_map() -> GaitMap:
-    """Return the map of a CSV file with the column names and signs of the package."""
+    """Return the gait map of a CSV file with the column names and signs of the package."""
     return GaitMap(
         shank_angle=ShankMap(terms=("shank_angle",)),
         ankle_angle=AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
@@ -196,7 +196,7 @@ def opensim_map(side: Side) -> GaitMap:
 
 
 def load_map(path: str | Path) -> GaitMap:
-    """Return the map in a TOML file; raises DataError if it cannot be used."""
+    """Load a gait map from a TOML file; raises DataError if it cannot be used."""
     return read_model(_FILE, GaitMap, path)[0]
 
 
@@ -260,11 +260,13 @@ def check_settings(settings: ImportSettings) -> None:
     if settings.body_mass is not None and not 1.0 <= settings.body_mass <= 500.0:
         wrong.append(f"a body mass of {settings.body_mass:g} kg is not plausible; give it in kg, such as '62 kg'")
     if settings.walking_speed is not None and not 0.05 <= settings.walking_speed <= 4.0:
-        wrong.append(f"a walking speed of {settings.walking_speed:g} m/s is not plausible; walking is 0.05 to 4 m/s")
+        wrong.append(f"a walking speed of {settings.walking_speed:g} m/s is not plausible; allowed is 0.05 to 4 m/s")
     if settings.stature is not None and not 0.5 <= settings.stature <= 2.5:
         wrong.append(f"a stature of {settings.stature:g} m is not plausible; give it in m, such as '1.75 m'")
     if settings.low_pass is not None and not (math.isfinite(settings.low_pass) and settings.low_pass >= 1.0):
-        wrong.append(f"a low pass at {settings.low_pass:g} Hz would remove the gait itself; 6 Hz is usual")
+        wrong.append(
+            f"a low pass at {settings.low_pass:g} Hz would remove the gait itself; give 1 Hz or more (usual: 6 Hz)"
+        )
     if not 0.0 <= settings.longest_gap <= LONGEST_FILLED:
         wrong.append(f"gaps of {settings.longest_gap:g} s cannot be filled; allowed is 0 to {LONGEST_FILLED:g} s")
     if settings.start is not None and settings.end is not None and not settings.start < settings.end:

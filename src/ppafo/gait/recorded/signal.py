@@ -1,4 +1,4 @@
-"""Signals over time from one file: gaps of motions, absent loads, and the low pass."""
+"""Signals over time from one file: gaps in motions, loads that were not measured, and low-pass filter."""
 
 from dataclasses import dataclass, replace
 

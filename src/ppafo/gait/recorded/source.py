@@ -1,4 +1,4 @@
-"""Recording from which a gait is imported: tables, map and signals of its files, gaps filled, and remarks."""
+"""Recording from which a gait is imported: tables, gait map and signals of its files, gaps filled, and remarks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -44,7 +44,7 @@ FORMS: Kinds[GaitForm] = Kinds(
 
 
 def form_of(path: str | Path, name: str = "") -> GaitForm:
-    """Return the format of a file: the named one, else the first that recognises it; raises DataError if none does."""
+    """Return the file format by name, or the first format that recognises the file; raises DataError if none does."""
     if name:
         form = FORMS.get(name)
         if form is None:
@@ -199,21 +199,20 @@ def _with_subject(
         wrong.append(
             DataError(
                 f"{tables[0].file}: does not state the body mass; give it, such as "
-                f"{setting_text('body_mass', 62.0, '62 kg')} (until then loads are taken relative to their largest "
-                "value)"
+                f"{setting_text('body_mass', 62.0, '62 kg')} (loads are checked relative to their maximum until then)"
             )
         )
     elif settings.body_mass is None:
         file, mass = masses[0]
         settings = replace(settings, body_mass=mass)
-        remarks.append(f"body mass {mass:.4g} kg, as {Path(file).name} states")
+        remarks.append(f"body mass {mass:.4g} kg, from {Path(file).name}")
     elif masses and abs(masses[0][1] - settings.body_mass) > _SAME * settings.body_mass:
         remarks.append(
-            f"body mass {settings.body_mass:.4g} kg as stated; {Path(masses[0][0]).name} states {masses[0][1]:.4g} kg"
+            f"body mass {settings.body_mass:.4g} kg as given; {Path(masses[0][0]).name} states {masses[0][1]:.4g} kg"
         )
     if settings.stature is None and statures:
         settings = replace(settings, stature=statures[0][1])
-        remarks.append(f"stature {statures[0][1]:.4g} m, as {Path(statures[0][0]).name} states")
+        remarks.append(f"stature {statures[0][1]:.4g} m, from {Path(statures[0][0]).name}")
     return settings, remarks
 
 
@@ -229,10 +228,10 @@ def _ends(walk: Mapping[str, Signal], tables: Sequence[MotionTable]) -> list[str
         if signal.absent is not None:
             loads.setdefault(round(100.0 * float(signal.absent.mean())), []).append(name)
     remarks = [
-        f"{', '.join(names)} from {first:.4g} to {last:.4g} s: not seen in the rest of {low:.4g} to {high:.4g} s"
+        f"{', '.join(names)}: missing outside {first:.4g} to {last:.4g} s (recording: {low:.4g} to {high:.4g} s)"
         for (first, last, low, high), names in seen.items()
     ]
     return remarks + [
-        f"{', '.join(names)}: absent in {percent} % of the record, where no plate measured this foot"
+        f"{', '.join(names)}: missing in {percent} % of the recording, where no plate measured this foot"
         for percent, names in loads.items()
     ]

@@ -33,7 +33,7 @@ ODD_SHAPE, ODD_PHASE, ODD_AGAINST_OTHERS = 0.25, 0.4, 4.0
 and at any one phase, and relative to the median distance of all strides. Impaired walking varies more, but in every
 stride."""
 _FEWEST_TO_COMPARE = 3
-"""Least number of strides for the detection of an odd one."""
+"""Least number of strides for the detection of an odd stride."""
 _MOST_ODD = 0.4
 """Fraction of odd strides above which no stride is rejected."""
 
@@ -99,14 +99,13 @@ def without_drop_outs(
             columns = [(" + ".join(signal.columns), np.sum([np.abs(values) for _, values in columns], axis=0))]
         for column, values in columns:
             for start, end in constant_stretches(table.time, values, spans):
-                what = f"column {column!r} of {name} keeps one value from {start:.4g} to {end:.4g} s"
+                what = f"column {column!r} of {name} is constant from {start:.4g} to {end:.4g} s"
                 with noted_in(wrong):
                     strides = strides.without(
                         [stride for stride in strides.taken if stride.start < end and start < stride.end],
-                        f"{what}: a sensor drop-out filled with a constant",
-                        f"{table.file}: {what} while the wearer walks: a sensor drop-out filled with a constant; "
-                        f"cut the file "
-                        "there and give the longer part",
+                        f"{what}: a sensor drop-out",
+                        f"{table.file}: {what} while the wearer walks, as by a sensor drop-out; cut the file there and "
+                        "give the longer part",
                     )
     return strides
 
@@ -151,6 +150,6 @@ def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: StrideSel
         odd = [stride for stride, is_it in zip(curve.strides, is_odd.tolist(), strict=True) if is_it]
         if len(odd) <= _MOST_ODD * len(curve.strides):
             strides = strides.without(
-                [stride for stride in odd if stride in strides.taken], f"{name} differs from all others"
+                [stride for stride in odd if stride in strides.taken], f"{name} differs from all other strides"
             )
     return strides

@@ -12,7 +12,7 @@ from ppafo.signals.recording import Floats
 from ppafo.wording import argument_text
 
 STRIKE, OFF = "foot strike", "foot off"
-"""Kinds of events: heel strike and toe-off."""
+"""Kinds of events in a file: heel strike and toe-off."""
 
 AXES = "xyz"
 _COORDINATES = (".x", ".y", ".z")
@@ -29,7 +29,7 @@ Events = dict[tuple[str, str], list[float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrialData:
-    """Data of a file besides its columns: subject (mass [kg], stature [m]; None if not stated) and events.
+    """Data of a recorded file besides its columns: subject (mass [kg], stature [m]; None if not stated) and events.
 
     ``events`` holds times [s] by side and kind. ``remarks`` state how the events were read, or the reason that they
     were not.
@@ -43,7 +43,7 @@ class TrialData:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionTable:
-    """Columns over time [s] as stored in a file; a unit is empty if the file does not state it.
+    """Motion recording: columns over time [s] as stored in a file; a unit that the file does not state is empty.
 
     ``form`` is the name of the file format, set by the caller of the reader. ``kind`` is ``measured`` or ``synthetic``.
     ``remarks`` describe repairs, ``trial`` holds data on subject and events.
@@ -60,7 +60,7 @@ class MotionTable:
 
 
 _LARGEST_JUMP = 3.0
-"""Interval, in median intervals, above which it is a gap and not jitter of the clock."""
+"""Sampling interval, relative to the median interval, above which it counts as a gap [-]."""
 
 
 def cut_table(
@@ -128,7 +128,7 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
             "not recorded": ~recorded,
             # A marker that is 0 throughout stands at the origin.
             "all coordinates 0": zero & bool((recorded & ~zero).any()),
-            "still at its last place": _held(at, MOST_ACCELERATION * interval**2),
+            "position unchanged": _held(at, MOST_ACCELERATION * interval**2),
         }
         lost = {cause: frames for cause, frames in causes.items() if frames.any()}
         if not lost:
@@ -160,7 +160,7 @@ LONGEST_FILLED = 0.25
 def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> MotionTable:
     """Return the table with gaps of up to ``longest`` [s] in these columns filled by a cubic spline.
 
-    Gaps at the ends and longer gaps remain; the user of the column rejects them.
+    Gaps at the ends and longer gaps remain NaN.
     """
     from scipy.interpolate import CubicSpline
 

@@ -36,9 +36,9 @@ _LEAST_FLAT = 0.1
 _SHORTEST_WALK = 1.0
 """Duration [s] below which a record may contain a part of a stride only, with little rotation of the shank."""
 _LEAST_UPRIGHT = 0.5
-"""Least vertical component of the mean shank relative to its length [-]."""
+"""Least vertical component of the mean line from knee to ankle, relative to its length [-]."""
 _RIGHT_ANGLE = 0.5 * np.pi
-"""Angle of the ankle [rad] between a vertical shank and a flat foot."""
+"""Ankle angle [rad] with a vertical shank and a flat foot."""
 _UNITS = {
     "shank_angle": ("rad",),
     "ankle_angle": ("rad",),
@@ -46,12 +46,12 @@ _UNITS = {
     "vertical_force": ("", "N", "N/kg"),
     "centre_of_pressure": ("m",),
 }
-"""SI units of the curves in a map, the package's own unit first."""
+"""SI units of the curves in a gait map, with the package's own unit first."""
 _POSITIVE = ("ankle_in_front", "plantarflexion", "up", "forward")
-"""Positive directions in the package."""
+"""Directions in a gait map that are positive in this package too."""
 
 MappedCurve = ShankMap | AngleMap | MomentMap | ForceMap | PressureMap
-"""Entry of a gait map for one curve; the knee has two and is read apart."""
+"""Entry of a gait map for a single curve; the knee, with two curves, is separate."""
 
 
 def walk_signals(
@@ -62,7 +62,7 @@ def walk_signals(
     is_default: bool,
     wrong: list[PpafoError],
 ) -> dict[str, Signal]:
-    """Return the signals that a map finds in tables; all problems with their columns are added to ``wrong``.
+    """Return the signals of a recorded walk by curve; problems with their columns are added to ``wrong``.
 
     Loads are divided by ``body_mass`` [kg] or by the body weight; ``stature`` [m] gives the length of the thigh.
 
@@ -172,12 +172,12 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
         return
     low, high = SHANK_RANGE
     travel = float(np.ptp(np.degrees(shank.values)))
-    range_text = f"covers a range of {travel:.2g} deg in the whole recording, walking at least {low:g} deg"
+    range_text = f"has a range of {travel:.2g} deg in the whole recording (walking: at least {low:g} deg)"
     message = f"{shank.file}: shank_angle {range_text}"
     if mapped.terms is not None:
         # Radians that are called degrees have no event either, but a unit as a remedy.
         if travel < low and not low <= np.degrees(travel) <= high:
-            raise DataError(f"{message}: the recording shows no walking, or the columns of the shank are wrong")
+            raise DataError(f"{message}: give a recording of walking, or check the columns of the shank")
         return
     ends = {
         axis: [columns.table.columns.get(f"{label}.{axis}") for label in (mapped.knee, mapped.ankle)] for axis in "xyz"
@@ -189,7 +189,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
     if abs(means[mapped.vertical]) < _LEAST_UPRIGHT * length:
         raise DataError(
             f"{shank.file}: shank_angle.vertical = {mapped.vertical!r}, but the line from {mapped.knee!r} to "
-            f"{mapped.ankle!r} is longest along {longest!r}; give {longest!r} in a gait map, also for the ankle"
+            f"{mapped.ankle!r} is longest along {longest!r}; give {longest!r} in a gait map, also for ankle_angle"
         )
     if travel >= low:
         return
@@ -199,7 +199,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
         leans = float(np.nanmax(lean) - np.nanmin(lean))
     if leans >= low:
         raise DataError(
-            f"{message}, but {leans:.2g} deg along {across}, and shank_angle.forward is {mapped.forward!r}; give "
-            f"{across!r} or '-{across}', the walking direction, in a gait map, also for the ankle"
+            f"{message}, but of {leans:.2g} deg along {across}; change shank_angle.forward = {mapped.forward!r} to the "
+            f"walking direction, {across!r} or '-{across}', in a gait map, also for ankle_angle"
         )
-    raise DataError(f"{message}: the recording shows no walking; give a recording of walking")
+    raise DataError(f"{message}: give a recording of walking")

@@ -1,4 +1,4 @@
-"""Checks of recordings for the needs of a bench procedure; every message names the file and a remedy."""
+"""Checks that recordings suit a bench procedure; messages name the file and a remedy."""
 
 from collections.abc import Iterable
 
@@ -13,11 +13,11 @@ from ppafo.signals.recording import Floats
 from ppafo.wording import nearest_name
 
 _SHARE_THAT_IS_CLIPPED = 0.05
-"""Fraction of samples at one extreme value [-] from which a sensor counts as saturated."""
+"""Fraction of samples at an extreme value [-] from which a sensor counts as saturated."""
 _FEWEST_CLIPPED = 4
 """Least number of equal samples for saturation."""
 _FRACTION_THAT_MOVES = 0.02
-"""Least change of the driving quantity, relative to its largest value [-], for a constant channel to be saturated."""
+"""Least relative change of the driving quantity [-] for which a constant channel counts as saturated."""
 _LARGEST_NUMBER = 1.0e12
 """Largest plausible magnitude of a measured value, in any SI unit."""
 
@@ -30,7 +30,7 @@ def check_sources(
     moving: Iterable[str] = (),
     absolute: Iterable[str] = (),
 ) -> None:
-    """Raise IdentificationError for recordings that lack a channel or have too few samples for a procedure.
+    """Raise IdentificationError for recordings with a missing channel or too few samples.
 
     A ``moving`` channel must change, and an ``absolute`` pressure must be positive. The message names the recording.
     """
@@ -107,7 +107,7 @@ def check_not_clipped(
 
 
 def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> int:
-    """Return the number of samples before a part of a recording. Raises IdentificationError for a part with a gap.
+    """Return the number of samples before ``part`` of a recording. Raises IdentificationError for a gap in the part.
 
     The message gives the time of the gap.
     """

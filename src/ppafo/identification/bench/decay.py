@@ -1,4 +1,4 @@
-"""Free-decay part of a recording: from the end of the push to standstill, the first reversal, or the end."""
+"""Free-decay interval of a recording: from the end of the push to standstill, the first reversal, or the end."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from ppafo.signals.recording import Floats
 PROCEDURE = "free-decay"
 ANGLE = "angle"
 VELOCITY = "angular_velocity"
-"""Channel fitted together with the angle if it was recorded."""
+"""Channel fitted together with the angle, if recorded."""
 MINIMUM_SAMPLES = 20
 """Least number of samples of a decay."""
 FEWEST_SMOOTHED = 5
@@ -21,9 +21,9 @@ FEWEST_SMOOTHED = 5
 _SMOOTHED_FRACTION = 0.04
 """Fraction of the samples of a decay to which a local parabola is fitted [-]."""
 _REVERSAL = 0.02
-"""Velocity against the push, divided by the largest, from which the vane swings back [-]; noise at rest stays below."""
+"""Backward velocity relative to the largest velocity [-] that counts as a reversal; noise at rest stays below."""
 _VELOCITY_MAY_DIFFER = 0.1
-"""Largest relative difference between velocity and rate of the angle [-]; a wrong unit or sign differs by more."""
+"""Largest relative difference of velocity and rate of the angle [-]; a wrong unit or sign differs by more."""
 _MINIMUM_OVER_NOISE = 20.0
 """Least range of the angle divided by its noise [-] for motion to be detected."""
 
@@ -38,7 +38,7 @@ class FreeDecay(NamedTuple):
 
 
 def decay_of(source: RecordingSource, start: float | None, end: float | None) -> FreeDecay:
-    """Return the decay in a recording between two times [s]; without ``start``, the decay starts at the largest speed.
+    """Return the decay between two times [s] of a recording; by default it starts at the largest speed.
 
     Raises IdentificationError, with file, sample and remedy, if there are too few samples, if nothing moves, or if the
     sensor is saturated or contradicts the velocity.
@@ -110,5 +110,5 @@ def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
 
 
 def smoothing_width(count: int) -> int:
-    """Return the odd number of samples of a smoothing window, given the number of samples of a decay."""
+    """Return the length of the smoothing window, an odd number of samples, for a decay of ``count`` samples."""
     return max(FEWEST_SMOOTHED, int(_SMOOTHED_FRACTION * count)) | 1

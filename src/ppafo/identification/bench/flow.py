@@ -29,19 +29,19 @@ from ppafo.signals.recording import Floats
 Law = Literal["orifice", "iso6358", "laminar", "both"]
 
 LINEAR_RATIO = 0.99999
-"""Pressure ratio [-] above which the flow falls linearly to zero: about 1 Pa at the atmosphere, below bench resolution.
+"""Pressure ratio [-] above which the flow falls linearly to zero; at the atmosphere a difference of about 1 Pa.
 
 The parameter ``flow.linear_ratio`` of a set belongs to the numerics of the engine, not to a measured opening.
 """
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
-"""Critical ratio of ISO 6358 [-] if it is estimated: start, lowest and highest value."""
+"""Critical ratio of ISO 6358 [-] in an estimation: start, lowest and highest value."""
 NEXT_LAW: Mapping[Law, str] = {
     "orifice": "try law = 'both', or for a valve 'iso6358'",
     "laminar": "try law = 'both'",
     "iso6358": "try law = 'both'",
     "both": "no orifice, laminar gap or combination of both explains the readings",
 }
-"""Remedy, by law, if the readings do not fit one opening; the law ``both`` contains each of its parts."""
+"""Remedy by flow law, for readings that the law does not fit; the law ``both`` contains each of its parts."""
 
 TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
 ZERO = "zero of the flow meter"
@@ -97,7 +97,7 @@ def flow_tolerances(
 
 
 def read_flow(at: Values, gas: GasAt, flow: Floats) -> Floats:
-    """Return the reading of the flow meter [kg/s] for a flow at the nominal gas state [kg/s]."""
+    """Return the flow meter reading [kg/s] for a flow at the nominal gas state [kg/s], with the errors ``at``."""
     # Flow through an opening goes with one over the root of the temperature.
     warm = np.sqrt(gas.temperature / (gas.temperature + at[TEMPERATURE]))
     return np.asarray((1.0 + at[GAS_LAW]) * (1.0 + at[METER]) * warm * flow + at[ZERO])
@@ -140,10 +140,10 @@ def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> 
 
 
 class OpeningSizes(NamedTuple):
-    """Unknowns of an opening.
+    """Sizes of an opening, the unknowns of a flow fit.
 
     ``size`` is Cd [-], A [m^2] or Cd A [m^2] of an orifice, C [m^3/(s Pa)] of ISO 6358, or c [kg/(s Pa^2)] of a laminar
-    gap. ``critical_ratio`` is b [-]; ``beside`` is c of a parallel laminar gap.
+    gap. ``critical_ratio`` is b [-]; ``beside`` is c of a parallel laminar gap [kg/(s Pa^2)].
     """
 
     size: float
@@ -153,7 +153,7 @@ class OpeningSizes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """Flow through an opening: gas, law, and known quantities.
+    """Flow law of an opening: gas, law, and known quantities.
 
     For an orifice, ``known`` is the area [m^2] or discharge coefficient [-] that multiplies the unknown size; ISO 6358
     does not use it. A ``critical_ratio`` [-] of None is estimated. The law ``both`` is a laminar gap in parallel with
@@ -179,7 +179,7 @@ class Opening:
         return through + sizes.beside * laminar if self.law == "both" else through
 
     def rough_sizes(self, first: Floats, second: Floats, flow: Floats) -> tuple[OpeningSizes, OpeningSizes]:
-        """Return non-negative least-squares sizes for a flow [kg/s], and the size of each part for all of the flow.
+        """Return start sizes by non-negative least squares, and the sizes if each part alone carried the whole flow.
 
         The flow is linear in the sizes; the nonlinear critical ratio is set to its usual value.
         """
@@ -193,18 +193,18 @@ class Opening:
 
 
 class Paths(NamedTuple):
-    """Names of the estimated quantities of an opening; an empty name means that the quantity is not estimated."""
+    """Names of the fit variables of an opening; an empty name for a quantity that is not estimated."""
 
     size: str
     critical_ratio: str = ""
     beside: str = ""
 
     def sizes(self, at: Values) -> OpeningSizes:
-        """Return the sizes of the opening from the values of a law."""
+        """Return the sizes of the opening, given the values of the fit variables."""
         return OpeningSizes(at[self.size], at[self.critical_ratio], at[self.beside])
 
     def sought(self, start: OpeningSizes, alone: OpeningSizes) -> tuple[FitVariable, ...]:
-        """Return the unknowns with start values; parallel parts are scaled as if each carried the whole flow."""
+        """Return the unknowns with start values; parallel parts are scaled as if each carried all of the flow."""
         scale = alone.size if self.beside else 0.0
         return (
             sought(self.size, start.size, 0.0, scale=scale),
@@ -221,7 +221,7 @@ def solve_flow(
     tolerances: Tolerances,
     confidence: float,
 ) -> tuple[Fit, Floats]:
-    """Return the fit of an opening to measured flow, and the fitted flow [kg/s]; see ``law.solve``.
+    """Fit an opening to measured flow. Returns the fit and the fitted flow [kg/s].
 
     ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second.
     """

@@ -49,7 +49,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _STEPS = 240
 """Number of steps of the speed from the start to standstill."""
 _SLOWEST = 1.0e-9
-"""Lower bound of the deceleration as a fraction of the largest [-]: without Coulomb friction there is no standstill."""
+"""Lower bound of the deceleration, relative to the largest [-], so that the vane stops without Coulomb friction too."""
 
 
 class Slowing(NamedTuple):
@@ -74,7 +74,7 @@ class Slowing(NamedTuple):
 
 
 class _DecayCurve(NamedTuple):
-    """Times [s], swept angle [rad] and speed [rad/s] from the start to standstill."""
+    """Time [s], swept angle [rad] and speed [rad/s] of a decay to standstill."""
 
     time: Floats
     swept: Floats
@@ -109,13 +109,13 @@ def course(times: Floats, speed: float, slowing: Slowing) -> _DecayCurve:
 _RISE, _RISE_VELOCITY, _INERTIA, _GAIN = "rise of the friction near standstill", "its velocity", "inertia", "gain"
 """Names of the tolerances: log of 1 + q [-], w_s [rad/s], relative errors of the inertia and of the angle [-]."""
 _START_ANGLE, _START_SPEED = "start angle {}", "start speed {}"
-"""Names of the initial angle [rad] and speed [rad/s] of each decay, by its number."""
+"""Names of the variables for initial angle [rad] and speed [rad/s], by number of the decay."""
 _USUAL_RISE_VELOCITY, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY = 0.1, 1.0e-3, 2.0
-"""Velocity at which half of the friction rise is left [rad/s]: usual, lowest and highest value."""
+"""Velocity at which the friction rise is halved [rad/s]: usual, lowest and highest value."""
 _LEAST_SPEED, _LEAST_SWEPT = 1.0e-6, 1.0e-9
-"""Least initial speed [rad/s] and swept angle [rad] of a fit if no motion is seen."""
+"""Least initial speed [rad/s] and swept angle [rad] for a fit without visible motion."""
 _MOVING = 0.03
-"""Fraction of the largest speed [-] below which the damping panel omits the acceleration, which is noise there."""
+"""Fraction of the largest speed [-] below which the damping panel omits the noisy acceleration."""
 
 
 def free_decay(
@@ -128,14 +128,25 @@ def free_decay(
     confidence: float = 0.95,
     tolerances: Tolerances = DEFAULTS,
 ) -> BenchResult:
-    """Return viscous damping [N m s/rad] and dynamic friction [N m], or both divided by inertia [1/s, rad/s^2].
+    """Identify viscous damping [N m s/rad] and dynamic friction [N m], or both over inertia [1/s, rad/s^2].
 
-    The model is equation (1). Angle and, if recorded, angular velocity are fitted. Several recordings are several
-    impulses to the same device, with common parameters and separate initial states. The vane turns freely from
-    ``start`` to ``end`` [s]; without ``start`` the decay starts at the largest speed. ``inertia_deviation`` is the
-    standard deviation of ``inertia`` [kg m^2]; without an inertia only ratios to it are estimated. ``rise`` is the
-    ratio of friction at rest to dynamic friction, minus 1 [-], by which seals may grip near standstill. Raises
-    IdentificationError, with file, sample and remedy, for recordings from which neither can be estimated.
+    The model is equation (1), fitted to angle and, if recorded, angular velocity. Several recordings are several
+    impulses to the same device, with common parameters and separate initial states.
+
+    Arguments:
+        sources: recordings of the angle
+        start, end: interval in which the vane turns freely [s]; default start: the largest speed
+        inertia: inertia about the joint [kg m^2]; None to estimate only ratios to the inertia
+        inertia_deviation: standard deviation of the inertia [kg m^2]
+        rise: largest friction near standstill over dynamic friction, minus 1 [-]
+        confidence: confidence level of the intervals [-]
+        tolerances: limits of the errors of the bench
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that determine neither parameter; names file, sample and remedy
     """
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
     sources, remarks = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)
@@ -219,7 +230,7 @@ _OVER_INERTIA = (
 
 
 def _readings(sources: tuple[RecordingSource, ...], decays: tuple[FreeDecay, ...]) -> PooledReadings:
-    """Return the samples of all decays in the order of the law, labelled by sensor and by half of the swept angle."""
+    """Return the samples of all decays, labelled by sensor and by half of the swept angle."""
     series, sensors, halves = list[Floats](), list[str](), list[str]()
     for decay in decays:
         moved = np.abs(decay.angle - decay.angle[0])

@@ -1,4 +1,4 @@
-"""Fit of a bench law with the common estimator, and uncertain quantities of the bench as variables with priors."""
+"""Fit of bench laws by the common estimator, and tolerances of the bench as variables with priors."""
 
 import math
 from collections import defaultdict
@@ -16,7 +16,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 
 Values = Mapping[str, float]
-"""Values of the variables of a law by name, in SI units; a missing name means 0."""
+"""Values of the fit variables by name [SI]; a missing name means 0."""
 
 _MEMORY = 2
 """Highest order of the noise autoregression: enough for sensor lag, drift or hum, too low to absorb model error."""
@@ -39,7 +39,7 @@ def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "")
 
 
 def within(name: str, limit: float, family: str = "") -> tuple[FitVariable, ...]:
-    """Return an error of the bench, known to lie within +-``limit`` [SI]; see ``tolerance``."""
+    """Return an error of the bench within +-``limit`` [SI], as a variable with a prior; nothing if exact."""
     return tolerance(name, deviation_of_limit(limit), family=family)
 
 
@@ -53,8 +53,8 @@ class PooledReadings:
     """Readings of all recordings, with labels for each reading.
 
     ``measured`` are the values [unit of the channel], ``sensors`` name the sensor (one noise each), ``recordings`` the
-    recording or repetition, and ``groups`` further groups. The estimates of each sensor, recording and group are tested
-    against the common ones.
+    recording or repetition, and ``groups`` other groups. The separate estimates of each sensor, recording and group are
+    tested against the common estimates.
     """
 
     measured: Floats
@@ -64,7 +64,7 @@ class PooledReadings:
 
 
 def recordings_of(sources: tuple[RecordingSource, ...], counts: Iterable[int] = ()) -> list[str]:
-    """Return the recording label with file name of each reading; ``counts`` are the readings of each recording."""
+    """Return for each reading the label of its recording, with the file name; ``counts`` are readings by recording."""
     sizes = tuple(counts) or [len(source.recording) for source in sources]
     pairs = enumerate(zip(sources, sizes, strict=True), start=1)
     return [label for number, (source, size) in pairs for label in [f"recording {number} ({source.name})"] * size]
@@ -73,7 +73,7 @@ def recordings_of(sources: tuple[RecordingSource, ...], counts: Iterable[int] = 
 def solve(
     law: Callable[[Values], Floats], readings: PooledReadings, numbers: Sequence[FitVariable], confidence: float
 ) -> tuple[Fit, Floats]:
-    """Return the fit of a law to readings, and the fitted values at the readings, in the unit of the readings."""
+    """Fit a law to readings. Returns the fit, and the fitted values in the unit of the readings."""
     names, measured = [number.name for number in numbers], readings.measured
     keys = list(zip(readings.recordings, readings.sensors, *readings.groups, strict=True))
     # In the order of their first reading, so that the first block is the first recording.

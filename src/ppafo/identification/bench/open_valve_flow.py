@@ -28,11 +28,11 @@ from ppafo.signals.recording import Floats
 PROCEDURE = "open-valve-flow"
 CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
 MINIMUM_SAMPLES = 5
-"""Least number of readings at the open valve that separates the unknowns."""
+"""Least number of readings at the open valve to separate the unknowns."""
 _FULLY_OPEN = 0.99
 """Magnitude of the command [-] from which a valve is fully open."""
 _FEW = 10
-"""Reciprocal of the fraction of readings up to which readings without flow or with crossed pressures are noise."""
+"""Reciprocal of the largest fraction of readings without flow or with crossed pressures that counts as noise."""
 _NEARLY_EQUAL = 0.9
 """Pressure ratio [-] above which the pressures are nearly equal."""
 _REGIMES = "choked flow", "subsonic flow", "flow at nearly equal pressures"
@@ -42,7 +42,7 @@ _SPAN, _SUBSONIC = 0.15, 0.6
 _LARGEST_COEFFICIENT = 1.0
 """Largest possible discharge coefficient [-]: the flow of a loss-free nozzle."""
 _GRAMS_PER_BAR = 1.0e8
-"""Flow over pressure in g/s per bar, for one in kg/(s Pa)."""
+"""Conversion factor from kg/(s Pa) to g/s per bar."""
 _GAP = ReportedNumber("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
 
 
@@ -56,12 +56,25 @@ def open_valve_flow(
     confidence: float = 0.95,
     tolerances: Tolerances = DEFAULTS,
 ) -> BenchResult:
-    """Return the estimated Cd [-] or Cd A [m^2], C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)] of the open valve.
+    """Identify Cd [-] or Cd A [m^2], C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)] of the open valve.
 
-    The laws are equations (6) and (7), ISO 6358, and a laminar gap. With an ``area`` [m^2] the orifice law gives Cd,
-    without one the product Cd A. The law ``both`` gives Cd, Cd A or, with a ``critical_ratio`` [-], C, together with c
-    of a parallel laminar gap. ``path`` is the path of the valve in a set (``valves.main``). Raises IdentificationError,
-    with file, sample and remedy, for recordings from which the flow law cannot be estimated.
+    The laws are equations (6) and (7), ISO 6358, and a laminar gap.
+
+    Arguments:
+        sources: recordings of mass flow, upstream and downstream pressure
+        gas: gas of the bench
+        law: flow law; ``both`` adds a laminar gap, c, to Cd, Cd A or, with ``critical_ratio``, C
+        area: area of the opening [m^2], with which the orifice law gives Cd; None for the product Cd A
+        path: path of the valve in a set, ``valves.main``
+        critical_ratio: b of ISO 6358 [-] for the law ``both``
+        confidence: confidence level of the intervals [-]
+        tolerances: limits of the errors of the bench
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that do not determine the flow law; names file, sample and remedy
     """
     readings = _open_readings(sources, gas, tolerances)
     upstream, flow, ratio = readings.upstream, readings.flow, readings.downstream / readings.upstream
@@ -112,7 +125,7 @@ def open_valve_flow(
 
 
 class _OpenReadings(NamedTuple):
-    """Readings of the open valve: pressures [Pa absolute], flow [kg/s], recording labels, remarks on others."""
+    """Readings at the open valve: absolute pressures [Pa], flow [kg/s], recording labels, remarks on omissions."""
 
     upstream: Floats
     downstream: Floats
@@ -122,7 +135,7 @@ class _OpenReadings(NamedTuple):
 
 
 def _open_readings(sources: tuple[RecordingSource, ...], gas: GasAt, tolerances: Tolerances) -> _OpenReadings:
-    """Return the readings with the valve fully open and a possible flow.
+    """Return the plausible readings at the fully open valve.
 
     Raises IdentificationError for exchanged pressures and a valve that is never open.
     """
@@ -174,7 +187,7 @@ def _open_readings(sources: tuple[RecordingSource, ...], gas: GasAt, tolerances:
 def _reported(
     opening: Opening, area: float | None, path: str, readings: _OpenReadings
 ) -> tuple[list[ReportedNumber], Paths]:
-    """Return the quantities to report, the size of the opening first, and their names in the fit."""
+    """Return the quantities to report, starting with the size of the opening, and their names in the fit."""
     size = _size(opening, area, path)
     if opening.law == "iso6358":
         ratio = ReportedNumber(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358")

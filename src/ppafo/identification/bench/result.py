@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class BenchResult:
-    """Result of one procedure.
+    """Result of a bench procedure.
 
-    ``kind`` is the kind of its recordings; figures state it if the recordings were not measured. ``conflict`` is a
-    sentence on readings whose own estimates differ from the common ones, empty if all agree.
+    ``kind``: origin of the recordings, which figures state unless measured. ``conflict``: sentence on readings whose
+    separate estimates differ from the common estimates, empty if all agree.
     """
 
     procedure: str
@@ -57,7 +57,7 @@ class ReportedNumber:
 
 
 _AT_BOUND = 1.0e-6
-"""Distance from a bound, as a fraction of the scale [-], up to which an estimate counts as at its bound."""
+"""Relative distance from a bound [-] up to which an estimate counts as at its bound."""
 
 
 def result_of(
@@ -112,18 +112,18 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
 
 
 _SIZE = (3.1, 2.7)
-"""Width and height of a panel [in]; two panels side by side fit a journal column."""
+"""Width and height of a panel [in] for two panels side by side in a journal column."""
 
 
 def bench_figure(panels: Sequence[Panel], kind: RecordingKind) -> "Figure":
-    """Return a figure with the two panels of a procedure side by side, lettered A and B."""
+    """Draw the two panels of a procedure side by side, lettered A and B."""
     pairs = zip("AB", panels, strict=True)
     lettered = [replace(panel, title=f"$\\bf{{{letter}}}$   {panel.title}") for letter, panel in pairs]
     return draw_panels(lettered, 2, _SIZE, kind=kind)
 
 
 def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
-    """Return figure 3 of the paper, static torque and damping, from a static torque and a free decay result.
+    """Draw figure 3 of the paper, static torque and damping, from results of static torque and free decay.
 
     The title of each panel states if its recordings are synthetic or simulated.
     """

@@ -31,10 +31,10 @@ from ppafo.signals.recording import Floats
 from ppafo.wording import count_of
 
 _ZERO = "static_torque.zero_offset"
-"""Path of the zero of the scale, which no set has."""
+"""Path of the zero error of the scale, which is no parameter of a set."""
 _GAIN, _SENSOR_ZERO = "gain of the pressure sensor", "zero of the pressure sensor"
 _SIGMAS = 4.0
-"""Standard errors by which a first guess of the friction must be negative to be a wrong sign rather than noise."""
+"""Standard errors below zero from which a negative friction guess means a wrong sign instead of noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class _Unknowns:
 
 
 def _unknowns_of(readings: TorqueReadings) -> _Unknowns:
-    """Return the unknowns of a torque or force; the friction of an actuator that slid is the kinetic one."""
+    """Return the unknowns for a torque or a force; an actuator that slides has kinetic friction."""
     key, friction = ("dynamic", "friction in motion") if readings.slides else ("static", "static friction")
     if readings.channel == FORCE:
         return _Unknowns(
@@ -80,12 +80,22 @@ def _unknowns_of(readings: TorqueReadings) -> _Unknowns:
 def static_torque(
     sources: tuple[RecordingSource, ...], confidence: float = 0.95, tolerances: Tolerances = DEFAULTS
 ) -> BenchResult:
-    """Return torque constant [m^3], friction without pressure [N m], its growth [m^3] and zero of the scale [N m].
+    """Identify torque constant [m^3], friction without pressure [N m], its growth [m^3], and scale zero [N m].
 
     The model is equation (2). The friction is static, or kinetic if the actuator slid. For a force the units are m^2
     and N. Readings with direction 0 belong to no branch and are left out. So is a flat start of the rising branch,
-    where a scale that only pulls shows nothing until friction is overcome. Raises IdentificationError, with file,
-    sample and remedy, for recordings that cannot separate the unknowns.
+    where a scale that only pulls shows nothing until friction is overcome.
+
+    Arguments:
+        sources: recordings of pressure difference, direction, and torque or force
+        confidence: confidence level of the intervals [-]
+        tolerances: limits of the errors of the bench
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that cannot separate the unknowns; names file, sample and remedy
     """
     readings = torque_readings(sources, tolerances.zero_of_pressure)
     unknowns, channel = _unknowns_of(readings), readings.channel
@@ -138,9 +148,7 @@ def static_torque(
                 f"{unknowns.slope.capitalize()}, the common slope of both branches",
             ),
             ReportedNumber(
-                unknowns.friction_path,
-                unknowns.unit,
-                f"{unknowns.friction.capitalize()} without a pressure difference",
+                unknowns.friction_path, unknowns.unit, f"{unknowns.friction.capitalize()} without a pressure difference"
             ),
             ReportedNumber(
                 unknowns.growth_path,
@@ -167,7 +175,7 @@ def static_torque(
 
 
 def _with_possible_friction(result: BenchResult, unknowns: _Unknowns) -> BenchResult:
-    """Return the result, valid for this model only if its friction, or the growth, lies below zero with certainty."""
+    """Limit the result to this model if friction or its growth with pressure is certainly negative."""
     if result.conflict:
         return result
     if result[unknowns.friction_path].high < 0.0:
@@ -185,7 +193,7 @@ def _with_possible_friction(result: BenchResult, unknowns: _Unknowns) -> BenchRe
 
 
 def _straight_line(readings: TorqueReadings, files: str) -> tuple[float, float, float, float]:
-    """Return first guesses from a linear fit of both branches: slope, zero, friction, and scale of the friction.
+    """Return start values from a linear fit of both branches: slope, zero, friction, and scale of the friction.
 
     The slope is in units of load per Pa, the others in units of load; the scale is at least the scatter. Raises
     IdentificationError, with ``files`` first, if a sign is impossible.
@@ -211,7 +219,7 @@ def _straight_line(readings: TorqueReadings, files: str) -> tuple[float, float, 
 
 
 def _of_files(at: Values, names: list[str], files: NDArray[np.int64]) -> Floats:
-    """Return the tolerance of each reading: the value of its file, or the common value; 0 if there is none."""
+    """Return the tolerance of each reading: value of its file, or common value; 0 without tolerance."""
     values = np.array([at[name] for name in names] or [0.0])
     return np.asarray(values[files] if len(names) > 1 else values)
 

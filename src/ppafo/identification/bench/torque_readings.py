@@ -1,4 +1,4 @@
-"""Readings of static torque over pressure: checked samples of the scale, averaged at each pressure of a stroke."""
+"""Readings of static torque over pressure: samples of the scale, averaged at each pressure of a stroke."""
 
 from dataclasses import dataclass
 
@@ -17,25 +17,25 @@ from ppafo.units import percentage
 PROCEDURE = "static-torque"
 TORQUE, FORCE = "torque", "force"
 _MOVING = ("position", "angle")
-"""Channels that show whether the actuator slid."""
+"""Channels by which sliding of the actuator is detected."""
 _MINIMUM_SAMPLES = 6
-"""Least number of readings that separates slope, friction, growth of the friction, and zero."""
+"""Least number of readings to separate slope, friction, growth of the friction, and zero."""
 _MINIMUM_LEVELS = 3
-"""Least number of different pressures that shows whether the torque is linear in pressure."""
+"""Least number of different pressures to test whether the torque is linear in pressure."""
 _SAME_LEVEL = 0.1
-"""Fraction of the highest pressure [-] within which pressures are one level: jitter of a regulator is no second one."""
+"""Largest pressure difference within a level, relative to the highest pressure [-]; a regulator jitters."""
 _MORE_THAN_FRICTION = 0.3
-"""Fraction of its range [-] by which the torque may change at one pressure when friction reverses."""
+"""Largest jump of the torque at one pressure when friction reverses, as a fraction of its range [-]."""
 _BINS = 20
 """Number of bins over the pressure range; readings within one bin have the same pressure level."""
 _FLAT = 0.002
 """Fraction of the torque range [-] within which readings belong to the flat start of a scale that only pulls."""
 _MOVES_WITH_DIRECTION = 0.5
-"""Least change of a channel per sweep, as a fraction of its range [-], for the direction to refer to the channel."""
+"""Least change of a channel per sweep, as a fraction of its range [-], for motion with the direction."""
 _MOST_REPETITIONS = 12
-"""Largest number of repetitions that are tested one by one; with more, whole recordings are tested."""
+"""Largest number of repetitions tested separately; with more, whole recordings are tested."""
 _TINY = 1.0e-300
-"""Range [unit of the channel] in place of 0, to divide by."""
+"""Smallest range [unit of the channel] for a division, in place of 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class TorqueReadings:
 
 
 def torque_readings(sources: tuple[RecordingSource, ...], zero_of_pressure: float) -> TorqueReadings:
-    """Return the readings of all recordings; ``zero_of_pressure`` [Pa] is the limit of the zero of the pressure sensor.
+    """Return the readings of all recordings; ``zero_of_pressure`` [Pa] is the zero error limit of the pressure sensor.
 
     Raises IdentificationError if they cannot separate slope from friction.
     """
@@ -158,7 +158,7 @@ def _check_separable(
 
 
 def _reading_indices(pressure: Floats, labels: Floats) -> NDArray[np.int64]:
-    """Return the reading index of each sample; consecutive samples of one branch at one pressure are one reading.
+    """Return the reading index of each sample; consecutive samples of a branch at the same pressure are one reading.
 
     ``labels`` (labels, samples) are branch and repetition. Friction varies with position within a stroke, so that these
     samples are not independent readings of the law.
@@ -174,7 +174,7 @@ def _reading_indices(pressure: Floats, labels: Floats) -> NDArray[np.int64]:
 
 
 def _slides(sources: tuple[RecordingSource, ...]) -> bool:
-    """Return whether a position or an angle moves with the direction while the pressure does not."""
+    """Return whether a position or an angle moves with the direction at constant pressure."""
     range_of_pressure = float(np.ptp(pool(sources, "pressure_difference")))
     pressures = [_change_per_sweep(item, "pressure_difference") / max(range_of_pressure, _TINY) for item in sources]
     motions = [
@@ -187,7 +187,7 @@ def _slides(sources: tuple[RecordingSource, ...]) -> bool:
 
 
 def _change_per_sweep(source: RecordingSource, name: str) -> float:
-    """Return the mean magnitude of the change of a channel per sweep in one direction [unit of the channel]."""
+    """Return the mean change of a channel per sweep in one direction, as magnitude [unit of the channel]."""
     direction = source.recording["direction"]
     is_inside = (direction[1:] == direction[:-1]) & (direction[1:] != 0.0)
     sweeps = 1 + int(np.count_nonzero(np.diff(direction[direction != 0.0])))

@@ -33,15 +33,15 @@ PROCEDURE = "valve-map"
 CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
 PRESSURES = ("upstream_pressure", "downstream_pressure")
 MINIMUM_SAMPLES = 12
-"""Least number of readings that separates the unknowns of a map."""
+"""Least number of readings to separate the unknowns of a map."""
 _MINIMUM_RANGE = 0.5
-"""Least range of the command [-] that separates dead band and gain."""
+"""Least range of the command [-] to separate dead band and gain."""
 _SHUT, _HALF_OPEN = 0.05, 0.5
-"""Fraction of the largest area [-] below which the valve is shut, and fraction above which it is at least half open."""
+"""Fractions of the largest area [-]: below the first the valve is shut, above the second at least half open."""
 _SATURATES = 0.02
-"""Least distance from the highest command [-] for the saturation to be identified."""
+"""Least distance of the saturation from the highest command [-] to be identified."""
 _CLEAR_COMMAND = 0.1
-"""Magnitude of a command [-] from which its direction, to chamber 1 or 2, is clear."""
+"""Least magnitude of a command with a clear direction [-]."""
 _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve_map.saturation_command"
@@ -80,10 +80,20 @@ def valve_map(
     confidence: float = 0.95,
     tolerances: Tolerances = DEFAULTS,
 ) -> BenchResult:
-    """Return dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; equations (6), (7).
+    """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).
 
-    ``path`` is the path of the valve in a set (``valves.main``). Raises IdentificationError, with file, sample and
-    remedy, for recordings from which the map cannot be estimated.
+    Arguments:
+        sources: recordings of command, mass flow, upstream and downstream pressure
+        gas: gas of the bench
+        path: path of the valve in a set, ``valves.main``
+        confidence: confidence level of the intervals [-]
+        tolerances: limits of the errors of the bench
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that do not determine the map; names file, sample and remedy
     """
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
     branches = []

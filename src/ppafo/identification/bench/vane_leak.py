@@ -52,14 +52,14 @@ CHANNELS = ("pressure_1", "pressure_2")
 STEADY = (*CHANNELS, "mass_flow")
 MINIMUM_SAMPLES, _FEWEST_STEADY = 20, 8
 EDGE = 20
-"""Largest number of samples averaged at either end for a first guess, at most a tenth of a record."""
+"""Largest number of samples averaged at an end of a record for a start value, at most a tenth of the record."""
 
 STANDS_STILL = 0.02
-"""Ratio of the pressure changes of both chambers [-] up to which the chamber with the smaller change is a room."""
+"""Largest ratio of the pressure changes of both chambers [-] at which the steadier chamber counts as a room."""
 _NEARLY_EQUAL = 0.01
 _RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
 _START, _RELAXED_BY = "start of {}, decay {}", "relaxation of {}, decay {}"
-"""Names of the initial pressure [Pa] and of the relative error just after filling [-], by channel and decay."""
+"""Names of the variables for initial pressure [Pa] and relative error after filling [-], by channel and decay."""
 _RELAXED, _MOST_RELAXED = 5.0, 0.02
 """Usual ratio of recording length to relaxation time [-], and largest relative pressure error from relaxation [-]."""
 _REMEDY = "{}, or give start and end; gas may leak elsewhere, or relax with its walls"
@@ -79,14 +79,27 @@ def vane_leak(
     tolerances: Tolerances = DEFAULTS,
     volume_deviation: float = deviation_of_limit(HELD["actuator.dead_volume_1"]),
 ) -> BenchResult:
-    """Return the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
+    """Identify the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
 
-    Recordings with a ``mass_flow`` are steady: the flow that maintains the pressure, at several pressures. For closed
-    chambers the samples from ``start`` to ``end`` [s] are used. Without the volume [m^3] of the emptying chamber, only
-    the area divided by the volume is estimated; ``volume_deviation`` is the relative standard deviation of a volume
-    [-]. A ``discharge_coefficient`` [-] turns the product Cd A into an area, a ``critical_ratio`` [-] selects the sonic
-    conductance, ``law`` "laminar" a laminar coefficient, and "both" a laminar gap in parallel with the law of the set.
-    Raises IdentificationError, with file, sample and remedy, for recordings from which the leak cannot be estimated.
+    Recordings with a ``mass_flow`` are steady: the flow that maintains the pressure, at several pressures.
+
+    Arguments:
+        sources: recordings of both chamber pressures
+        gas: gas of the bench
+        volume_1, volume_2: chamber volumes [m^3]; without the volume of the emptying chamber, area over volume is found
+        discharge_coefficient: Cd [-], with which an orifice gives an area; None for the product Cd A
+        start, end: samples used of closed chambers [s]
+        confidence: confidence level of the intervals [-]
+        critical_ratio: b of ISO 6358 [-], which selects the sonic conductance
+        law: ``laminar`` for a laminar coefficient, ``both`` for a laminar gap in parallel with the orifice
+        tolerances: limits of the errors of the bench
+        volume_deviation: relative standard deviation of a volume [-]
+
+    Returns:
+        the estimates with intervals and verdicts, a summary and two panels
+
+    Raises:
+        IdentificationError: recordings that do not determine the leak; names file, sample and remedy
     """
     form: Law = law if law != "orifice" or critical_ratio is None else "iso6358"
     opening = Opening(gas, form, discharge_coefficient or 1.0, critical_ratio)
@@ -123,7 +136,7 @@ def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumb
 
 
 class _ClosedChambers(NamedTuple):
-    """Decay of two closed chambers.
+    """Decay of the pressures in two closed chambers.
 
     ``time`` is in s; ``first`` and ``second`` are the pressures [Pa] of the fuller chamber and the other; ``fuller`` is
     the number of the fuller chamber, 1 or 2; ``number`` is the number of the decay.
@@ -137,12 +150,12 @@ class _ClosedChambers(NamedTuple):
 
     @property
     def edge(self) -> int:
-        """Number of samples averaged at either end."""
+        """Number of samples averaged at an end of the decay."""
         return max(1, min(EDGE, self.time.size // 10))
 
     @property
     def changes(self) -> tuple[float, float]:
-        """Fall of the first and rise of the second pressure [Pa]."""
+        """Fall of the pressure in the fuller chamber, and rise in the other chamber [Pa]."""
         edge = self.edge
         fall, rise = (
             float(np.mean(pressure[-edge:]) - np.mean(pressure[:edge])) for pressure in (self.first, self.second)
@@ -151,7 +164,7 @@ class _ClosedChambers(NamedTuple):
 
     @property
     def room(self) -> int | None:
-        """Index of the constant pressure, 0 for the first and 1 for the second; None if both change."""
+        """Index of the constant pressure, 0 for the fuller chamber and 1 for the other; None if both change."""
         fall, rise = (abs(change) for change in self.changes)
         if rise <= STANDS_STILL * fall:
             return 1
@@ -159,12 +172,12 @@ class _ClosedChambers(NamedTuple):
 
     @property
     def changing(self) -> int:
-        """Index of the pressure that determines the leak: the first, or the second if the first is constant."""
+        """Index of the changing pressure that determines the leak: 0 for the fuller chamber, 1 for the other."""
         return 1 if self.room == 0 else 0
 
     @property
     def sensors(self) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
-        """Channels of the fuller chamber and of the other, with their pressures [Pa]."""
+        """Channels of the fuller and the other chamber, with their pressures [Pa]."""
         return (f"pressure_{self.fuller}", self.first), (f"pressure_{3 - self.fuller}", self.second)
 
     @property
@@ -186,7 +199,7 @@ class _ClosedChambers(NamedTuple):
         return float(start), float(end)
 
     def numbers(self) -> Iterator[FitVariable]:
-        """Yield the unknowns: initial pressures (in a room, with a prior of its noise) and relaxation after filling."""
+        """Yield the unknowns: initial pressures, with a prior in a room, and relaxation after filling."""
         for side, (sensor, values) in enumerate(self.sensors):
             size = max(abs(self.changes[self.changing]), float(np.std(np.diff(values))), 1.0)
             initial = sought(_START.format(sensor, self.number), float(values[: self.edge].mean()), 1.0, scale=size)
@@ -197,13 +210,13 @@ class _ClosedChambers(NamedTuple):
             yield from within(_RELAXED_BY.format(sensor, self.number), _MOST_RELAXED)
 
     def halves(self) -> list[str]:
-        """Return for each sample the label of the early or late half of the fall of the pressure difference."""
+        """Return for each sample the label of the early or late half of the pressure fall."""
         half = int(np.argmax(self.first - self.second < 0.5 * sum(self.ends)))
         return ["the early fall"] * half + ["the late fall"] * (self.time.size - half)
 
 
 def closed_chambers(source: RecordingSource, start: float | None, end: float | None, number: int) -> _ClosedChambers:
-    """Return the chambers in the recording of a decay, from its start until the pressures are nearly equal.
+    """Return the pressure decay of closed chambers in a recording, until the pressures are nearly equal.
 
     Raises IdentificationError if too few samples are left.
     """
@@ -237,13 +250,13 @@ def closed_chambers(source: RecordingSource, start: float | None, end: float | N
 
 _POINTS = 400
 _LOWEST = 1.0e-3
-"""Pressure difference at the end of a computed fall, as a fraction of the difference at the start [-]."""
+"""Final pressure difference of a computed fall, relative to the initial difference [-]."""
 
 
 def pressures_of_fall(
     opening: Opening, sizes: OpeningSizes, first: float, second: float, ratio: float, rate: float, times: Floats
 ) -> tuple[Floats, Floats]:
-    """Return both pressures [Pa] at times [s] as their difference falls, without loss of gas to the outside.
+    """Return both pressures [Pa] at times [s] while gas leaks between closed chambers.
 
     ``sizes`` are the sizes of the opening, ``first`` and ``second`` the initial pressures [Pa]. ``ratio`` is V1/V2 [-]:
     0 if the second side is a room, infinite if the first is. ``rate`` is R T / V1 [Pa/kg], or R T / V2 if the first
@@ -358,7 +371,7 @@ def _over_volume(size: ReportedNumber, fuller: int) -> ReportedNumber:
 def _ratio(
     decays: tuple[_ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
 ) -> tuple[FitVariable, ...]:
-    """Return the volume ratio as unknown, or with a prior if both volumes [m^3] are given; nothing beside a room."""
+    """Return the chamber volume ratio as unknown, or with a prior for known volumes [m^3]; empty with a room."""
     changes = [decay.changes for decay in decays if decay.room is None]
     if not changes:
         return ()
@@ -368,13 +381,9 @@ def _ratio(
 
 
 def _sought(
-    size: ReportedNumber,
-    has_volume: bool,
-    decays: tuple[_ClosedChambers, ...],
-    opening: Opening,
-    emptied: float,
+    size: ReportedNumber, has_volume: bool, decays: tuple[_ClosedChambers, ...], opening: Opening, emptied: float
 ) -> tuple[Paths, tuple[ReportedNumber, ...], OpeningSizes, OpeningSizes]:
-    """Return paths, reported quantities, start values, and the size of each part alone, for closed chambers."""
+    """Return paths, reported quantities, start sizes, and sizes of each part alone, for closed chambers."""
     gas = opening.gas
     rate = gas.specific_gas_constant * gas.temperature / emptied
     rough = _rough_size(decays, opening, OpeningSizes(1.0), rate)
@@ -396,7 +405,7 @@ def _beside(has_volume: bool) -> ReportedNumber:
 
 
 def _rough_size(decays: tuple[_ClosedChambers, ...], opening: Opening, unit: OpeningSizes, rate: float) -> float:
-    """Return the positive multiple of ``unit`` whose flow gives the mean rate of change of the pressure."""
+    """Return the multiple of ``unit`` whose flow gives the mean rate of the pressure change."""
     sizes = []
     for item in decays:
         flow = float(np.mean(opening.flow(unit, item.first, item.second)))
@@ -413,7 +422,7 @@ def _steady_leak(
     tolerances: Tolerances,
     confidence: float,
 ) -> BenchResult:
-    """Return the leak from steady flow over pressures; different pressures separate the zero of the flow meter."""
+    """Identify the leak from steady flow at several pressures, which separate the zero of the flow meter."""
     check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY, moving=("mass_flow",), absolute=CHANNELS)
     for source in sources:
         check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])

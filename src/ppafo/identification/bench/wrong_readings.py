@@ -1,4 +1,4 @@
-"""Readings that cannot be right: samples far off their neighbours, and flow against its direction."""
+"""Detection of wrong readings: samples far from their neighbours, and flow against its direction."""
 
 import math
 from collections.abc import Sequence
@@ -19,16 +19,16 @@ _FINE_SAMPLE, _GROSS_SAMPLE, _GROSS_READING = 0.01, 1.0 / 6.0, 0.25
 """Outlier limits as fractions of the usual range [-]: of samples over time (a sixth of the limit), fine and gross; of
 readings, gross.
 
-A glitch of a third of the range in a real logger is one of many samples, and no reason to refuse the recording.
+A single glitch of a third of the range, as loggers produce, must not refuse a recording.
 """
 _MOST_LEFT_OUT = 0.02
 """Largest fraction of the samples of a recording over time that may be left out as outliers [-]."""
 _COARSEST = 0.05
-"""Converter step divided by the largest valid sample [-], above which it is no step: two outliers may be equal."""
+"""Largest converter step, relative to the largest valid sample [-]; a larger step may be two equal outliers."""
 _NO_DECAY = 0.5
-"""Fraction of the range by which the first two samples may differ from the median of the first five [-]."""
+"""Largest difference of the first two samples from the median of the first five, relative to the range [-]."""
 _ALIKE, _FEWEST_ALIKE = 6, 8
-"""Number of neighbours with which a reading is compared, and least number of readings for the comparison."""
+"""Number of neighbours for the comparison of a reading, and least number of readings to compare."""
 
 
 def without_wrong_samples(
@@ -73,7 +73,7 @@ def without_wrong_samples(
 def _outliers(values: Floats, most: int, share: float) -> Flags:
     """Return flags of samples off their neighbours by 6 times the noise, and 6 times a share of the usual range.
 
-    With more than ``most`` outliers the step of the converter is looked for among all samples.
+    With more than ``most`` outliers the converter step is estimated from all samples, outliers included.
     """
     # Of samples that stand still the noise is 0, and what moves first among them is no error.
     noise = max(noise_of(values), share * usual_range(values))
@@ -88,7 +88,7 @@ def _outliers(values: Floats, most: int, share: float) -> Flags:
 
 
 def check_not_alone(source: RecordingSource, procedure: str, name: str) -> None:
-    """Raise IdentificationError for an isolated extreme value of a channel, naming the sample.
+    """Raise IdentificationError, naming the sample, for an isolated extreme value of a channel.
 
     A value is isolated if its distance from the next one exceeds twice the range of all others and their median
     magnitude. The check applies to driving quantities, for which there is no other check.
@@ -140,13 +140,9 @@ def check_no_wrong_reading(
 
 
 def meter_readings(
-    sources: tuple[RecordingSource, ...],
-    procedure: str,
-    direction: Floats,
-    zero: float,
-    used: Flags | None = None,
+    sources: tuple[RecordingSource, ...], procedure: str, direction: Floats, zero: float, used: Flags | None = None
 ) -> tuple[Floats, Flags, tuple[str, ...]]:
-    """Return flow meter readings with their sign [kg/s], flags of the possible ones, and remarks on the others.
+    """Return flow meter readings with sign [kg/s], flags of possible readings, and remarks on the others.
 
     Under every law gas flows from the higher to the lower pressure. A meter that never shows a negative flow has no
     sign; if the flow was reversed in many readings, each reading gets the sign of ``direction``. Otherwise a reading

@@ -1,4 +1,4 @@
-"""Choice of the most informative next experiment: expected information of its samples, added to the present fit."""
+"""Choice of the next experiment: expected information of its samples, added to the present fit (D-optimality)."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,12 +18,12 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
 
 _WHOLE = 1.0e-6
-"""Fraction of a sample interval [-] by which rounding may shorten the last one."""
+"""Rounding tolerance of the last sample interval, as a fraction of an interval [-]."""
 
 
 @dataclass(frozen=True, slots=True)
 class CandidateExperiment:
-    """Possible further experiment: scenario, noise of each channel [rad], [Pa], and sample interval [s].
+    """Candidate for the next experiment: scenario, noise of each channel [rad], [Pa], and sample interval [s].
 
     The device comes from the scenario, with the fitted values inserted. Without ``noise``, all channels of the fit are
     compared, each with its estimated noise; otherwise only the channels in ``noise``.
@@ -60,7 +60,7 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExper
 
 
 def _benefit(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBenefit:
-    """Return the expected benefit of one candidate: its whitened Jacobian, added to the information of the fit."""
+    """Return the expected benefit of a candidate, from its whitened Jacobian added to the information of the fit."""
     noise = dict(candidate.noise) or dict(fit.fit.noise)
     if not noise or any(name not in FITTED_CHANNELS or not deviation > 0.0 for name, deviation in noise.items()):
         raise IdentificationError(

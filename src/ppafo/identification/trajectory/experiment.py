@@ -35,13 +35,13 @@ from ppafo.simulation.scenario import (
 from ppafo.wording import nearest_name
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
-"""Channels that can be compared with a recording [rad], [Pa], [Pa]."""
+"""Channels that a fit can compare with a recording [rad], [Pa], [Pa]."""
 
 INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE)
 """Recorded channels that drive a run without a scenario, sample by sample."""
 
 ALL_INPUTS = (*INPUTS, DORSIFLEXION_SUPPLY, ANGLE)
-"""Recorded channels that may drive a run in place of the scenario; a recorded angle is a prescribed motion."""
+"""Recorded channels that may replace inputs of the scenario; a recorded angle is a prescribed motion."""
 
 InitialState = Literal["scenario", "recording"]
 """Source of the initial angle and pressures of a run."""
@@ -74,7 +74,7 @@ class FittedExperiment:
 
 
 def check_experiment(experiment: FittedExperiment) -> None:
-    """Raise IdentificationError, with the label first, for an experiment that cannot be fitted."""
+    """Raise IdentificationError for an experiment that cannot be fitted; the message begins with the label."""
     where, recording, inputs = f"experiment '{experiment.label}'", experiment.recording, experiment.inputs
     if len(recording) < 2:
         raise IdentificationError(f"{where}: {recording.label} has only one sample; a fit needs two or more")
@@ -123,16 +123,16 @@ def check_experiment(experiment: FittedExperiment) -> None:
 
 
 def refuse_first(where: str, *checks: tuple[bool, str]) -> None:
-    """Raise IdentificationError for the first failed of pairs (is wrong, reason); ``where`` starts the message."""
+    """Raise IdentificationError for the first failed pair (is wrong, reason); ``where`` is the message prefix."""
     for is_wrong, why in checks:
         if is_wrong:
             raise IdentificationError(f"{where}: {why}")
 
 
 def scenario_of(experiment: FittedExperiment) -> Scenario:
-    """Return the scenario of an experiment, completed with data from the recording except for the samples of inputs.
+    """Return the scenario completed from the recording: supply, recorded control, initial angle and pressures.
 
-    A recorded initial state is taken from the samples up to the start.
+    Samples of inputs are added later. A recorded initial state is taken from the samples up to the start.
     """
     scenario, recording = experiment.scenario, experiment.recording
     if {SUPPLY, DORSIFLEXION_SUPPLY} & set(experiment.inputs):

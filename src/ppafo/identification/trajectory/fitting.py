@@ -72,13 +72,13 @@ class NuisanceParameter:
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryFit:
-    """Result of a trajectory fit: estimates of the unknowns, and of the tolerances (``known``).
+    """Result of a trajectory fit: estimates of the unknowns, and the updated tolerances (``known``).
 
     ``covariance`` [SI] and ``correlation`` are in the order of ``estimates``. ``channels`` are residual statistics.
     ``models`` are the fitted runs at the sample times and ``measurements`` the samples, both by experiment with the
     time of the run. ``scenarios`` have the fitted values. ``conflict`` is a sentence on recordings or channels whose
-    own estimates differ from the common ones, empty if all agree. ``remarks`` are sentences on the fit as a whole,
-    ``outliers`` on samples left out.
+    separate estimates differ from the common estimates, empty if all agree. ``remarks`` are sentences on the fit as a
+    whole, ``outliers`` on samples left out.
     """
 
     problem: TrajectoryProblem
@@ -115,7 +115,7 @@ class TrajectoryFit:
 
 
 def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> TrajectoryFit:
-    """Return the parameters that explain the recordings of a problem best, each with interval [SI] and verdict.
+    """Fit the parameters of a problem to its recordings; each estimate has an interval [SI] and a verdict.
 
     ``report`` receives the progress. Raises IdentificationError if the problem cannot be simulated.
     """
@@ -133,12 +133,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     report(Progress(f"trajectory fit: {len(free)} numbers, {len(runs)} recordings"))
     blocks = blocks_of(runs, numbers, start)
     fitted = fit_residuals(
-        lambda points: residuals_of(runs, numbers, points),
-        free,
-        blocks,
-        problem.confidence,
-        report,
-        is_motion=True,
+        lambda points: residuals_of(runs, numbers, points), free, blocks, problem.confidence, report, is_motion=True
     )
     conflict = conflict_in_words(fitted, "the model is incomplete") or _wandering(fitted, numbers)
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
@@ -216,12 +211,11 @@ _INSIDE = 1.0e-3
 
 
 def _in_unit(value: float, estimate: Estimate) -> str:
-    """Return a value with the unit of an estimate, in the format of a problem file."""
     return f"{value:.4g}" if estimate.unit in ("", "-") else f"{value:.4g} {estimate.unit}"
 
 
 def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Sequence[Estimate]) -> NuisanceParameter:
-    """Return the fitted tolerance ``number``, with the unknown whose interval it widens most."""
+    """Return a tolerance after the fit, with the unknown whose interval it widens most."""
     name, free = number.free.name, number.free
     shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
     widens = max(shares, key=lambda path: shares[path], default="")
@@ -234,7 +228,7 @@ def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Se
 def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
     """Return a sentence on a channel whose residual drifts beyond the limit of its zero error; empty if none does.
 
-    The zero of a sensor stays within its limit, so that a larger drift must come from the model.
+    The zero error of a sensor stays within its limit, so a larger drift is due to the model.
     """
     for number in (number for number in numbers if number.path.startswith(ZERO_OF)):
         channel = number.path.removeprefix(ZERO_OF)

@@ -1,4 +1,4 @@
-"""Layout of the section [trajectory] of a problem file; texts have units, scenarios and recordings are named."""
+"""Layout of the section [trajectory] of a problem file: quantities as text with units, files by name."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -25,7 +25,7 @@ class PriorSection(StrictTable):
 
 
 class ParameterSection(StrictTable):
-    """Entry of a problem file for a parameter to be fitted."""
+    """Table [[trajectory.parameters]]: parameter to fit, with start, bounds and prior."""
 
     path: Text = Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")
     start: Text | None = Field(
@@ -40,7 +40,7 @@ class ParameterSection(StrictTable):
 
 
 class ExperimentSection(StrictTable):
-    """Recording, with the scenario that models it.
+    """Table [[trajectory.experiments]]: recording with the scenario that models it.
 
     The scenario is run with the device of the problem. Without a scenario, the recorded command, supply and external
     torque drive the run, which starts from the recorded state.
@@ -74,7 +74,7 @@ class ExperimentSection(StrictTable):
 
 
 class CandidateSection(StrictTable):
-    """Entry of a problem file for a possible further experiment."""
+    """Table [[trajectory.candidates]]: possible next experiment."""
 
     label: _Label
     scenario: Text = Field(description="name of a scenario, or a file relative to this one")
@@ -84,7 +84,7 @@ class CandidateSection(StrictTable):
 
 
 class TrajectorySection(StrictTable):
-    """Section of a problem file for a trajectory fit."""
+    """Table [trajectory] of a problem file."""
 
     parameters: tuple[ParameterSection, ...] = Field(strict=False, min_length=1, description="free parameters")
     experiments: tuple[ExperimentSection, ...] = Field(strict=False, min_length=1, description="recordings to explain")

@@ -1,4 +1,4 @@
-"""Parameters that a trajectory fit can vary: availability in scenario and recording, start, bounds and prior."""
+"""Parameters of a scenario or recording that a trajectory fit can vary, with start, bounds and prior."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ TIME_OFFSET = "recording.time_offset"
 """Path of the delay of the samples of a recording with respect to the run; no scenario has this parameter."""
 
 ZERO_OF, GAIN_OF = "recording.zero_of_", "recording.gain_of_"
-"""Prefixes of the paths of zero error and gain error of a sensor; the name of the channel follows."""
+"""Prefixes of the parameter paths of zero and gain errors of a sensor; the channel name follows."""
 
 RECORDING = (
     Quantity("time_offset", "s", "delay of the samples behind the run, such as a late trigger", 0.0, -1.0, 1.0),
@@ -42,7 +42,7 @@ _OF_RECORDING = frozenset(f"recording.{quantity.name}" for quantity in RECORDING
 
 
 def full_path(path: str, scenario: Scenario) -> str:
-    """Return the path as in a parameter set: ``valve.area`` becomes ``valves.NAME.area`` of the chosen valve."""
+    """Return the path as in a parameter set: ``valve.area`` becomes ``valves.NAME.area`` with the chosen valve."""
     section, _, name = path.partition(".")
     return f"valves.{scenario.device.valve_name}.{name}" if section == "valve" else path
 
@@ -78,7 +78,7 @@ def declaration_of(path: str, scenario: Scenario) -> Quantity:
 
 
 def number_at(scenario: Scenario, path: str) -> float:
-    """Return the value at a path [SI]; parameters of a recording are 0 before they are fitted."""
+    """Return the value of a parameter [SI]; parameters of a recording are 0 before the fit."""
     declaration_of(path, scenario)
     return 0.0 if path in _OF_RECORDING else numbers.number_at(scenario, path)
 
@@ -104,13 +104,13 @@ LONGEST_TIME_OFFSET = 0.02
 """Default bound of a fitted time offset [s]: covers the delay of a trigger or a sensor."""
 
 _FURTHEST = 100.0
-"""Default bounds of a positive parameter: largest ratio to its start, up and down [-]."""
+"""Default bounds of a positive parameter, as the largest ratio to its start value, up and down [-]."""
 
 _SCALE = 100.0
-"""Scale of a parameter with a prior, in standard deviations [-]; finite differences are at most a thousandth of it."""
+"""Scale of a parameter with a prior, in standard deviations [-]; a finite difference is at most 0.001 scales."""
 
 _STATE = frozenset({"motion", "initial"})
-"""Sections of the initial state of a run, for which the recording may have better values."""
+"""Sections with the initial state of a run, which a recording may give more accurately."""
 
 _SUPPLIES = {"supply.pressure": "plant.supply_pressure", "supply.dorsiflexion_pressure": "plant.dorsiflexion_pressure"}
 
@@ -121,7 +121,7 @@ class FreeParameter:
 
     ``start`` defaults to the value of the scenario. ``low`` and ``high`` default to the declared bounds, at most a
     factor of 100 from the start. ``deviation`` is the standard deviation of a normal prior about the start, infinite
-    for none. ``recordings`` limits the parameter to some experiments, by label, such as an initial pressure to one.
+    for none. ``recordings`` are the labels of the experiments to which the parameter is limited, empty for all.
     ``is_tolerance`` marks a quantity known within a tolerance, which is not an unknown of the device. With
     ``is_logarithm`` the natural logarithm is varied, and ``deviation`` refers to the logarithm.
     """
@@ -137,7 +137,7 @@ class FreeParameter:
 
     @property
     def name(self) -> str:
-        """Path, with the labels of the experiments if the parameter is limited to some."""
+        """Path, followed by the labels of the experiments if the parameter is limited to some of them."""
         return f"{self.path} of {', '.join(self.recordings)}" if self.recordings else self.path
 
 

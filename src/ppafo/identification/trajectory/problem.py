@@ -11,7 +11,7 @@ from ppafo.wording import first_twice, nearest_name
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryProblem:
-    """Parameters to be fitted to the recordings of experiments. Raises IdentificationError if inconsistent."""
+    """Trajectory fit problem: parameters and experiments. Raises IdentificationError if inconsistent."""
 
     parameters: tuple[FreeParameter, ...]
     experiments: tuple[FittedExperiment, ...]

@@ -37,11 +37,11 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FIT_TOLERANCE = 0.02
-"""Error tolerance of a run of a fit, relative to other runs [-]; finite differences are then accurate to 1e-3."""
+"""Error tolerance of a run of a fit, relative to a normal run [-]; finite differences are then accurate to 1e-3."""
 _FINER = 0.25
-"""Relative tolerance [-] of the second run that serves to estimate the error of the first."""
+"""Relative tolerance [-] of the finer runs by which the integration error is estimated."""
 _FITS = 1.0e-6
-"""Rounding tolerance of sample times, as a fraction of a record interval [-] and in seconds."""
+"""Rounding tolerance of sample times, as a fraction of a record interval [-], and in seconds."""
 
 _ZERO_OF_ANGLE = math.radians(1.0)
 """Largest distance of a reading from a stop [rad] at which the vane counts as resting at the stop."""
@@ -49,12 +49,12 @@ _ZERO_OF_ANGLE = math.radians(1.0)
 _READ_INTERVAL = 5.0e-5
 """Record interval for interpolation at samples [s]; a chamber fills within milliseconds."""
 _MAXIMUM_RECORDS = 100_000
-"""Number of records above which the interval is lengthened, to limit memory for long recordings."""
+"""Largest number of records, above which the record interval is lengthened to limit memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class FitChannel:
-    """Channel of an experiment: samples [rad] or [Pa], and least noise assumed for them."""
+    """Channel of an experiment: samples [rad] or [Pa], and their noise floor."""
 
     name: str
     values: Floats
@@ -128,7 +128,7 @@ def prepare_samples(
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None = None,
 ) -> _PreparedExperiment:
-    """Return samples of a scenario prepared for fitting, at ``numbers`` [SI], with time offsets up to ``reach`` [s]."""
+    """Return a prepared experiment from samples, at ``numbers`` [SI], with time offsets up to ``reach`` [s]."""
     run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
     unlocated = np.zeros(time.size)
     before = unlocated.astype(np.intp)
@@ -137,7 +137,7 @@ def prepare_samples(
 
 
 def _locate_samples(prepared: _PreparedExperiment, run: Run) -> _PreparedExperiment:
-    """Return the experiment with its samples located in a record that is only as fine as they need."""
+    """Locate the samples of an experiment between records that are no finer than needed."""
     time, recorded = prepared.time, prepared.recorded
     every = _steps_between_samples(time, prepared.reach, run.step)
     records = math.ceil((float(time[-1]) + prepared.reach) / (run.step * every) - _FITS)
@@ -154,7 +154,7 @@ def _locate_samples(prepared: _PreparedExperiment, run: Run) -> _PreparedExperim
 
 
 def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
-    """Return the steps between two records: a sample interval, or less if samples must be interpolated.
+    """Return the number of steps between records: a sample interval, or less if samples must be interpolated.
 
     The result is a fraction of a step if a whole step is too long for interpolation.
     """
@@ -327,7 +327,7 @@ def signals_at(prepared: _PreparedExperiment, columns: Mapping[str, Floats], cou
 
 
 def _with_inputs(prepared: _PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
-    """Return ideal sensor signals; runs with different zeros of recorded inputs are simulated in separate groups."""
+    """Return ideal sensor signals; runs with different zero errors of recorded inputs form separate batches."""
     zeros = {path: column for path, column in columns.items() if path.startswith(ZERO_OF)}
     others = {path: column for path, column in columns.items() if path not in zeros}
     if not zeros or prepared.inputs is None:
@@ -385,7 +385,7 @@ def _run_signals(prepared: _PreparedExperiment, columns: Mapping[str, Floats], c
 
 
 def _at_samples(values: Floats, prepared: _PreparedExperiment, offsets: Floats) -> Floats:
-    """Return a state at the sample times, interpolated linearly between records; each run has a time offset [s]."""
+    """Return a state at the sample times, interpolated linearly between records; each run has its time offset [s]."""
     if offsets.any():
         # Before the first record the device stands still.
         interval = prepared.run.step * prepared.run.record_every

@@ -1,4 +1,4 @@
-"""Section [trajectory] of a problem file: conversion to a problem in SI units, and its result.
+"""Section [trajectory] of a problem file: conversion to SI units, fit, and ranking of candidate experiments.
 
 All input errors are reported before the search starts.
 """
@@ -14,13 +14,7 @@ from ppafo.identification.keys import positive_in, quantity_in
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
 from ppafo.identification.tolerances import Tolerances, quantity_of
 from ppafo.identification.trajectory.expected import CandidateExperiment, ExpectedBenefit, expected_information
-from ppafo.identification.trajectory.experiment import (
-    FITTED_CHANNELS,
-    INPUTS,
-    FittedExperiment,
-    refuse_first,
-    use_of,
-)
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, INPUTS, FittedExperiment, refuse_first, use_of
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.identification.trajectory.layout import ExperimentSection, ParameterSection, TrajectorySection
 from ppafo.identification.trajectory.numbers import TIME_OFFSET, FreeParameter, declaration_of, full_path
@@ -65,7 +59,7 @@ class SectionContext:
 
 
 def noise_of_channels(texts: Mapping[str, str], where: str) -> dict[str, float]:
-    """Return the standard deviation of the noise by channel [rad], [Pa]; ``where`` starts messages.
+    """Parse the noise of each channel into standard deviations [rad], [Pa]; ``where`` is the prefix of messages.
 
     Raises IdentificationError for a channel that cannot be fitted.
     """
@@ -81,11 +75,11 @@ def noise_of_channels(texts: Mapping[str, str], where: str) -> dict[str, float]:
 
 
 SHORTEST_STEP = 1.0e-6
-"""Shortest time step that may be requested [s]; a shorter step would only cost time."""
+"""Shortest time step that a problem file may request [s]."""
 
 
 def trajectory_problem(section: TrajectorySection, context: SectionContext) -> TrajectoryProblem:
-    """Return the problem of a section. Raises IdentificationError if a bench procedure already used a recording."""
+    """Convert a section to a fit problem. Raises IdentificationError for a recording used by a bench procedure."""
     experiments = tuple(_experiment(entry, context) for entry in section.experiments)
     scenarios = {experiment.label: experiment.scenario for experiment in experiments}
     # Samples that a bench procedure used are in its interval, which is a prior here.
@@ -109,7 +103,7 @@ def trajectory_problem(section: TrajectorySection, context: SectionContext) -> T
 
 
 def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExperiment:
-    """Return an experiment of a section: its recording, and the scenario that models it."""
+    """Convert a table of a section to an experiment: recording, and scenario that models it."""
     where = f"{context.file}: experiment '{entry.label}'"
     source = context.read(entry)
     if entry.scenario is None:
@@ -149,7 +143,7 @@ def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExpe
 
 
 def _scenario(name: str, overrides: tuple[str, ...], context: SectionContext) -> Scenario:
-    """Return a bundled scenario, or one from a file in the folder of the problem, with the device of the problem."""
+    """Load a scenario, bundled or from a file in the folder of the problem, with the device of the problem."""
     name_or_file = name if name in list_scenarios() else str(context.folder / name)
     # The valve of the problem goes before what the experiment changes of it.
     chosen = () if context.valve is None else (f"device.valve={context.valve}",)
@@ -157,7 +151,7 @@ def _scenario(name: str, overrides: tuple[str, ...], context: SectionContext) ->
 
 
 def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], context: SectionContext) -> FreeParameter:
-    """Return a parameter to fit [SI]; ``scenarios`` are the scenarios of the experiments, by label."""
+    """Convert a table of a section to a parameter to fit [SI]; ``scenarios`` are by label of the experiment."""
     scenario = next((scenarios[label] for label in entry.recordings if label in scenarios), None)
     acting = scenario or next(iter(scenarios.values()))
     quantity = declaration_of(entry.path, acting)
@@ -223,7 +217,7 @@ def _replay(
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryOutcome:
-    """Result of a section: fit, expected benefit of candidates (best first), and remarks on recordings and fit."""
+    """Result of section [trajectory]: fit, expected benefit of candidates (best first), and remarks."""
 
     fit: TrajectoryFit
     expected: tuple[ExpectedBenefit, ...]
@@ -236,7 +230,7 @@ class TrajectoryOutcome:
 
 
 def solve_section(section: TrajectorySection, context: SectionContext, report: Report) -> TrajectoryOutcome:
-    """Return the result of a section; all input errors are reported before the search starts."""
+    """Solve section [trajectory]: fit the parameters and rank the candidates, after a check of all inputs."""
     try:
         problem = trajectory_problem(section, context)
         candidates = []

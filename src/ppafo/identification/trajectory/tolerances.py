@@ -1,4 +1,4 @@
-"""Tolerances of bench and parameter set as parameters of a trajectory fit with priors."""
+"""Tolerances of the bench and the parameter set as fit parameters with priors."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ _WIDEST = 12.0
 """Largest deviation of a tolerance in the search, in standard deviations of its prior [-]."""
 
 _EXACT = ("area", "angle_min", "angle_max", "linear_ratio", "critical_ratio", "atmospheric_pressure")
-"""Parameters without a default tolerance: they act only through another one, or like the zero error of a sensor."""
+"""Parameters without a default tolerance, because another parameter or a zero error has the same effect."""
 
 _STRIBECK, _SHARE = "effects.stribeck.velocity", "effects.stribeck.share"
 _FACTOR, _ONE_SIDED, _LEAST = 1.5, 1.645, 0.01
@@ -42,7 +42,7 @@ _START_OF_ANGLE = math.radians(0.05)
 
 
 def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, float]:
-    """Return the half-widths of the 95 % intervals stated in a set [SI], by path."""
+    """Return the half-widths of 95 % intervals stated in a parameter set [SI], by path."""
     found = {}
     for path, quantity in declared_numbers(scenario).items():
         entry = parameter_set.numbers.get(path)
@@ -57,7 +57,7 @@ def tolerance_parameters(
     fitted: Sequence[FreeParameter],
     stated: Mapping[str, float] | None = None,
 ) -> tuple[FreeParameter, ...]:
-    """Return all uncertain quantities, except parameters already ``fitted``, as fit parameters with priors.
+    """Return all tolerances, except parameters already ``fitted``, as fit parameters with priors.
 
     ``stated`` are the half-widths of the 95 % intervals stated in the set [SI], by path.
     """
@@ -98,7 +98,7 @@ def tolerance_parameters(
 def _stribeck(
     tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str]
 ) -> Iterator[FreeParameter]:
-    """Yield Stribeck velocity and share of the fall to dynamic friction as parameters, if the set has no such effect.
+    """Yield Stribeck velocity and share of the fall to dynamic friction as parameters, unless the set defines them.
 
     With an abrupt fall, static friction trades off against damping. The static friction seen in a step response varies
     with the logarithm of the Stribeck velocity, so the logarithm is varied; 95 % of its prior lies below the limit. A
@@ -127,7 +127,7 @@ def _stribeck(
 
 
 def _of_run(tolerances: Tolerances, experiment: FittedExperiment) -> dict[str, tuple[float, float]]:
-    """Return start and standard deviation of the operating conditions and initial state of a run, by path [SI]."""
+    """Return initial state and operating conditions of a run as (start, standard deviation), by path [SI]."""
     scenario, inputs, recording = scenario_of(experiment), experiment.inputs, experiment.recording
     free = scenario.motion if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is None else None
     found = {}

@@ -66,35 +66,35 @@ if TYPE_CHECKING:
     from ppafo.exports.c_library.program import ComposedLibrary
 
 LANES = 8
-"""Number of runs computed together; with more, their numbers would not fit the registers used by current browsers."""
+"""Number of runs computed together, limited by the registers of current browsers."""
 TARGET = ("--target=wasm32-freestanding", "-mcpu=generic+simd128+bulk_memory")
 # -O2 makes modules 14 % larger and no quicker.
 STRICT = ("-std=c99", "-Os", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
 _FREESTANDING = ("-nostdlib", "-fno-sanitize=undefined", "-fvisibility=hidden", "-Wno-pass-failed", "-I.")
 STACK = 262144
-"""Stack size [bytes] for a run."""
+"""Stack size of a module [bytes]."""
 _LINKED = ("-Wl,--no-entry", "-Wl,--strip-all", f"-Wl,-z,stack-size={STACK}")
 FLAGS = (*TARGET, *STRICT, *_FREESTANDING, *_LINKED)
 INDEX = "index.json"
-"""Index file of the prebuilt programs: digest of the C text of each, and version of the compiler."""
+"""Index file of prebuilt programs: digest of each C text, and compiler version."""
 _TITLE = "The functions that a run is made of, from ppafo."
 _COMMENT = re.compile(r"\s*/\*.*?\*/\s*", re.DOTALL)
 _INSIDE = re.compile(r"(?:PPAFO_INLINE\s[\w\s*]*?\b|^\} )(\w+)(?=[(;])", re.MULTILINE)
-"""Declarations of functions and types that are not visible outside a module."""
+"""Pattern of functions and types that are internal to a module."""
 _COUNT = re.compile(r"counts\.(\w+)")
 _HOW_TO_INSTALL = "pip install 'ppafo[workbench]'"
 
 
 _WRITERS = ("exports", "gait", "page", "parameters", "simulation", "translation", "walking")
-"""Package folders that contribute to the C text of a module, in addition to the folders of a program."""
+"""Package folders behind the C text of a module, besides the folders of a program."""
 WRITTEN_BY = (*COMPOSED, *_WRITERS)
 SHIPPED_KEYS = "shipped.json"
-"""File with the program digest of each bundled scenario and walk, by its description and by the outline of its text,
-and the package files for which these are valid."""
+"""File of program digests of bundled scenarios and walks, by description and by outline of the text, with the package
+files for which they are valid."""
 
 
 def program_of(library: Library, scenario: Scenario) -> bytes:
-    """Return the WebAssembly of a scenario's library: the bundled one if identical, else compiled now.
+    """Return the WebAssembly of a library: the bundled program if identical, else compiled.
 
     C text and module are cached on disk.
     """
@@ -117,7 +117,7 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
 
 @cache
 def _shipped_keys() -> dict[str, Any]:
-    """Return the digests of bundled scenarios and walks, with the package files and values for which they are valid."""
+    """Load the digests of bundled scenarios and walks, with the package files for which they are valid."""
     keys: dict[str, Any] = json.loads(files("ppafo.page.wasm").joinpath(SHIPPED_KEYS).read_text(encoding="utf-8"))
     return keys
 
@@ -128,7 +128,7 @@ def short_digest(described: str) -> str:
 
 
 def _known_digest(library: Library, shipped: Mapping[str, str]) -> str:
-    """Return the digest of a library's C text, which does not depend on the values of its settings.
+    """Return the digest of a library's C text, which is independent of setting values.
 
     ``shipped`` has digests by outline that are valid for the package as it is.
     """
@@ -148,21 +148,21 @@ def _known_digest(library: Library, shipped: Mapping[str, str]) -> str:
 
 
 def compose(library: Library) -> "ComposedLibrary":
-    """Return the functions of a library, composed from their Python sources."""
+    """Compose the functions of a library from their Python sources."""
     from ppafo.exports.c_library.program import composed_library  # most digests are kept
 
     return composed_library(library.program, library.further, LANES)
 
 
 def outline_of_unit(library: Library, composed: "ComposedLibrary") -> str:
-    """Return the translation unit of a library with its functions still in Python, which determines its C text."""
+    """Return the translation unit with functions still in Python, which determines the C text."""
     from ppafo.exports.c_library.program import outline_of
 
     return _unit(library, outline_of(library.program, composed, [setting.name for setting in library.settings]))
 
 
 def source_of(library: Library, composed: "ComposedLibrary") -> str:
-    """Return the C translation unit of a composed library, which does not contain the values of settings."""
+    """Return the C translation unit of a composed library, independent of setting values."""
     from ppafo.exports.c_library.program import c_text
 
     names = [setting.name for setting in library.settings]
@@ -170,7 +170,7 @@ def source_of(library: Library, composed: "ComposedLibrary") -> str:
 
 
 def _unit(library: Library, functions: str) -> str:
-    """Return the C translation unit that wraps the given functions."""
+    """Return the C translation unit around given functions."""
     program, names = library.program, [setting.name for setting in library.settings]
     assignments = [f"given[SETTING_{name.upper()}] = settings->{name};" for name in names]
     arrays = ", ".join(f"array_of({name}, {count}, 0, 0)" for name, count in _ARRAYS.items())
@@ -204,11 +204,11 @@ _ARRAYS = {
     "prepared->states": "STATES",
     "prepared->counts": "COUNTS",
 }
-"""Array arguments of the function ``prepare``, with the size of each."""
+"""Array arguments of the function ``prepare``, with their sizes."""
 
 
 def _chosen_loop(program: ExportedProgram, ending: str) -> str:
-    """Return C lines that call the time-stepping loop selected by the clock."""
+    """Return the C lines that call the time-stepping loop selected by the clock."""
     if not program.program.chooses_parts:
         return f"GO_ON({WHOLE}{ending});"
     in_parts, whole = (f"        GO_ON({name}{ending});\n" for name in (IN_PARTS, WHOLE))
@@ -216,7 +216,7 @@ def _chosen_loop(program: ExportedProgram, ending: str) -> str:
 
 
 def digest_of(text: str) -> str:
-    """Return the digest of a C text, for everything but the compiler that determines the bytes of a module.
+    """Return the digest of a C text, which with the compiler determines the bytes of a module.
 
     Comments, line breaks and names of internal functions and types are ignored. These names contain the location of
     their Python source, and a bundled program remains valid if the source is moved.
@@ -228,7 +228,7 @@ def digest_of(text: str) -> str:
 
 
 def check_can_build() -> None:
-    """Raise ProgramError if ziglang is not installed."""
+    """Raise ProgramError unless ziglang is installed."""
     if importlib.util.find_spec("ziglang") is None:
         raise ProgramError(
             "this scenario needs functions that no program of the package has, and ziglang to build them: "
@@ -237,7 +237,7 @@ def check_can_build() -> None:
 
 
 def build(text: str) -> bytes:
-    """Compile a translation unit to WebAssembly; ProgramError if ziglang is missing or fails."""
+    """Compile a translation unit to WebAssembly. Raises ProgramError if ziglang is missing or fails."""
     check_can_build()
     sources = {"module.c": text.encode(), "math.h": template(__name__, "math.h").encode()}
     with temporary_folder("ppafo", sources) as folder:
@@ -262,7 +262,7 @@ _PROGRAMS = files("ppafo.page.wasm").joinpath("programs")
 
 @cache
 def prebuilt_programs() -> dict[str, str]:
-    """Return the file names of prebuilt programs by the digest of their C text."""
+    """Return the file names of prebuilt programs by digest of the C text."""
     programs: dict[str, str] = json.loads(_PROGRAMS.joinpath(INDEX).read_text(encoding="utf-8"))["programs"]
     return programs
 
@@ -270,14 +270,14 @@ def prebuilt_programs() -> dict[str, str]:
 @final
 @dataclass(frozen=True, slots=True)
 class WasmModule:
-    """Bytes of a WebAssembly module, and its description as plain data (``description_of``)."""
+    """WebAssembly module of a scenario or walk: bytes, and description as plain data (``description_of``)."""
 
     wasm: bytes
     description: dict[str, Any]
 
 
 def module_of(scenario: Scenario) -> WasmModule:
-    """Return a scenario or walk as a WebAssembly module.
+    """Return the WebAssembly module of a scenario or walk.
 
     The bundled program is used if a bundled scenario or walk has the same one, with any numbers; otherwise it is
     compiled. Raises ProgramError if this needs the package ``ziglang`` and it is missing, or if code cannot be

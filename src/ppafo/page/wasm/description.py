@@ -51,14 +51,14 @@ from ppafo.units.shown import quantity_of_unit
 from ppafo.version import __version__
 
 _KINDS = {VANE: "scenario", WALK: "walk"}
-"""Name of each kind of simulation on a page."""
+"""Name of a simulation on a page, by kind of motion."""
 _TASK = {"origin": "task", "source": "", "note": "", "half_width": None}
 _CHANGED = {**_TASK, "origin": "changed"}
 _DEFAULT = {**_TASK, "origin": "default"}
 
 
 def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
-    """Return the description of the module of a scenario or walk, in the form given in the module docstring."""
+    """Return the description of a scenario's module, in the form given in the module docstring."""
     keys = {setting.name: setting.path for setting in library.settings}
     origins, kept = _origins(scenario, library), _kept(library)
     # Settings that have the number of another until they are changed by themselves.
@@ -116,7 +116,7 @@ def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
 
 
 def _kept(library: Library) -> dict[str, str]:
-    """Settings, by C name, that must stay ``zero`` or ``above zero``, because they select the program."""
+    """Return the settings, by C name, that must stay ``zero`` or ``above zero`` for the same program."""
     values = {setting.name: setting.value for setting in library.settings}
     kept: dict[str, str] = {}
     for names, is_above in library.switches:
@@ -175,7 +175,7 @@ def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolut
 
 
 def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
-    """Return the origin of each setting's value, by path."""
+    """Return the origin of each setting by path."""
     origin, device = scenario.origin, scenario.device
     # None where the set cannot be read any more.
     parameter_set: ParameterSet | None = None

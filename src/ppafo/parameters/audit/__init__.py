@@ -1,7 +1,7 @@
-"""Consistency checks of a parameter set, with any values.
+"""Consistency checks of a parameter set.
 
-All checks run, in the order of the report. Reasons with which the author of the set accepts a finding are applied.
-To add a check, write a function in the module of its subject and list it here.
+All checks run, in the order of the report. A reason given by the author of the set accepts a finding. To add a check,
+write a function in the module of its subject and list it here.
 """
 
 from collections.abc import Callable, Iterator
@@ -101,6 +101,6 @@ def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> li
 
 
 def changed_paths(parameter_set: ParameterSet, parent: ParameterSet | None) -> frozenset[str]:
-    """Return the paths of all values that come from overrides or differ from the parent's."""
+    """Return the paths of values set by overrides or different from the parent set."""
     of_file = frozenset[str]() if parent is None else {change.path for change in changes(parameter_set, parent)}
     return overridden_paths(parameter_set) | of_file

@@ -67,7 +67,7 @@ def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
 def _gas_use(
     evidence: Evidence, torque_constant: float, displacement_per_radian: float
 ) -> tuple[tuple[str, ...], tuple[ComparedNumber, ...], str]:
-    """Return paths, numbers and a sentence on the volume occupied by the gas of one filling."""
+    """Return paths, numbers and a sentence on the volume that holds the gas of one filling."""
     gas, supply, angles = evidence.gas(), evidence.number(_SUPPLY), evidence.angle_range()
     path = evidence.single_fill_gas()
     if gas is None or supply is None or supply <= evidence.atmosphere() or angles is None or path is None:
@@ -108,7 +108,7 @@ def check_volumes(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_path: str) -> Iterator[AuditFinding]:
-    """Yield an error if the volume of a chamber is not positive ``travel`` [rad] from its zero swept volume."""
+    """Yield an error if a chamber volume is not positive at ``travel`` [rad] from its zero swept volume."""
     slope = evidence.number(_SLOPE) or math.inf
     dead_path, stop_path = _DEAD[chamber - 1], _STOPS[chamber - 1]
     dead = evidence.number(dead_path) or 0.0
@@ -172,7 +172,7 @@ _LEVER = ("actuator.lever_length", "actuator.base_distance", "actuator.lever_off
 
 
 def check_stroke(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a note on the stroke of a cylinder between the stops and on its lever arm, to compare with a data sheet."""
+    """Yield a note on cylinder stroke and lever arm between the stops, for comparison with a data sheet."""
     lever, base, offset, *stops = (evidence.number(path) for path in (*_LEVER, *_STOPS))
     low, high = ((stop or 0.0) + (offset or 0.0) for stop in stops)
     if lever is None or base is None or None in stops or not 0.0 < low < high < math.pi:
@@ -199,7 +199,7 @@ def check_stroke(evidence: Evidence) -> Iterator[AuditFinding]:
 
 _VOLUME = ("actuator.displacement_per_radian", "actuator.dead_volume_1")
 _LEAST, _MOST = 0.6, 1.1
-"""Accepted ratio of the gas of one filling to the measured gas use; the rest leaks across the vane during the task."""
+"""Accepted ratio of the gas of one filling to the measured gas use [-]; the remainder leaks during the task."""
 
 
 def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -246,7 +246,7 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a note on the distance by which the volumes of a rounded table were moved."""
+    """Yield a note on the moves of the volumes of a rounded table."""
     parameter_set = evidence.parameter_set
     path = Path(parameter_set.file).parent / parameter_set.actuator_file
     if parameter_set.actuator_table is None or not path.is_file():

@@ -1,4 +1,4 @@
-"""Changes of a parameter set with respect to its parent set, value by value, in any units."""
+"""Changes of a parameter set relative to its parent set, value by value, in any units."""
 
 import math
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from ppafo.parameters.parameter_set import (
 )
 
 _SAME = 1e-12
-"""Relative difference caused by conversion to another unit."""
+"""Relative tolerance for rounding in unit conversions [-]."""
 
 
 @dataclass(frozen=True, slots=True)
 class ValueChange:
-    """Changed value: text in the parent ('' if absent), text in the set ('' if absent), and origin of the new value."""
+    """Changed value of a parameter set: text in parent and set ('' if absent), and origin of the new value."""
 
     path: str
     before: str
@@ -28,7 +28,7 @@ class ValueChange:
 
 
 def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChange]:
-    """Return the differences of a set from its parent: names such as the valve first, then values in the set's order.
+    """Return the differences of a parameter set from its parent: valve and other names first, then values in order.
 
     Numbers are compared in SI: the same value in another unit is no change. Sources and notes are not compared.
     """

@@ -12,7 +12,7 @@ from ppafo.parameters.device import Gas
 _C1 = "reported.choked_flow_constant"
 _EXPONENT = "reported.choked_flow_exponent"
 _ROUNDING = 1e-3
-"""Relative tolerance beyond the reported digits, for other values of R, M and 273 or 273.15 K."""
+"""Relative tolerance besides the reported digits [-], for other values of R, M and 273 or 273.15 K."""
 
 _LONGEST, _LARGEST = 80, 1e3
 """Largest number of characters of a formula, and largest magnitude of its value."""
@@ -25,7 +25,7 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a finding for each reported constant, a note if it agrees, and a finding for the reported exponent."""
+    """Yield a finding for each reported flow constant, a note if it agrees, and for the reported exponent."""
     gas = evidence.gas()
     if gas is None:
         return
@@ -63,7 +63,7 @@ def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
-    """Compare C1 with the reported exponent to C1 with (k + 1)/(k - 1)."""
+    """Yield a finding if the reported exponent in C1 differs from (k + 1)/(k - 1)."""
     formula = evidence.text(_EXPONENT)
     k = gas.heat_capacity_ratio
     exponent = None if formula is None else evaluate(formula, k)
@@ -114,7 +114,7 @@ def evaluate(formula: str, heat_capacity_ratio: float) -> float | None:
 
 
 def _value(node: ast.expr, k: float) -> float:
-    """Return the value of a syntax tree of arithmetic in k; ValueError for anything else."""
+    """Return the value of a syntax tree of arithmetic in k. Raises ValueError for any other tree."""
     match node:
         case ast.BinOp(left, operation, right) if type(operation) in _BINARY:
             return _BINARY[type(operation)](_value(left, k), _value(right, k))

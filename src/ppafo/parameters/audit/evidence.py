@@ -1,4 +1,4 @@
-"""Audit finding with its compared numbers, and parameter set as the checks read it."""
+"""Audit finding with its compared numbers, and access of the checks to a parameter set."""
 
 import contextlib
 import math
@@ -25,7 +25,7 @@ Severity = Literal["error", "warning", "note"]
 
 @dataclass(frozen=True, slots=True)
 class NamedValue:
-    """Value of the set on which a finding rests, in the unit given by the set."""
+    """Value of a parameter set that a finding refers to, in the unit of the set."""
 
     path: str
     value: float | str
@@ -35,7 +35,7 @@ class NamedValue:
 
 @dataclass(frozen=True, slots=True)
 class ComparedNumber:
-    """Operand of a comparison, in SI units, pressures absolute."""
+    """Number compared in a finding, in SI units, pressures absolute."""
 
     label: str
     value: float
@@ -69,42 +69,42 @@ class AuditFinding:
 GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 
 _SMALLEST, _LARGEST = 1e-20, 1e20
-"""Limits of SI magnitudes: numbers beyond are typing errors, and their products would overflow."""
+"""Limits of plausible SI magnitudes; products of larger numbers would overflow."""
 
 
 class ReportedRange(NamedTuple):
-    """Interval of the numbers that round to a reported number; SI, positive."""
+    """Interval of the positive numbers [SI] that round to a reported number."""
 
     low: float
     high: float
 
     def times(self, other: "ReportedRange") -> "ReportedRange":
-        """Return the interval of the product of this number and another."""
+        """Return the interval of the product of two reported numbers."""
         return ReportedRange(self.low * other.low, self.high * other.high)
 
     def over(self, other: "ReportedRange") -> "ReportedRange":
-        """Return the interval of this number divided by another."""
+        """Return the interval of the quotient of two reported numbers."""
         return ReportedRange(self.low / other.high, self.high / other.low)
 
     def meets(self, other: "ReportedRange") -> bool:
-        """Return True if the two intervals overlap."""
+        """Return True if two intervals overlap."""
         return self.low <= other.high and other.low <= self.high
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Parameter set as read by the checks of an audit."""
+    """Parameter set and declarations, as read by the checks of an audit."""
 
     parameter_set: ParameterSet
     declared: Mapping[str, Quantity]
 
     def number(self, path: str) -> float | None:
-        """Return the value at a path in SI; None if the set lacks it or its magnitude is not within 1e-20 to 1e20."""
+        """Return the value of a parameter [SI]; None if absent or with a magnitude outside 1e-20 to 1e20."""
         value = number_in_si(self.parameter_set, path)
         return value if value is None or value == 0.0 or _SMALLEST < abs(value) < _LARGEST else None
 
     def numbers(self, *paths: str) -> tuple[float, ...] | None:
-        """Return the values at all paths in SI; None if any is missing."""
+        """Return the values of all parameters [SI]; None if any is missing."""
         values = [self.number(path) for path in paths]
         present = tuple(value for value in values if value is not None)
         return present if len(present) == len(paths) else None
@@ -115,7 +115,7 @@ class Evidence:
         return None if entry is None else entry.value
 
     def magnitude(self, path: str) -> ReportedRange | None:
-        """Return the interval [SI] of the magnitude at a path: its stated uncertainty, else its rounding."""
+        """Return the interval of the magnitude of a parameter [SI]: its stated uncertainty, else its rounding."""
         value, entry = self.number(path), self.parameter_set.numbers.get(path)
         if value is None or entry is None or entry.value == 0.0:
             return None
@@ -125,7 +125,7 @@ class Evidence:
         return ReportedRange(abs(value) * (1.0 - relative), abs(value) * (1.0 + relative))
 
     def in_set_unit(self, path: str, value: float) -> str:
-        """Return an SI value in the unit in which the set gives the quantity at a path, for example ``84 g m^2``."""
+        """Format an SI value in the unit of a parameter in the set, for example ``84 g m^2``."""
         entry, quantity = self.parameter_set.numbers.get(path), self.declared[path]
         if entry is not None:
             for unit in alternatives(quantity):
@@ -135,14 +135,14 @@ class Evidence:
         return f"{value:.4g} {quantity.unit.removesuffix('_a')}".rstrip()
 
     def torque(self, value: float, form: str = ".3g") -> str:
-        """Return a torque [N m] as text in the unit in which the set writes torques, for example ``550 N cm``."""
+        """Format a torque [N m] in the torque unit of the set, for example ``550 N cm``."""
         with shown_in(self.parameter_set.shown):
             number, unit = f"{shown_value(value, 'N m'):{form}}", shown_unit("N m")
         # A form that keeps zeros makes "550." of 550.
         return f"{number.removesuffix('.')} {unit}"
 
     def values_of(self, *paths: str) -> tuple[NamedValue, ...]:
-        """Return the values at the given paths, as stated in the set; paths without a value are omitted."""
+        """Return the values of parameters, as stated in the set; missing values are omitted."""
         numbers, texts = self.parameter_set.numbers, self.parameter_set.texts
         values = [NamedValue(p, numbers[p].value, numbers[p].unit, numbers[p].origin) for p in paths if p in numbers]
         return (*values, *(NamedValue(p, texts[p].value, "", texts[p].origin) for p in paths if p in texts))
@@ -159,7 +159,7 @@ class Evidence:
         return self.number(ATMOSPHERE_PATH) or STANDARD_ATMOSPHERE
 
     def angle_range(self) -> tuple[str, float, str, float] | None:
-        """Return path and value [rad] of the smallest and the largest angle in use: reported ones, else the stops."""
+        """Return path and value [rad] of the smallest and the largest angle in use, from reports or else the stops."""
         numbers = self.parameter_set.numbers
         low_path, high_path = (
             reported if reported in numbers else stop
@@ -172,12 +172,12 @@ class Evidence:
         return None if ends is None else (low_path, ends[0], high_path, ends[1])
 
     def single_fill_gas(self) -> str | None:
-        """Return the path of the first gas use of a single filling that the set reports."""
+        """Return the path of the first reported gas use of a single filling."""
         paths = (f"reported.valves.{name}.single_fill_gas" for name in self.parameter_set.valve_kinds)
         return next((path for path in paths if self.number(path)), None)
 
     def chamber_1_volume(self, angle: float) -> float | None:
-        """Return the volume of chamber 1 [m^3] at an angle [rad]; a dead volume missing in the set counts as 0."""
+        """Return the volume of chamber 1 [m^3] at an angle [rad]; a missing dead volume counts as 0."""
         values = self.numbers("actuator.displacement_per_radian", "actuator.angle_min")
         dead_volume = self.number("actuator.dead_volume_1") or 0.0
         return None if values is None else chamber_1_volume(angle, values[1], values[0], dead_volume)

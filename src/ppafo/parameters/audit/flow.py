@@ -84,7 +84,7 @@ def _flow(evidence: Evidence, name: str) -> _ValveFlow | None:
 
 
 def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> Iterator[AuditFinding]:
-    """Compare the first valve with every other of the same Cd: their flows must then be in the ratio of the areas."""
+    """Yield an error if two valves of equal Cd have reported flows that are not in the ratio of their areas."""
     for other in flows[1:]:
         first = flows[0]
         area_ratio = first.area / other.area

@@ -1,7 +1,4 @@
-"""Checks of damping and dynamic friction against the inertia and the reported ratios they were computed from.
-
-Equations (1) and (10).
-"""
+"""Checks of damping and dynamic friction against inertia and reported decay ratios. Equations (1) and (10)."""
 
 from collections.abc import Iterator
 
@@ -16,11 +13,11 @@ _DECAY = "reported.acceleration_over_velocity"
 _DECAY_INVERSE = "reported.velocity_over_acceleration"
 _DECELERATION = "reported.stopping_deceleration"
 _SHIFTS = (-3, -2, -1, 1, 2, 3)
-"""Powers of ten by which a slipped decimal point or a prefix changes a number."""
+"""Powers of ten of a misplaced decimal point or a wrong prefix."""
 
 
 def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each product that does not hold, and a note on a single inertia for which both would hold."""
+    """Yield errors for damping or friction contradicting inertia times decay rate, and a note on a fitting inertia."""
     inertia = evidence.magnitude(_INERTIA)
     decay_path, decay = _decay_rate(evidence)
     if inertia is None:
@@ -80,7 +77,7 @@ def _middle(interval: ReportedRange) -> float:
 def _one_inertia(
     evidence: Evidence, damping: ReportedRange, friction: ReportedRange, decay_path: str
 ) -> Iterator[AuditFinding]:
-    """Search an inertia that fits both products within their digits, first the reported one with a shifted point."""
+    """Yield a note on an inertia that fits both products, preferably the reported one with its decimal point moved."""
     if not damping.meets(friction):
         return
     common = ReportedRange(max(damping.low, friction.low), min(damping.high, friction.high))

@@ -27,11 +27,11 @@ _TUBES = {
 }
 """Standard inner diameters [m] of tubes and ports."""
 _SAME_BORE = 0.005
-"""Relative difference of an area and a bore that is due to rounding to three digits."""
+"""Relative difference of an area and a bore [-] due to rounding to three digits."""
 
 
 def check_orifices(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for an orifice in two forms, and a note on each valve's flow with the gas of the set."""
+    """Yield an error for an orifice in two forms, and a note on the flow of each valve with the gas of the set."""
     valves = {name: f"valves.{name}" for name in evidence.parameter_set.valve_kinds}
     for section in ("actuator.leak", *valves.values()):
         names = both_forms(evidence.parameter_set, section)

@@ -1,4 +1,4 @@
-"""Checks of the torques of an actuator: largest one at the supply, vacuum, published torques. Equation (2)."""
+"""Checks of actuator torques: largest torque at the supply, vacuum, published torques. Equation (2)."""
 
 import math
 from collections.abc import Iterator
@@ -18,17 +18,17 @@ _DEMAND = "reported.demanded_torque"
 _STATIC = "friction.static_torque"
 _SUPPLIES = ("supply.pressure", "supply.dorsiflexion_pressure", "reported.other_supply_pressure")
 _TOLERANCE = 0.1
-"""Relative tolerance of a torque published with one or two digits."""
+"""Relative tolerance [-] of a torque published with one or two digits."""
 _REACHED = 0.9
-"""Fraction of the torque that defines the filling time; the final value is approached asymptotically."""
+"""Fraction of the final torque [-] that defines the filling time, since the approach is asymptotic."""
 _PUSH_OFF = 0.2
 """Time [s] of push-off: from 42 to 61 % of the built-in gait's stride of 1.04 s."""
 _TOE_OFF = math.radians(110.0)
 """Angle [rad] of the vane at toe-off: 20 deg of plantarflexion."""
 _INTERVALS = 200
-"""Number of pressure intervals in which a filling time is summed up."""
+"""Number of pressure intervals in the integration of a filling time."""
 _ANGLES = 40
-"""Number of intervals between the stops in which the torque of an actuator is evaluated."""
+"""Number of angle intervals between the stops for an actuator's torque."""
 _LIMIT = "A reference above that cannot be followed by any valve or controller."
 
 
@@ -84,7 +84,7 @@ def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield the ceiling of an actuator whose torque depends on the angle: its maximum and minimum between the stops."""
+    """Yield the torque ceiling of an actuator with angle-dependent torque: maximum and minimum between the stops."""
     from ppafo.parameters.building import build_device
 
     try:
@@ -138,9 +138,9 @@ def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Sever
 
 
 def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a comparison of each published torque with the torque at supply pressure, and of the fill time in walking.
+    """Yield findings on published torques: comparison with the torque at supply pressure, filling time in walking.
 
-    Agreement gives a note, disagreement a warning. Yields nothing without published torques.
+    Agreement gives a note, disagreement a warning.
     """
     for name in ("rated", "walking"):
         paths = f"reported.{name}_torque", f"reported.{name}_torque_pressure"

@@ -1,4 +1,4 @@
-"""Checks of the values of a set: dimensions, ranges, data of the named gas, and error of the ideal gas law."""
+"""Checks of the values of a parameter set: dimensions, ranges, data of the named gas, ideal-gas error."""
 
 import contextlib
 import math
@@ -20,7 +20,7 @@ from ppafo.wording import count_of
 
 
 def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each value whose key names no published number, or a number of another value."""
+    """Yield an error for each value whose key names no published number, or a different published number."""
     for path, entry in evidence.parameter_set.numbers.items():
         name, _, identifier = entry.key.partition("/")
         if not entry.key:
@@ -44,7 +44,7 @@ def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
-    """Return number and unit of each statement of a publication, keyed by id, or ``ID.ARGUMENT`` for an argument."""
+    """Return number and unit of each statement of a publication, by id, or by ``ID.ARGUMENT`` for an argument."""
     numbers = {}
     for claim in read_publication(name)[0].claims:
         if claim.published is not None:
@@ -62,7 +62,7 @@ def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
 
 
 def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a warning with the values missing for a device, unless the set names another set that completes it."""
+    """Yield a warning on values that a device lacks, unless the set names a completed set."""
     parameter_set = evidence.parameter_set
     if parameter_set.completed_by:
         return
@@ -91,7 +91,7 @@ def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def check_contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield an error for each contradiction between values for which a run refuses the device."""
+    """Yield an error for each contradiction between values that prevents a run."""
     parameter_set, found = evidence.parameter_set, dict[str, tuple[str, ...]]()
     for valve in parameter_set.valve_kinds:
         # A value that is missing or wrong by itself has a finding of its own.
@@ -113,7 +113,7 @@ def check_contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
 
 
 def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield one finding for values of a wrong dimension, and one for each value in the unit of its inverse."""
+    """Yield a finding on values of a wrong dimension, and a finding on each value in the unit of its inverse."""
     foreign = []
     for path, entry in evidence.parameter_set.numbers.items():
         quantity = evidence.declared[path]
@@ -245,7 +245,7 @@ _SUPPLY = "supply.pressure"
 
 
 def check_ideal_gas(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a note on the error of the ideal gas law at supply pressure, a warning if the error exceeds 5 %."""
+    """Yield a note on the ideal gas law error at supply pressure, a warning above 5 %."""
     gas, pressure = evidence.gas(), evidence.number(_SUPPLY)
     virial = SECOND_VIRIAL.get(evidence.text("gas.species") or "")
     if gas is None or pressure is None or virial is None:

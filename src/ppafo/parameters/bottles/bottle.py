@@ -42,17 +42,17 @@ FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") 
 
 _SURFACES = ("bottle.content_heat_transfer", "bottle.room_heat_transfer")
 _WALL = 885.0
-"""Heat capacity of the paper's bottle divided by its mass [J/(kg K)]: 400 J/K and 452 g."""
+"""Wall heat capacity of the paper's bottle per mass [J/(kg K)]: 400 J/K and 452 g."""
 
 
 @functools.cache
 def bottle_parts() -> Mapping[str, Part]:
-    """Return the bottles of the bundled catalogue, by name."""
+    """Return the bottles of the bundled catalogue of parts, by name."""
     return load_catalogue().groups["bottles"]
 
 
 def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
-    """Return the values of a bottle scaled from the ``paper``'s to the gas mass [kg] and empty mass [kg] of a part."""
+    """Return the paper's bottle values scaled to the gas mass [kg] and empty mass [kg] of a catalogue part."""
     content, empty_mass = part.values["content"], part.values["empty_mass"]
     # At the same filling density the volume is proportional to the content.
     ratio = 1000.0 * content / paper["bottle.gas_mass"].value
@@ -97,13 +97,13 @@ class Bottle:
 
     @property
     def label(self) -> str:
-        """Name for sentences and titles of figures, with a remark if overrides changed values."""
+        """Name of the bottle for sentences and titles, with a remark if overrides changed values."""
         is_changed = any(entry.source == SOURCE for entry in self.entries.values())
         return f"{self.name} (values changed)" if is_changed else self.name
 
     @property
     def supply(self) -> ColdSupply:
-        """Bottle, regulator and hose as parameters of the model."""
+        """Bottle, regulator and hose as parameters of the gas supply model."""
         return ColdSupply(
             volume=self.volume,
             wall=self.wall,
@@ -117,7 +117,7 @@ class Bottle:
 
 
 def is_of_catalogue(name_or_path: str | Path) -> bool:
-    """Tell whether a name has the form ``CATALOGUE.toml/PART`` of a part in a catalogue file."""
+    """Return whether a name has the form ``CATALOGUE.toml/PART`` of a part in a catalogue file."""
     return Path(name_or_path).parent.suffix == ".toml"
 
 
@@ -181,14 +181,14 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
 
 
 def _entries_of(parsed: Any) -> dict[str, Entry]:
-    """Return the numbers of a bottle file that are given, by dotted path."""
+    """Return the numbers given in a bottle file, by dotted path."""
     sections = {section: getattr(parsed, section) for section in SECTIONS}
     entries = {path: getattr(sections[path.partition(".")[0]], path.partition(".")[2], None) for path in PATHS}
     return {path: entry for path, entry in entries.items() if entry is not None}
 
 
 def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
-    """Return the bottle with the given values; ParameterError for missing or impossible ones."""
+    """Build a bottle from its values. Raises ParameterError for missing or impossible values."""
     with refused_as(ParameterError, f"{file}: gas = '{parsed.gas.value}'", ParameterError):
         fluid = load_fluid(parsed.gas.value)
     values = {}

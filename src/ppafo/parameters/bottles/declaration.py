@@ -1,4 +1,4 @@
-"""Declarations of the numbers of a bottle file, with their ranges, and the layout of the file."""
+"""Declarations of the numbers of a bottle file with their ranges, and file layout."""
 
 import functools
 from typing import Any
@@ -25,7 +25,7 @@ FILL_BY_PRESSURE = (
     ),
 )
 FILLS: Forms = {"bottle": tuple(tuple(quantity.name for quantity in form) for form in (FILL_BY_MASS, FILL_BY_PRESSURE))}
-"""Alternative forms of the filling of a bottle: by mass, or by pressure and temperature."""
+"""Alternative forms of a bottle filling: by mass, or by pressure and temperature."""
 REGULATOR = (
     Quantity("set_pressure", "Pa_a", "outlet pressure of the regulator without flow", minimum=1e5, maximum=2e7),
     Quantity("droop", "Pa s/kg", "drop of the outlet pressure per mass flow", minimum=0.0, maximum=1e9),
@@ -85,15 +85,15 @@ REQUIRED = tuple(
     for section, members in (("bottle", BOTTLE), ("regulator", REGULATOR), ("room", ROOM))
     for quantity in members
 )
-"""Numbers without a default, except those of the filling, which has two forms."""
+"""Paths of numbers without a default, without the filling, which has two forms."""
 
 WARMING = (*(f"regulator.{quantity.name}" for quantity in BODY), *(f"hose.{quantity.name}" for quantity in HOSE))
-"""Values for the warming of the gas in regulator and hose; by default those of the paper's bottle."""
+"""Paths of values for the warming of the gas in regulator and hose; defaults from the paper's bottle."""
 
 
 @functools.cache
 def bottle_file() -> type[BaseModel]:
-    """Return the model of a bottle file."""
+    """Return the validation model of a bottle file."""
     fields: dict[str, Any] = {
         "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME)),

@@ -1,4 +1,4 @@
-"""Fluid of a bottle: table of properties by name, and mass of a filling given by pressure and temperature.
+"""Fluid of a bottle: property table by name, and gas mass from fill pressure and temperature.
 
 The tables are made from CoolProp.
 """
@@ -20,12 +20,12 @@ from ppafo.wording import nearest_name, said_missing
 _TABLES = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"
 _LARGEST_FILLING = {"CO2": 680.0}
-"""Largest filling [kg/m^3] of a bottle of liquid that transport rules allow (49 CFR 173.304a, 68 % of its water)."""
+"""Largest filling density of a liquefied gas [kg/m^3] by transport rules (49 CFR 173.304a, 68 % of the water mass)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fluid:
-    """Fluid: name, table of properties, and source of the numbers."""
+    """Fluid: name, property table, and source of the numbers."""
 
     name: str
     table: FluidTable
@@ -39,7 +39,7 @@ def list_fluids() -> tuple[str, ...]:
 
 @functools.cache
 def load_fluid(name: str) -> Fluid:
-    """Return a fluid by name; ParameterError if it has no property table."""
+    """Load a fluid by name. Raises ParameterError if it has no property table."""
     available = list_fluids()
     if name not in available:
         raise ParameterError(
@@ -70,7 +70,7 @@ def check_temperature(path: str, temperature: float, fluid: Fluid, file: str) ->
 
 
 def filling_text(fluid: Fluid, mass: float | None = None, volume: float = 0.0) -> str:
-    """Return the gas mass for a volume [m^3], or the volume for a mass [kg], at the largest filling, for a message."""
+    """Format, for a message, the largest gas mass in a volume [m^3], or the smallest volume for a mass [kg]."""
     density = _LARGEST_FILLING.get(fluid.name)
     if density is None:
         return ""
@@ -81,7 +81,7 @@ def filling_text(fluid: Fluid, mass: float | None = None, volume: float = 0.0) -
 
 
 def filled_mass(values: Mapping[str, float], entries: Mapping[str, Entry], fluid: Fluid, file: str) -> float:
-    """Return the mass of gas [kg] in a full bottle, given directly or by pressure and temperature.
+    """Return the mass of gas in a full bottle [kg], stated directly or by pressure and temperature.
 
     ``values`` are numbers of a bottle in SI by path, ``entries`` the same as given. Raises ParameterError if none or
     both of the forms are given, or if pressure and temperature do not determine the mass.

@@ -1,4 +1,4 @@
-"""Commercial parts for a device: data-sheet figures, each with its origin, and unknown figures."""
+"""Commercial parts for a device: data-sheet figures with their origins."""
 
 from ppafo.parameters.parts.catalogue import Catalogue, Part, load_catalogue, rated_pressure
 

@@ -1,4 +1,4 @@
-"""Catalogue of parts: file layout, commercial parts with data-sheet figures, and loading."""
+"""Catalogue of commercial parts with data-sheet figures: file layout and loading."""
 
 import math
 from collections.abc import Mapping
@@ -46,7 +46,7 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     "processors": (MASS, POWER),
     "batteries": (MASS, ENERGY),
 }
-"""Data-sheet figures by group of parts; a valve has in addition the figures of its valve type."""
+"""Declared figures by group of parts; a valve also has the figures of its kind."""
 
 NEEDED: dict[str, tuple[str, ...]] = {
     "valves": ("mass",),
@@ -56,20 +56,20 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "processors": ("mass", "power"),
     "batteries": ("mass", "energy"),
 }
-"""Figures of a part required by a study; a valve also needs an orifice in one of its two forms.
+"""Figures of a part that a study requires; a valve also needs an orifice in one of two forms.
 
 By default the displacement of an actuator per radian is its torque constant, as in a parameter set.
 """
 
 
 def figures_of(group: str, kind: str) -> tuple[Quantity, ...]:
-    """Return the figures of a part of a group; ``kind`` is the kind of a valve, '' for other groups."""
+    """Return the declared figures of a group; ``kind`` is the kind of a valve, '' for other groups."""
     return VALVE + VALVES[kind].quantities if group == "valves" else GROUPS[group]
 
 
 Origin = Literal["published", "datasheet", "quoted", "measured", "derived", "assumed"]
 DOUBTFUL: tuple[Origin, ...] = ("quoted", "assumed")
-"""Origins to verify before buying a part: quoted from memory of a document, or assumed."""
+"""Origins that need verification before a part is bought: quoted from memory of a document, or assumed."""
 
 
 class Figure(StrictTable):
@@ -92,7 +92,7 @@ class Figure(StrictTable):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Part of the catalogue.
+    """Commercial part with its data-sheet figures.
 
     ``kind`` is the kind of a valve, else ''. ``figures`` are as written and ``values`` in SI units (pressures
     absolute), by name. ``unknown`` lists figures for which no source states a value.
@@ -111,23 +111,23 @@ class Part:
 
     @property
     def title(self) -> str:
-        """Maker and model."""
+        """Maker and model of the part."""
         return f"{self.maker} {self.model}"
 
     @property
     def doubtful(self) -> tuple[str, ...]:
-        """Names of the figures of origin quoted or assumed."""
+        """Names of the figures with origin quoted or assumed."""
         return tuple(name for name, figure in self.figures.items() if figure.origin in DOUBTFUL)
 
     @property
     def full_mass(self) -> float:
-        """Mass [kg] of the part in use; for a bottle including its gas."""
+        """Mass of the part in use [kg]; for a bottle with its gas."""
         # Only a bottle has no mass of its own: it is empty mass and content.
         return self.values["mass"] if "mass" in self.values else self.values["empty_mass"] + self.values["content"]
 
     @property
     def model_numbers(self) -> dict[str, float]:
-        """Numbers of a valve by path, in SI; a number not stated by its maker has the ideal default."""
+        """Numbers of a valve part by path [SI]; missing figures have the default of an ideal valve."""
         # A figure that is not given is left at the model's default, which is the ideal valve.
         settings = {
             quantity.name: quantity.default for quantity in VALVES[self.kind].quantities if quantity.default is not None
@@ -138,7 +138,7 @@ class Part:
 
 
 def rated_pressure(*parts: Part) -> float:
-    """Return the lowest of the rated pressures [Pa absolute] of some parts; infinity if no part states one.
+    """Return the lowest rated pressure of parts [Pa absolute]; infinity if no part states it.
 
     A part without a rated pressure sets no limit.
     """
@@ -213,7 +213,7 @@ _NEEDS_A_REASON = ("derived", "assumed")
 
 @dataclass(frozen=True, slots=True)
 class Catalogue:
-    """Parts by group and name; ``file`` is the label used in messages."""
+    """Catalogue of parts by group and name; ``file`` is the label in messages."""
 
     file: str
     name: str
@@ -241,7 +241,7 @@ class Catalogue:
 
 @checked
 def load_catalogue(catalogue: str | Path = DEFAULT) -> Catalogue:
-    """Return a catalogue of parts by its name in the package or by the path of a TOML file.
+    """Load a catalogue of parts, by bundled name or path of a TOML file.
 
     >>> import ppafo
     >>> [part.name for part in ppafo.load_catalogue().parts if part.kind == "solenoid"]

@@ -1,1 +1,1 @@
-"""Published statements on this device and similar ones, one file each, that a simulation can test."""
+"""Publications on this device and similar ones: files of statements that a simulation can test."""

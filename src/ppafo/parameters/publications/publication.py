@@ -1,4 +1,4 @@
-"""File of a publication: every number and sentence that a simulation could contradict, with its degree of commitment.
+"""File of a publication: numbers and sentences that a simulation can contradict.
 
 Statements of the publication (``published``, ``words``) are kept apart from arithmetic on them (``own``). Claims,
 observations and the audit read the file of the paper on which this package is based.
@@ -26,7 +26,7 @@ _IDENTIFIER = r"^[a-z][a-z0-9_]*$"
 
 
 class ClaimEntry(StrictTable):
-    """Statement in the file of a publication."""
+    """Statement of a publication, with the computation and limits that test it."""
 
     id: str = Field(pattern=_IDENTIFIER, description="name of the statement, unique in the file")
     statement: Text = Field(description="statement, in one sentence")
@@ -51,7 +51,7 @@ class ClaimEntry(StrictTable):
 
 
 class PublicationFile(StrictTable):
-    """Layout of the file of a publication."""
+    """Layout of a publication file."""
 
     schema_version: SchemaVersion
     name: str = Field(pattern=NAME)
@@ -66,7 +66,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
-    """Return a publication by name or file, and the label of the file for messages; ScenarioError if it is invalid."""
+    """Read a publication by name or file; also return the file label. Raises ScenarioError if invalid."""
     read, file = read_model(FILE, PublicationFile, name_or_path)
     twice = first_twice(entry.id for entry in read.claims)
     if twice is not None:

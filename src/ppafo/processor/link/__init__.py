@@ -1,4 +1,4 @@
-"""Integer controller of a scenario in C with the protocol of ``ppafo hil``: the controller side of the link."""
+"""Integer controller in C for the protocol of ``ppafo hil``: controller side of the link."""
 
 import shlex
 
@@ -14,7 +14,7 @@ _TEMPLATES = ("Makefile", "README.md", "host.c", "link.c", "link.h", "plant.h")
 
 
 def example_controller(scenario: Scenario) -> dict[str, bytes]:
-    """Files of a controller for the link, by name. Raises ScenarioError if it has no integer form."""
+    """Return the files of a linked controller by name. Raises ScenarioError without an integer form."""
     fixed = fixed_point_controller(scenario)
     of_firmware = firmware(scenario)
     period = round(scenario.controller.period * MICROSECONDS)

@@ -1,1 +1,1 @@
-"""Torque laws in integer arithmetic for a small processor: on/off control, dead zone, and PID."""
+"""Torque laws in integer arithmetic: on/off control, dead zone, and PID."""

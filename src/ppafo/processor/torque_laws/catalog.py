@@ -1,4 +1,4 @@
-"""Integer controllers by their names in scenarios. To add one: a module in this folder, and one entry."""
+"""Catalogue of integer controllers by name in scenarios."""
 
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.processor.torque_laws.on_off import DEAD_ZONE, ON_OFF

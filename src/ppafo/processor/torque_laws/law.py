@@ -1,4 +1,4 @@
-"""Declaration of an integer controller and its numbers, in addition to its entry in the catalogue of controllers."""
+"""Declaration of an integer controller: law, numbers, and entry in the catalogue of controllers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -13,15 +13,15 @@ from ppafo.model.declaration import Quantity
 from ppafo.processor.fixed_point import SETTINGS, ConverterCounts, converter_of
 
 Sample = Callable[[Any, Any, ConverterCounts], tuple[int, Any]]
-"""Function from numbers, state and readings to a command in steps, -1000 to 1000, and the next state; integers only."""
+"""Law as a function of numbers, state and readings: command [steps], -1000 to 1000, and next state."""
 Settings = Mapping[str, float]
 _ROUNDING = 1.0e-9
-"""Torque [N m] by which a reference may exceed the converter range, for rounding."""
+"""Rounding tolerance of a reference at the end of the converter range [N m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class FixedLaw:
-    """Integer form of a controller in the catalogue.
+    """Integer form of a controller of the catalogue.
 
     ``kind`` is the form for the engine: its update reads the converter, calls ``sample``, which is the law itself, and
     returns the command as a number from -1 to 1. ``numbers`` is the NamedTuple class of the parameters of ``sample``;
@@ -40,7 +40,7 @@ class FixedLaw:
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """Conversion of controller settings to the integers of a law, callable like ``ControllerKind.plan``.
+    """Conversion of controller settings to the integers of a law, callable as ``ControllerKind.plan``.
 
     ``prepare(settings, period, torque_step)`` computes the numbers after the converter's, for one run; ``quantities``
     declare all numbers in order. ``largest`` returns the largest ratio of a number to the limit of its range, above 1
@@ -55,7 +55,7 @@ class Numbers:
     def __call__(
         self, settings: Mapping[str, Any], period: Any, torque_constant: Any, reference: tuple[Any, Any]
     ) -> tuple[dict[str, Any], tuple[Problem, ...]]:
-        """Return the integers of a law by name, and the problems of settings that cannot be represented."""
+        """Return the integers of a law by name, and problems of settings that cannot be represented."""
         bits, pressure_range = (settings[quantity.name] for quantity in SETTINGS)
         steps, limits = over_runs(converter_of, bits, pressure_range, torque_constant)
         names = tuple(settings)
@@ -102,7 +102,7 @@ def fixed_point_kind(
     update: Callable[[Any, Any, float, Any, float], tuple[float, Any]],
     plan: Numbers,
 ) -> ControllerKind:
-    """Integer form of a law as a controller in the catalogue, with the settings of the law and of the converter."""
+    """Return the catalogue entry of a law's integer form, with settings of law and converter."""
     return replace(
         floats,
         name=plan.name,

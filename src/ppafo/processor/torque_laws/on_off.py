@@ -27,26 +27,26 @@ from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
 
 
 class _OnOffNumbers(NamedTuple):
-    """Parameters of on/off control: limits of the readings."""
+    """Numbers of the on/off law: limits of the readings."""
 
     limits: ConverterLimits
 
 
 class _OnOffCounts(NamedTuple):
-    """State of on/off control: 1 while all readings have been valid."""
+    """State of the on/off law: 1 while all readings were valid."""
 
     sound: int
 
 
 class _OnOffRows(NamedTuple):
-    """Steps of the converter, and parameters of ``on_off_sample``."""
+    """Parameter row of the on/off law: converter resolution, and numbers of ``on_off_sample``."""
 
     steps: CountResolution
     numbers: _OnOffNumbers
 
 
 def on_off_sample(numbers: _OnOffNumbers, state: _OnOffCounts, readings: ConverterCounts) -> tuple[int, _OnOffCounts]:
-    """Command in steps: 1000 for an error of 0 or more, else -1000; permanently 0 after a reading out of range."""
+    """Return the command [steps]: 1000 for an error of 0 or more, else -1000; 0 for good after a bad reading."""
     sound = still_sound(state.sound, readings, numbers.limits)
     command = COMMAND_STEPS if error_of(readings, numbers.limits) >= 0 else -COMMAND_STEPS
     return (command if sound == 1 else 0), _OnOffCounts(sound)
@@ -55,7 +55,7 @@ def on_off_sample(numbers: _OnOffNumbers, state: _OnOffCounts, readings: Convert
 def on_off_update(
     parameters: _OnOffRows, state: _OnOffCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, _OnOffCounts]:
-    """Command from -1 to 1 by ``on_off_sample`` for the converter readings."""
+    """Return the command from -1 to 1 of ``on_off_sample`` for converter readings."""
     readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = on_off_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
@@ -79,7 +79,7 @@ ON_OFF = FixedLaw(
 
 
 class _DeadZoneNumbers(NamedTuple):
-    """Limits of the readings; errors at which the valve opens and closes again [counts]; opening [steps]."""
+    """Numbers of the dead-zone law: reading limits, opening and closing errors [counts], opening [steps]."""
 
     limits: ConverterLimits
     dead_zone: int
@@ -88,14 +88,14 @@ class _DeadZoneNumbers(NamedTuple):
 
 
 class _DeadZoneCounts(NamedTuple):
-    """Direction of the opening: 1, 0 (closed) or -1; and 1 while all readings have been valid."""
+    """State of the dead-zone law: opening direction 1, 0 (closed) or -1, and 1 while all readings were valid."""
 
     direction: int
     sound: int
 
 
 class _DeadZoneRows(NamedTuple):
-    """Steps of the converter, and parameters of ``dead_zone_sample``."""
+    """Parameter row of the dead-zone law: converter resolution, and numbers of ``dead_zone_sample``."""
 
     steps: CountResolution
     numbers: _DeadZoneNumbers
@@ -104,7 +104,7 @@ class _DeadZoneRows(NamedTuple):
 def dead_zone_sample(
     numbers: _DeadZoneNumbers, state: _DeadZoneCounts, readings: ConverterCounts
 ) -> tuple[int, _DeadZoneCounts]:
-    """Command in steps: opening in the direction of an error beyond the dead zone; 0 for good after a bad reading."""
+    """Return the command [steps]: opening towards an error beyond the dead zone; 0 for good after a bad reading."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)
     # Hysteresis: the valve closes at the release, nearer to the reference than where it opens.
@@ -118,14 +118,14 @@ def dead_zone_sample(
 def dead_zone_update(
     parameters: _DeadZoneRows, state: _DeadZoneCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, _DeadZoneCounts]:
-    """Command from -1 to 1 by ``dead_zone_sample`` for the converter readings."""
+    """Return the command from -1 to 1 of ``dead_zone_sample`` for converter readings."""
     readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = dead_zone_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
 
 
 def prepare_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
-    """Numbers of ``_DeadZoneNumbers`` after the limits, for settings in SI units and a torque per count [N m]."""
+    """Return the numbers of ``_DeadZoneNumbers`` after the limits, from settings [SI] and torque per count [N m]."""
     # A release beyond the dead zone would close the valve before it opens.
     zone, release = settings["dead_zone"], min(settings["release"], settings["dead_zone"])
     counts = [float(min(LARGEST_READING, int(torque / torque_step + 0.5))) for torque in (zone, release)]
@@ -133,7 +133,7 @@ def prepare_dead_zone(settings: Mapping[str, float], period: float, torque_step:
 
 
 def largest_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> float:
-    """Dead zone divided by the largest value of its number [-]."""
+    """Return the dead zone relative to the largest representable value [-]."""
     return settings["dead_zone"] / torque_step / LARGEST_READING
 
 

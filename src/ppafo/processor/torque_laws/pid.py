@@ -36,29 +36,29 @@ from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
 
 PART_BITS = 6
 HALF_STEP = 2 ** (PART_BITS - 1)
-"""Half a step of the command, in units of the summation (1/64 step)."""
+"""Half a command step, in summation units of 1/64 step."""
 FULL = COMMAND_STEPS * 2**PART_BITS
-"""Command of 1 during summation, in units of 1/64 step."""
+"""Full command in summation units of 1/64 step."""
 FINE_BITS = 8
 FINE = 2**FINE_BITS
-"""Number of integral units in 1/64 step."""
+"""Number of integral units per summation unit of 1/64 step."""
 WIDE = 2**FRACTION_BITS
-"""Scale factor of the error, so that ``fraction_of`` keeps all bits of its product with a gain."""
+"""Scale factor of the error for ``fraction_of``, which keeps all bits of the product with a gain."""
 SLOPE_UNIT = 65536
 """Number of slope units per count."""
 LARGEST_CHANGE = 8191
-"""Largest change of the error [counts]: 8191 * 65536 is below 2^30, the largest argument of ``fraction_of``."""
+"""Largest change of the error per sample [counts], so that its slope is below 2^30."""
 LARGEST_SLOPE = LARGEST_CHANGE * SLOPE_UNIT
 LARGEST_EXCESS = 32 * FULL
-"""Largest anti-windup correction, in units of 1/64 step; in integral units it is below 2^30."""
+"""Largest anti-windup correction, in summation units of 1/64 step; below 2^30 in integral units."""
 LARGEST_INTEGRAL = 32 * FULL * FINE
-"""Largest integral, in integral units: below 2^30."""
+"""Largest integral in integral units, below 2^30."""
 SHARE = float(2**FRACTION_BITS)
-"""Integer value of a fraction of 1."""
+"""Integer that represents a fraction of 1."""
 
 
 class _PidNumbers(NamedTuple):
-    """Limits of the readings, gains as 15-bit fractions and shifts; filter, anti-windup and dead band in 1/2^15."""
+    """Numbers of the PID law: reading limits, gains as fractions and shifts, other fractions in 1/2^15."""
 
     limits: ConverterLimits
     proportional: int
@@ -73,7 +73,7 @@ class _PidNumbers(NamedTuple):
 
 
 class _PidCounts(NamedTuple):
-    """Integral [integral units], error [counts], slope [1/65536 counts], 1 once started, 1 while readings are valid."""
+    """State of the PID law: integral, error [counts], slope [1/65536 counts], start flag, validity flag."""
 
     integral: int
     error: int
@@ -83,14 +83,14 @@ class _PidCounts(NamedTuple):
 
 
 class _PidRows(NamedTuple):
-    """Steps of the converter, and parameters of ``pid_sample``."""
+    """Parameter row of the PID law: converter resolution, and numbers of ``pid_sample``."""
 
     steps: CountResolution
     numbers: _PidNumbers
 
 
 def pid_sample(numbers: _PidNumbers, state: _PidCounts, readings: ConverterCounts) -> tuple[int, _PidCounts]:
-    """Command in steps from -1000 to 1000 for a sample; permanently 0 after a reading at an end of its range."""
+    """Return the command [steps], -1000 to 1000, for a sample; 0 for good after a reading at an end of its range."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)
     # Without a last error there is no change: no derivative kick at the first sample.
@@ -120,7 +120,7 @@ def pid_sample(numbers: _PidNumbers, state: _PidCounts, readings: ConverterCount
 def pid_update(
     parameters: _PidRows, state: _PidCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, _PidCounts]:
-    """Command from -1 to 1 by ``pid_sample`` for the converter readings, once every ``period`` [s]."""
+    """Return the command from -1 to 1 of ``pid_sample`` for converter readings, every ``period`` [s]."""
     readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = pid_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
@@ -129,7 +129,7 @@ def pid_update(
 def pid_factors(
     settings: Mapping[str, float], period: float, torque_step: float
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Gains and fractions of the law for settings in SI units, a sample period [s] and a torque per count [N m].
+    """Return gains and fractions of the PID law, from settings [SI], period [s] and torque per count [N m].
 
     The gains are represented by a fraction and a shift: of the error, in 1/64 step per count; of its integral, in
     integral units; of the slope, in 1/64 step per 1/65536 count per sample, times 2^15. The fractions [-] are: of a
@@ -149,14 +149,14 @@ def pid_factors(
 
 
 def prepare_pid(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
-    """Numbers of ``_PidNumbers`` after the limits, for settings in SI units, period [s] and torque per count [N m]."""
+    """Return the numbers of ``_PidNumbers`` after the limits, from settings [SI], period [s], torque per count."""
     gains, shares = pid_factors(settings, period, torque_step)
     scaled = (number for gain in gains for number in gain_of(gain))
     return (*scaled, *(float(min(LARGEST_FRACTION, int(share * SHARE + 0.5))) for share in shares))
 
 
 def largest_pid(settings: Mapping[str, float], period: float, torque_step: float) -> float:
-    """Largest ratio of a gain to the largest value of its number [-]; above 1 the settings are refused."""
+    """Return the largest gain relative to its largest representable value [-]; above 1 it is refused."""
     gains, (_, anti_windup, _) = pid_factors(settings, period, torque_step)
     return max(*gains, anti_windup * LARGEST_FRACTION) / LARGEST_FRACTION
 
@@ -178,7 +178,7 @@ _PID_NUMBERS = (
 )
 _PID_BEGINS = _PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
 _LARGEST_ERROR = 2 * LARGEST_READING
-"""Largest error in counts: reference from mid-range and pressure difference each span at most one range."""
+"""Largest error [counts]: reference and pressure difference each span one range."""
 PID_FIXED_POINT = fixed_point_kind(
     FLOAT_PID,
     _PidRows,

@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9", BLACK, GREY)
-"""Colours of the valves, in their order."""
+"""Colours of the curves of the valves, in the order of the valves."""
 _RING = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
-"""Ring around the suggested device."""
+"""Marker style of the ring around the suggested device."""
 PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
 _TORQUE = Kind("Torque", "N m", "torque", ".3g")
 _GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
 _MASS = Kind("Mass", "kg", "part mass")
 _MAXIMUM_OF_LIMIT = 4.0
-"""Top of the error axis divided by the error limit; larger errors are not resolved."""
+"""Upper end of the error axis divided by the error limit; larger errors are not plotted."""
 _DOTTED = {"marker": ".", "markersize": 4}
 _HEAD = (
     "valve",
@@ -139,12 +139,12 @@ class Sizing:
 
     @property
     def choice(self) -> SizedValve | None:
-        """Suggested valve; None if there is none."""
+        """Sizing result of the suggested valve; None without a suggestion."""
         return None if self.suggested is None else self.valves[self.suggested]
 
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
-        """Quoted or assumed figures of the parts on which the result rests."""
+        """Quoted or assumed figures of parts on which the sizing rests, as pairs of part and figure name."""
         parts = [sized.valve for sized in self.valves] + [
             sized.bottle for sized in self.valves if sized.bottle is not None
         ]
@@ -152,7 +152,7 @@ class Sizing:
         return tuple((part, name) for part in unique for name in part.doubtful)
 
     def json_document(self) -> dict[str, Any]:
-        """Return the valves and the suggestion as plain data in SI."""
+        """Return the sized valves and the suggestion as plain data in SI."""
         problem = self.problem
         return {
             "format": "ppafo sizing",

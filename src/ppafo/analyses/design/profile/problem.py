@@ -28,7 +28,7 @@ _TORQUE = "N m"
 _ROUNDING = 1.0e-9
 """Fraction of the range of a profile below which a difference counts as rounding."""
 _MOMENT = 1.0e-5
-"""Time [s] for the step from the end of a repetition to the start of the next, if their torques differ."""
+"""Duration [s] of the torque step between two repetitions if the end differs from the start."""
 
 
 class ProfileSection(StrictTable):
@@ -45,7 +45,7 @@ class ProfileSection(StrictTable):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RequiredTorque:
-    """Period of a torque profile.
+    """Torque profile of one repetition: samples as given, and the table of knots that a run follows.
 
     ``time``, ``torque``: samples as given, times [s] from 0 and torques [N m]
     ``kind``: origin of the samples: ``measured``, ``simulated``, ``synthetic`` or ``typed``
@@ -60,26 +60,26 @@ class RequiredTorque:
 
     @property
     def period(self) -> float:
-        """Length of a repetition [s]."""
+        """Duration of a repetition of the profile [s]."""
         return float(self.time[-1])
 
     @property
     def table_error(self) -> float:
-        """Largest difference between the table and the given samples [N m]."""
+        """Largest difference between the table of knots and the given samples [N m]."""
         return float(np.max(np.abs(self.at(self.time[:-1]) - self.torque[:-1])))
 
     @property
     def largest(self) -> float:
-        """Largest absolute torque of the table [N m]."""
+        """Largest absolute torque of the table of knots [N m]."""
         return float(np.max(np.abs(self.knot_values)))
 
     def at(self, time: Floats) -> Floats:
-        """Return the torque of the table [N m] at times [s] from 0 on."""
+        """Return the torque of the repeated table of knots [N m] at times [s] from 0 on."""
         times, values = np.append(self.knot_times, self.period), np.append(self.knot_values, self.knot_values[0])
         return np.asarray(np.interp(np.mod(time, self.period), times, values))
 
     def overrides(self) -> tuple[str, ...]:
-        """Return the overrides with which a scenario follows the table."""
+        """Return the scenario overrides that make the table the reference."""
         kind = ("reference.kind=tabulated", f"reference.level=0 {_TORQUE}", f"reference.period={self.period!r} s")
         times = enumerate(self.knot_times[1:].tolist(), 2)
         values = enumerate(self.knot_values.tolist(), 1)
@@ -91,7 +91,7 @@ class RequiredTorque:
 
 
 def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorque:
-    """Return the profile of a design file; a recording's path is relative to ``folder``."""
+    """Read the torque profile of a design file; the path of a recording is relative to ``folder``."""
     where = f"{file}: profile"
     is_typed = bool(table.time or table.torque)
     if is_typed == (table.recording is not None):
@@ -175,7 +175,7 @@ class UseTable(StrictTable):
 
 
 class LimitsTable(StrictTable):
-    """Section of a sizing file: largest RMS error."""
+    """Section of a sizing file: limit of the RMS torque error."""
 
     rms_error: Annotated[Text, Field(description="largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")]
 
@@ -197,7 +197,7 @@ class PressureTable(StrictTable):
 
 
 class SizingFile(StrictTable):
-    """Layout of a sizing file: design of a device that follows a torque profile."""
+    """Sizing file: design of a device that follows a torque profile."""
 
     schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -270,12 +270,12 @@ class SizingProblem:
 
     @property
     def carried(self) -> tuple[Part, ...]:
-        """Parts carried in addition to valve and bottle."""
+        """Parts that a wearer carries in addition to valve and bottle."""
         return self.regulators if self.actuator is None else (*self.regulators, self.actuator)
 
     @property
     def hours(self) -> float:
-        """Duration of all repetitions without a pause [h]."""
+        """Duration of all repetitions of the profile without a pause [h]."""
         return self.repetitions * self.profile.period / _SECONDS_PER_HOUR
 
 
@@ -343,7 +343,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
 
 
 def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file: str) -> Scenario:
-    """Return the scenario with the profile as its reference, for all repetitions in whole samples."""
+    """Load the scenario with the profile as its reference; it ends with a whole controller and output sample."""
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
     plain.device.check_torque_constant("the size of a device")

@@ -35,23 +35,23 @@ LIMITS: dict[Limit, str] = {
     "control": "the control: neither more pressure nor a larger opening would suffice",
     "pressure": "nothing: the lowest requested pressure suffices",
 }
-"""Limiting quantity of a valve, in words."""
+"""Quantities that limit a valve, each with its description in words."""
 ERROR, GAS = "rms_error", "gas_supplied"
 OSCILLATES = "the torque loop oscillates"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
 STREAMS = 16
-"""Number of noise streams of every trial, the same for all, if sensors are noisy."""
+"""Number of noise streams of each trial if sensors are noisy; the streams are the same for all trials."""
 _SEED = 1
-"""Seed of the sensor noise, the same for every pressure."""
+"""Random seed of the noise streams, the same for every pressure."""
 _AT_ONCE = 16_384
 """Number of runs of a batch: enough to occupy all threads with little memory."""
 GRID = 17
-"""Number of pressures of a grid."""
+"""Number of supply pressures that are tried in each round of the search."""
 FINENESS = 0.1 * PASCALS_PER_PSI
-"""Tolerance [Pa] of the lowest pressure."""
+"""Tolerance [Pa] of the lowest feasible supply pressure."""
 WIDER = (2.0, 4.0, 16.0)
-"""Factors [-] on the opening with which the flow is tested as the limit."""
+"""Factors [-] on the valve opening that show whether the flow is the limit."""
 NEAR_CEILING = 1.2
 """Ratio [-] of lowest gauge pressure to ceiling gauge pressure up to which the torque counts as the limit."""
 LEAST_PEAK = 0.7
@@ -63,7 +63,7 @@ OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
 
 
 Trial = NDArray[np.void]
-"""Trials as a structured array of ``TRIAL``."""
+"""Structured array of trials, with the fields of ``TRIAL``."""
 TRIAL = np.dtype([("pressure", np.float64), ("error", np.float64), ("gas", np.float64), ("gains", np.intp)])
 """Row of a trial: supply pressure [Pa absolute], RMS error [N m], gas per repetition [kg], index of the gain set.
 
@@ -73,7 +73,7 @@ Error and gas are nan if a run failed or oscillated.
 
 @final
 class Trials:
-    """Runner of the trials of a problem, which counts runs and failures.
+    """Runner of the trials of a sizing problem, which counts runs and failures.
 
     ``gain_sets`` (sets, gains): every combination of the gain factors
     ``seeds``: noise streams of every trial, the same for all; empty without noise
@@ -91,7 +91,7 @@ class Trials:
         self._threads = threads
 
     def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
-        """Return trials of a valve at pressures [Pa absolute].
+        """Run trials of a valve at supply pressures [Pa absolute].
 
         Each trial has an index of a gain set in ``gains`` and a factor on the valve opening in ``opening`` [-].
         """
@@ -121,8 +121,8 @@ class Trials:
     def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> Trial:
         """Return for each pressure the trial with the best set of gains.
 
-        Among sets that keep the error limit it is the one with the least gas; otherwise the one with the smallest
-        error.
+        The best set uses the least gas of all sets that keep the error limit; if no set keeps the limit, it has the
+        smallest error.
         """
         sets = self.gain_sets.shape[0]
         pressures, gains = np.repeat(pressure, sets), np.tile(np.arange(sets), pressure.size)
@@ -169,7 +169,7 @@ def highest_pressure(problem: SizingProblem, valve: Part) -> float:
 
 
 def try_pressures(trials: Trials, valve: Part) -> Trial:
-    """Return the best trial of a valve at each pressure; the lowest feasible pressure is within 0.1 psi."""
+    """Search the lowest feasible pressure of a valve to 0.1 psi; returns the best trial at each pressure tried."""
     problem = trials.problem
     tried = trials.best(valve, np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID))
     if np.isnan(tried["error"]).all():
@@ -196,7 +196,7 @@ def first_of(members: NDArray[np.bool_]) -> int | None:
 
 
 def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
-    """Return the quantity that keeps a valve from a lower pressure, or from working at all.
+    """Return the quantity that limits a valve at lower pressures, or at every pressure if no pressure is feasible.
 
     There is no limit if the lowest requested pressure works ('pressure'). The limit is the torque if the lowest
     feasible pressure is near ``ceiling_pressure``. Otherwise larger openings are tried halfway between these two

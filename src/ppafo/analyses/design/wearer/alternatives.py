@@ -1,4 +1,4 @@
-"""Alternatives if no device meets the requirements: each relaxes one of them, confirmed by a walk on a bottle."""
+"""Alternative devices with relaxed requirements if no device meets all, each confirmed by a walk on a bottle."""
 
 import itertools
 import math
@@ -30,15 +30,15 @@ _MOST_PAIRS = 5
 _MOST_WALKED = 4
 """Number of candidates walked on a bottle in the search for an alternative, starting with the least gas."""
 _USABLE = 0.8
-"""Usable fraction of a bottle's gas, above which no walk is tried for an alternative."""
+"""Largest fraction of a bottle's gas for the required time with which a candidate is walked on the bottle [-]."""
 _SHOWN_TIME = 0.6
 """Resolution [s] to which the time of an alternative is rounded down: a hundredth of a minute."""
 _SHOWN_TORQUE = 100.0
-"""Fractions of a newton metre to which the torque of an alternative is rounded down."""
+"""Inverse of the resolution to which the torque of an alternative is rounded down [1/(N m)]."""
 
 
 class _Candidate(NamedTuple):
-    """Pair of parts after a few strides, and the requirements with the supply pressure of these strides."""
+    """Pair of valve and actuator after a few strides, with the requirements at the supply pressure of these strides."""
 
     requirements: DesignRequirements
     pair: WalkedDevice

@@ -46,7 +46,7 @@ _READING = (
 
 
 def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
-    """Return the device with its walk, or the alternatives, as a finding; not passed without a device."""
+    """Return a sizing for a wearer as a finding: device with its walk, or alternatives; not passed without device."""
     requirements, device = sizing.requirements, sizing.device
     rows = [
         (tried.valve.name, tried.actuator.name, tried.torque, tried.toes, tried.flow, tried.mass)

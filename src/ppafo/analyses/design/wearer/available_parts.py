@@ -12,7 +12,7 @@ from ppafo.wording import argument_text
 
 @dataclass(frozen=True, slots=True)
 class AvailableParts:
-    """Parts available for a device.
+    """Parts available for the device of a wearer.
 
     ``groups``: parts by group and name
     ``own_groups``: groups that come from the user's catalogue
@@ -27,7 +27,7 @@ class AvailableParts:
 
     @property
     def bottles(self) -> list[Part]:
-        """Bottles, lightest first."""
+        """Available bottles, the lightest first."""
         return sorted(self.groups["bottles"].values(), key=lambda bottle: bottle.full_mass)
 
     def part(self, group: str, usual: str) -> Part:

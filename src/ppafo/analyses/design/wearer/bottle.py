@@ -20,7 +20,7 @@ _ALLOWANCE = 1.15
 def lightest_on_bottle(
     requirements: DesignRequirements, tried: Sequence[WalkedDevice], shelf: AvailableParts, report: Report
 ) -> tuple[WalkedDevice, Part, WalkResult] | None:
-    """Return the lightest pair and bottle whose walk meets the requirements, with that walk; None if there is none.
+    """Return the lightest pair and bottle whose walk meets the requirements, with this walk; None if no pair does.
 
     Every pair that might last on a bottle is tried, so that a later design for an alternative finds its device again.
     """

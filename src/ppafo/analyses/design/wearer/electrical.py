@@ -16,7 +16,7 @@ USABLE = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Electrical:
-    """Electrical energy of a walk and the battery.
+    """Electrical energy of a walk, and the battery that supplies it.
 
     ``powers``: mean power [W] by consumer
     ``cell``: cell of the battery
@@ -31,7 +31,7 @@ class Electrical:
 
     @property
     def power(self) -> float:
-        """Mean power [W] of all consumers."""
+        """Mean electrical power of all consumers [W]."""
         return sum(self.powers.values())
 
     @property

@@ -23,7 +23,7 @@ from ppafo.walking.wearer import STATURES, WEARER
 from ppafo.wording import argument_text
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
-"""Walk configuration and its controller, by valve type."""
+"""Name of the walk configuration, with its controller, by kind of valve."""
 BODY_MASS_INDEX = 22.0
 """Body mass divided by the square of the stature [kg/m^2], for a wearer of unknown stature."""
 TOES = 0.01
@@ -31,7 +31,7 @@ TOES = 0.01
 REACHED = 0.95
 """Least ratio [-] of the peak torque of the mean stride to the required torque that counts as reached."""
 SHORTEST = 6.0
-"""Shortest time [s] of a walk on a bottle."""
+"""Shortest time [s] of a walk on a bottle that may be required."""
 _SHORTEST_WEARER = 1.0
 """Least stature [m] of a wearer: about four years, the youngest whose leg segments were measured (R. K. Jensen, Body
 segment mass, radius and radius of gyration proportions of children, J. Biomech. 19(5), 1986: boys of 4 to 15 years)."""
@@ -42,7 +42,7 @@ TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part
 
 @dataclass(frozen=True, slots=True)
 class DesignRequirements:
-    """Design requirements of a wearer.
+    """Design requirements of a wearer on a device.
 
     ``mass``: body mass [kg]
     ``stature``: stature [m]; None for the stature at ``BODY_MASS_INDEX``
@@ -66,7 +66,7 @@ class DesignRequirements:
 
     @property
     def height(self) -> float:
-        """Stature [m]; by default the stature of a wearer with ``BODY_MASS_INDEX``."""
+        """Stature of the wearer [m]; by default computed from the mass with ``BODY_MASS_INDEX``."""
         return math.sqrt(self.mass / BODY_MASS_INDEX) if self.stature is None else self.stature
 
     @property
@@ -88,7 +88,7 @@ class DesignRequirements:
         return torque >= REACHED * self.torque
 
     def text(self) -> str:
-        """Return torque, pressure, time and toe clearance in words."""
+        """Format torque, pressure, time and toe clearance of the requirements as text."""
         pressure = Kind("", "Pa_a", "pressure").text(self.pressure)
         toes = f"toes {CLEARANCE.text(self.clearance)} over the ground"
         return f"{TORQUE.text(self.torque)} at {pressure} for {self.seconds / 60.0:.4g} min, {toes}"
@@ -157,11 +157,11 @@ class WalkedDevice:
 
     @property
     def mass(self) -> float:
-        """Mass of both parts [kg]."""
+        """Mass of valve and actuator [kg]."""
         return self.valve.full_mass + self.actuator.full_mass
 
     def has(self, requirements: DesignRequirements) -> bool:
-        """Return whether a few strides have the required torque and toe clearance."""
+        """Return whether the strides of the device have the required torque and toe clearance."""
         return requirements.is_reached_by(self.torque) and self.toes >= requirements.clearance
 
 
@@ -213,7 +213,7 @@ class Alternative:
     bottle: Part
 
     def text(self, asked: DesignRequirements) -> str:
-        """Return the alternative in full: relaxed requirements first, then its parts."""
+        """Format the alternative as text: relaxed requirements first, then its parts."""
         changes = [
             *(["less torque"] if self.requirements.torque < asked.torque else []),
             *(["lower toes"] if self.requirements.clearance < asked.clearance else []),
@@ -227,7 +227,7 @@ class Alternative:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WearerSizing:
-    """Requirements, every device tried, and the sized device.
+    """Result of a sizing for a wearer: requirements, tried devices, and the sized device.
 
     ``healthy_toes``: toe clearance of the healthy gait [m]
     ``device``: lightest device that meets the requirements; None if there is none
@@ -250,7 +250,7 @@ class WearerSizing:
 
     @property
     def doubtful(self) -> list[tuple[Part, str]]:
-        """Quoted or assumed figures of these parts."""
+        """Quoted or assumed figures of the parts of the device, as pairs of part and figure name."""
         return [(part, name) for part in self.parts for name in part.doubtful]
 
     def json_document(self) -> dict[str, Any]:

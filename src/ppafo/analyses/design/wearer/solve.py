@@ -37,9 +37,9 @@ from ppafo.walking.walk import healthy_metrics
 from ppafo.wording import argument_text
 
 _REGULATORS = ("pipeline-jacpac-regulator", "festo-lrma-qs-4")
-"""Regulators of plantarflexion and dorsiflexion, unless the user's catalogue has others."""
+"""Default regulators of plantarflexion and dorsiflexion, by name in the catalogue of the package."""
 _PROCESSOR, _CELL = "msp430g2553", "ncr18650b"
-"""Processor and battery cells, unless the user's catalogue has others."""
+"""Default processor and battery cell, by name in the catalogue of the package."""
 
 
 def size_for_wearer(
@@ -100,7 +100,7 @@ def size_for_wearer(
 def _device(
     pair: WalkedDevice, bottle: Part, walked: WalkResult, requirements: DesignRequirements, shelf: AvailableParts
 ) -> SizedDevice:
-    """Return the device of a pair and a bottle, with regulators, shut-off valve, processor and battery."""
+    """Assemble the device of a pair and a bottle, with regulators, shut-off valve, processor and battery."""
     life = endurance_of_walk(walked)
     assert life is not None, "a walk on a bottle that has a torque took gas"
     processor, cell = shelf.part("processors", _PROCESSOR), shelf.part("batteries", _CELL)

@@ -1,7 +1,7 @@
-"""A few strides with a valve and an actuator at a constant supply: torque, toe clearance and gas flow.
+"""Short walks with a valve and an actuator at constant supply: torque, toe clearance and gas flow.
 
-A torque controller receives the lowest requested torque that provides the required one. It lifts the foot earlier and
-harder if the toes would not clear the ground.
+A torque controller is given the lowest request with which the device provides the required torque. If the toes would
+not clear the ground, the foot is lifted earlier and with more torque.
 """
 
 from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
@@ -24,23 +24,23 @@ _MINUTES = 0.15
 _DORSIFLEXION = 0.9
 """Gauge pressure of dorsiflexion divided by plantarflexion, for walks with regulators: 45 of 50 psi."""
 _EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.1", "controller.swing_fall_time=0.2")
-"""Foot lift from toe-off with full torque, for toes that do not clear the ground with the walk's own lift."""
+"""Overrides for an earlier foot lift from toe-off, used if toes do not clear the ground with the walk's own lift."""
 _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 """Catalogue figures of an actuator that a walk adopts."""
 _PROPORTIONAL = "proportional"
 """Valve type that a torque controller needs; solenoid valves only limit the torque."""
 SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
-"""Numbers of the shut-off valve of every device [SI]: the usual ones, and an area that does not throttle the supply."""
+"""Numbers of the shut-off valve of every device [SI]: usual values, and an area that does not throttle the supply."""
 
 
 def of_wearer(requirements: DesignRequirements) -> tuple[str, ...]:
-    """Return the overrides that give a walk the wearer of the requirements, and the wearer's gait if it is given."""
+    """Return the overrides of a walk for the wearer of the requirements, and for the wearer's gait if it is given."""
     wearer = (f"wearer.body_mass={requirements.mass:.6g} kg", f"wearer.stature={requirements.height:.6g} m")
     return wearer if requirements.gait is None else (*wearer, f"gait={requirements.gait}")
 
 
 def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -> list[WalkedDevice]:
-    """Return strides of a pair of parts that meet the required torque and toe clearance, else the nearest ones.
+    """Return strides of a pair of parts that meet the required torque and toe clearance, else the nearest strides.
 
     Nearest are the strides with the most torque, and the strides with the highest toes and enough torque: one or two
     results, none if no walk provides help.

@@ -1,1 +1,1 @@
-"""File formats of gait recordings, one module each; ``reading.py`` has the catalogue."""
+"""File formats of gait recordings, one module each; ``FORMS`` in ``source.py`` is the catalogue."""

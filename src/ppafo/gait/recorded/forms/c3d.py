@@ -15,7 +15,7 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 from ppafo.storage.text_table import doubled, said_of_doubled, told_apart
 from ppafo.storage.trial_reading import check_can_be_read
-from ppafo.wording import one_line
+from ppafo.wording import count_of, one_line
 
 _AXES = "xyz"
 _MARK = b"\x50"
@@ -102,7 +102,7 @@ def read_c3d(path: str | Path) -> MotionTable:
     )
     time = (first + np.arange(frames)) / rate
     remarks = said_of_doubled(twins, dict.fromkeys(labels), "points")
-    remarks += [f"points not read, for they have no label: {number - len(labels)}"] if len(labels) < number else []
+    remarks += [f"{count_of(number - len(labels), 'point')} without a label not read"] if len(labels) < number else []
     return MotionTable(str(path), time, columns, units, remarks=(*trial.remarks, *remarks), trial=trial)
 
 
@@ -116,7 +116,7 @@ def open_c3d(path: str | Path) -> Any:
         except (OSError, RuntimeError, ValueError, IndexError, KeyError):
             return ezc3d.c3d(str(path))
     except (OSError, RuntimeError, ValueError, IndexError, KeyError) as error:
-        raise DataError(f"{path}: ezc3d cannot read it: {one_line(error)}") from error
+        raise DataError(f"{path}: ezc3d cannot read the file: {one_line(error)}") from error
 
 
 def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
@@ -149,7 +149,7 @@ def _unit_name(unit: str) -> str:
 
 
 def _texts(group: Any, key: str) -> list[str]:
-    """Return the texts of a parameter; with more than 255 texts it continues in KEY2, KEY3 and so on."""
+    """Return the texts of a C3D parameter; with more than 255 texts it continues in KEY2, KEY3 and so on."""
     keys = [key]
     for number in count(2):
         if f"{key}{number}" not in group:
@@ -175,7 +175,7 @@ def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
     """
     present = [name for name in ("CONTEXTS", "LABELS", "TIMES") if name in group]
     if len(present) < 3:
-        return {}, ("its events are not read: one of EVENT:CONTEXTS, LABELS and TIMES is missing",) if present else ()
+        return {}, ("events not read: EVENT needs CONTEXTS, LABELS and TIMES",) if present else ()
     sides, kinds = _texts(group, "CONTEXTS"), _texts(group, "LABELS")
     times = np.asarray(group["TIMES"]["value"], dtype=np.float64)
     count, assumption = len(kinds), ""
@@ -189,16 +189,14 @@ def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
         pairs = np.zeros((2, 0))
     if not count == len(sides) == pairs.shape[1]:
         return {}, (
-            f"its events are not read: EVENT has {len(sides)} contexts, {count} labels and {times.size} times, which "
-            "do not fit together",
+            f"events not read: EVENT has {len(sides)} contexts, {count} labels and {times.size} times, but needs the "
+            "same number of each",
         )
     events: Events = {}
     for side, kind, time in zip(sides, kinds, (60.0 * pairs[0] + pairs[1]).tolist(), strict=True):
         if np.isfinite(time):
             events.setdefault((side.strip().lower(), kind.strip().lower()), []).append(time)
-    return {key: sorted(events[key]) for key in events}, (
-        f"times of its events read as {assumption}",
-    ) if assumption else ()
+    return {key: sorted(events[key]) for key in events}, (f"event times read as {assumption}",) if assumption else ()
 
 
 FORM = GaitForm(

@@ -1,4 +1,4 @@
-"""CSV files: of this package, with its names and units, and plain files with any usual delimiter.
+"""CSV files of gait recordings: with the names and units of this package, or plain with any usual delimiter.
 
 The header of a CSV file need not be ``name [unit]``: a name alone, or with the unit in other brackets, is accepted.
 """
@@ -34,12 +34,12 @@ def _recognises(path: str | Path) -> bool:
 def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of the package's column names and signs; raises DataError for a left foot."""
     if side != "right":
-        raise DataError(f"a CSV file without a gait map contains one foot; omit {setting_text('side')} left")
+        raise DataError(f"a CSV file without a gait map has one foot, read as right; omit {setting_text('side')}")
     return Convention(package_map())
 
 
 def plain_names(path: str | Path) -> list[str]:
-    """Return the names in the header of a plain CSV file; an empty list for one of the package.
+    """Return the column names of a plain CSV file; an empty list for a CSV file of the package.
 
     A plain file has a foreign delimiter, or a column without a unit in square brackets.
     """
@@ -69,7 +69,7 @@ def read_plain_csv(path: str | Path) -> MotionTable:
         at = 0
     if names[at].lower() not in _TIMES:
         raise DataError(
-            f"{path}: the first column must be 'time', it is {one_line(names[at])[:_LONGEST_SHOWN]!r}; give at "
+            f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; give at "
             "least two strides over time instead of one mean stride over percent"
         )
     if "" in names[at:]:

@@ -53,7 +53,7 @@ _LEAST_WAY = 0.5
 """Travel of a marker [m] above which it shows the direction of walking; on a treadmill the travel is shorter."""
 
 _MOST_OBLIQUE = 25.0
-"""Largest angle [deg] between walk and axis, at which the lean of the shank is underestimated by 10 %."""
+"""Largest angle [deg] between walking direction and laboratory axis; the shank lean is then 10 % too small."""
 
 
 def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
@@ -72,7 +72,7 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
     # The model's own angle is preferred: its zero comes from a static trial.
     if angles is None and heel is not None and toe is not None:
         angle = AngleMap(heel=heel, toe=toe, forward=forward, vertical=vertical, positive="plantarflexion")
-        ankle_remarks = (f"ankle angle from the markers {heel} and {toe}; its zero is the foot that stands flat",)
+        ankle_remarks = (f"ankle angle from the markers {heel} and {toe}; zero from the flat foot",)
     else:
         column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
         angle = AngleMap(terms=(column,), positive="dorsiflexion", unit="deg")
@@ -209,7 +209,7 @@ def _axes(
             "the coordinates so that one axis points along the walk"
         )
     forward = _FORWARDS[along + 3 * bool(travel[along] < 0.0)]
-    remarks = () if (forward, up) == ("x", 2) else (f"the walk goes along {forward}, upwards is {'xyz'[up]}",)
+    remarks = () if (forward, up) == ("x", 2) else (f"walking direction is {forward}, upwards is {'xyz'[up]}",)
     return forward, _UPWARDS[up], remarks
 
 
@@ -222,11 +222,11 @@ _FACTORS = {
     "moment": {"N m/kg": 1.0, "N mm/kg": 1.0e-3, "N m": None, "N mm": None},
     "force": {"N/kg": 1.0, "N": None, "": 9.8, "percent": 0.098},
 }
-"""Factor from a unit to N m/kg or N/kg; None if the factor is the inverse of the body mass."""
+"""Factors from units to N m/kg or N/kg; None if the factor is the inverse of the body mass."""
 
 
 _PLAUSIBLE = {"moment": (0.35, 2.6), "force": (5.5, 20.0)}
-"""Plausible peaks in walking, N m/kg and N/kg; up to a body mass of 130 kg only one unit fits."""
+"""Plausible peaks in walking [N m/kg] and [N/kg]; up to a body mass of 130 kg only one unit fits."""
 
 
 def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tuple[str, list[str]]:
@@ -250,11 +250,11 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
     if len(fitting) != 1:
         known = ", ".join(repr(unit) for unit in _FACTORS[kind])
         raise DataError(
-            f"{table.file}: column {name!r} reaches {peak:.4g}, which is implausible for a {kind} of walking in "
-            f"the unit {stated or 'not stated'!r}; give its unit in a gait map: {known}"
+            f"{table.file}: column {name!r} reaches {peak:.4g} ({stated or 'no unit'}), which is implausible for a "
+            f"{kind} of walking; give its unit in a gait map: {known}"
         )
-    was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file does not state it"
-    return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'} by its size: {was}"]
+    was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file states no unit"
+    return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'}, judged by its magnitude: {was}"]
 
 
 def is_trc(path: str | Path) -> bool:

@@ -14,15 +14,15 @@ from ppafo.storage.matlab import MATLAB_SUFFIX, read_matlab
 
 _TIMES = ("time", "t", "tout")
 _OPENSIM = re.compile(r"ankle_angle_[rl].*|.*_force_v[xyz]|.*_moment|pelvis_.*")
-"""Pattern of OpenSim's labels."""
+"""Pattern of OpenSim's column labels."""
 _DEGREES = re.compile(r"inDegrees\s*=\s*(yes|no)", re.IGNORECASE)
 _THREE = re.compile(r"(?P<name>.*)\(:,(?P<number>[123])\)")
 
 
 def _read(path: str | Path) -> MotionTable:
-    """Return the variables that are as long as the time; a matrix of three columns is also available as a marker.
+    """Read the variables that are as long as the time; a matrix of three columns is also available as a marker.
 
-    Its columns are named ``RKNE.x``, ``.y`` and ``.z``. Raises DataError if no variable is a time.
+    The columns of a marker are named ``RKNE.x``, ``.y`` and ``.z``. Raises DataError if no variable is a time.
     """
     file = read_matlab(path)
     name = next((name for name in file.columns if name.rpartition(".")[2].lower() in _TIMES), None)
@@ -38,7 +38,7 @@ def _read(path: str | Path) -> MotionTable:
     }
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
-        raise DataError(f"{path}: {name} does not increase after sample {stalled[0] + 1}")
+        raise DataError(f"{path}: variable '{name}' must increase, but does not after sample {stalled[0] + 1}")
     # The unit of angles that the kept header of an OpenSim table states.
     stated = [match[1].lower() for word in file.words if (match := _DEGREES.search(word))]
     angle = {"yes": "deg", "no": "rad"}[stated[0]] if stated else ""

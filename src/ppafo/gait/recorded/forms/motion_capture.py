@@ -28,7 +28,7 @@ from ppafo.signals.recording import Floats
 from ppafo.wording import one_line
 
 _NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
-"""Blocks of a Nexus export: first markers, model angles and moments; then force plates and other analog channels."""
+"""Block titles of a Nexus export: markers and model outputs; then force plates and other analog channels."""
 _LENGTHS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
 _MOTIVE_ROWS = 3
 """Least number of rows above the axes of a Motive export: types, names and quantities."""
@@ -49,9 +49,7 @@ def _rate_in(path: str | Path, cell: str, line: int) -> float:
     except ValueError:
         rate = 0.0
     if not 0.0 < rate < np.inf:
-        raise DataError(
-            f"{path}: line {line}: the frame rate must be a number above 0 Hz, it is {one_line(cell)[:20]!r}"
-        )
+        raise DataError(f"{path}: line {line}: the frame rate must be a number above 0 Hz, not {one_line(cell)[:20]!r}")
     return rate
 
 
@@ -159,7 +157,7 @@ def _read_qualisys(path: str | Path) -> MotionTable:
         raise DataError(f"{path}: has no line MARKER_NAMES; export the 3D data of Qualisys as TSV")
     at, labels = keys["MARKER_NAMES"]
     labels = [bare_label(label) for label in labels if label]
-    line, (rate, *_) = keys.get("FREQUENCY", (0, ["not there"]))
+    line, (rate, *_) = keys.get("FREQUENCY", (0, ["missing"]))
     names = [f"{label}.{axis}" for label in labels for axis in AXES]
     first = next((n for n in range(at + 1, len(lines)) if _NUMBER.match(cells_of(lines[n], "\t")[0])), len(lines))
     width = len(cells_of(lines[first], "\t")) if first < len(lines) else 0
@@ -169,7 +167,9 @@ def _read_qualisys(path: str | Path) -> MotionTable:
     block = NumberBlock(lines, first, "\t", decimal="," if "," in lines[min(first, len(lines) - 1)] else ".")
     units = [*["", "s"][: len(before)], *["mm"] * len(names)]
     if width < len(before) + len(names) - 2:
-        raise DataError(f"{path}: line {first + 1} has {width} values, expected {len(labels)} (one for each marker)")
+        raise DataError(
+            f"{path}: line {first + 1} has {width} values for {len(before) + len(names)} columns, three for each marker"
+        )
     frame_rate = None if is_counted else _rate_in(path, rate, line + 1)
     clock = "time" if is_counted else ""
     return table_of(path, block, [*before, *names], units, clock, frame_rate=frame_rate, noun="markers")

@@ -1,4 +1,4 @@
-"""OpenSim's tables of motion and force (.mot, .sto), and CSV files with OpenSim's column names."""
+"""OpenSim's tables of motion and force (.mot, .sto), and CSV files with OpenSim's column names, as gait recordings."""
 
 import re
 from dataclasses import replace
@@ -49,12 +49,12 @@ def _read(path: str | Path) -> MotionTable:
     units = {name: unit_of_label(paths.get(name, name), name, angle) for name in columns}
     remarks = table.remarks
     if is_unstated and any(unit == "deg" for unit in units.values()):
-        remarks = (*remarks, "the header does not state the unit of angles: degrees, as in files of its older style")
+        remarks = (*remarks, "the header states no unit of angles; degrees assumed, as in older OpenSim files")
     return MotionTable(str(path), table.time, columns, units, kind=table.kind, remarks=remarks)
 
 
 def unit_of_label(path: str, label: str, angle: str) -> str:
-    """Return the unit implied by a label, ``angle`` for a coordinate; ``path`` is the path of a state."""
+    """Return the unit implied by an OpenSim label; ``angle`` is the unit of angles, ``path`` the path of a state."""
     if path != label:
         # States are in radians and metres whatever the header says of other columns.
         angle = angle or "rad"
@@ -135,8 +135,8 @@ def _turned_forward(table: MotionTable) -> MotionTable:
             table,
             remarks=(
                 *table.remarks,
-                f"the walker turns by {turned:.0f} deg within the record (pelvis_rotation), and the walk is seen along "
-                f"its mean direction: give a straight part with {setting_text('start')} and {setting_text('end')}",
+                f"the walker turns by {turned:.0f} deg (pelvis_rotation), and angles refer to the mean walking "
+                f"direction; select a straight part with {setting_text('start')} and {setting_text('end')}",
             ),
         )
     if abs(facing) <= _ALONG:
@@ -150,7 +150,8 @@ def _turned_forward(table: MotionTable) -> MotionTable:
         forward = -np.sin(tilt) * np.cos(tipped) * cosine - np.sin(tipped) * sine
         columns["pelvis_tilt"] = np.arctan2(-forward, np.cos(tilt) * np.cos(tipped)) / degree["pelvis_tilt"]
     remarks = (
-        f"the walk goes {np.degrees(facing):.0f} deg to the left of x (pelvis_rotation): the pelvis is turned into it"
+        f"walking direction is {np.degrees(facing):.0f} deg to the left of x (pelvis_rotation); the pelvis was rotated "
+        "to x"
     )
     return replace(table, columns=columns, remarks=(*table.remarks, remarks))
 
