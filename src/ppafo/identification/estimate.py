@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from ppafo.errors import IdentificationError
 from ppafo.units import percentage
 
-Verdict = Literal["identified", "holds for this model only", "not identifiable", "at its bound"]
+Verdict = Literal["identified", "holds for this model only", "not identifiable", "at its bound", "unit probably wrong"]
 """Verdict on an estimated value, given the fit of the model to the recordings.
 
 A value is "identified" only if the model explains the recordings. A value that "holds for this model only" is written
@@ -16,6 +16,8 @@ into a set with the origin ``fitted``, and is not to be taken as a property of t
 """
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+WRONG_UNIT: Verdict = "unit probably wrong"
+"""Verdict on a value far from the set that a common unit mistake in a recording explains; it is not used in a set."""
 _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only")
 
 UNKNOWN = 1.0
@@ -89,7 +91,12 @@ class Estimate:
 
     @property
     def verdict_text(self) -> str:
-        """Verdict, with the half-width of a wide interval relative to the value: ``identified, +-44 %``."""
+        """Verdict, with the half-width of a wide interval relative to the value: ``identified, +-44 %``.
+
+        A probably wrong unit is named, with its factor.
+        """
+        if self.verdict == WRONG_UNIT:
+            return f"{self.verdict}: {self.explanation.partition(';')[0]}"
         width = relative_half_width(self.value, self.low, self.high)
         if not self.is_usable or self.size is not None or width <= _WIDE:
             return self.verdict

@@ -15,12 +15,7 @@ from ppafo.documents.models import StrictTable, Text
 from ppafo.errors import IdentificationError, UnitError, refused_as
 from ppafo.identification.estimate import interval_factor
 from ppafo.parameters.parameter_set import CONFIDENCE
-from ppafo.simulation.recorded.usual_errors import (
-    ANGLE_ERRORS,
-    PRESSURE_ERRORS,
-    SUPPLY_ERROR,
-    deviation_of_limit,
-)
+from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS, SUPPLY_ERROR, deviation_of_limit
 from ppafo.units import parse_quantity
 
 Sensed = Literal["zero", "gain"]

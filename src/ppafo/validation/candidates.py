@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.misread_units import misread_units
 from ppafo.simulation.recorded.usual_errors import (
     ANGLE_ERRORS,
     PRESSURE_ERRORS,
@@ -35,20 +35,6 @@ from ppafo.validation.settings import ReplaySettings
 def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> ModelChange:
     """Return a change in which sensors have an error of one ``kind``: gain about a value, zero offset or delay."""
     return ModelChange(dict.fromkeys(names, replace(SensorModel(about=about), **{kind: size})))
-
-
-_MISREAD_UNITS = {
-    "kPa read as psi": PASCALS_PER_PSI / 1.0e3,
-    "psi read as kPa": 1.0e3 / PASCALS_PER_PSI,
-    "bar read as psi": PASCALS_PER_PSI / 1.0e5,
-    "psi read as bar": 1.0e5 / PASCALS_PER_PSI,
-    "kPa read as bar": 1.0e2,
-    "bar read as kPa": 1.0e-2,
-}
-"""Factor [-] on the true pressure for each pair of true unit and unit assumed when reading the file."""
-
-_CONVERTED = "", "Pa", "Pa_a", "Pa_g"
-"""Declared units of pressures that were already converted to SI, so that the original unit is unknown."""
 
 
 def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]]:
@@ -75,17 +61,20 @@ def exchanges(
     a chamber that stays at atmospheric pressure, which shows no factor, nor against a unit that the file declares.
     """
     atmosphere = device.supply.atmospheric_pressure
+    quantities = (ANGLE, "rad"), (EXTERNAL_TORQUE, "N m")
+    measured = [((name,), f"{name} seems", unit, 0.0) for name, unit in quantities if name in names]
     for channels, group, verb in _groups(names):
-        declared = frozenset[str]().union(*(units.get(name, ()) for name in channels))
-        for unit, factor in _MISREAD_UNITS.items() if units.keys() & set(channels) else ():
-            if not declared <= {*_CONVERTED, *(f"{unit.rpartition(' ')[2]}{kind}" for kind in ("", "_a", "_g"))}:
-                continue
-            words = f"{group} {verb} to be {unit}"
-            change = partial(_sensed, channels, "gain", atmosphere)
-            yield CandidateCause(words, words, change, (factor,), is_of_unit=True)
+        measured.append((channels, f"{group} {verb}", "Pa", atmosphere))
         for kind, zero in (("gauge read as absolute", -atmosphere), ("absolute read as gauge", atmosphere)):
             words = f"{group} {verb} to be {kind}"
             yield CandidateCause(words, words, partial(_sensed, channels, "zero", 0.0), (zero,), is_of_unit=True)
+    for channels, seems, si_unit, true_zero in measured:
+        stated = set[str]().union(*(units.get(name, ()) for name in channels))
+        for mistake, factor in misread_units(si_unit, stated) if units.keys() & {*channels} else ():
+            name = f"{seems} to be {mistake}"
+            words = f"{name}: the unit is probably wrong, by a factor of {max(factor, 1.0 / factor):.4g}"
+            change = partial(_sensed, channels, "gain", true_zero)
+            yield CandidateCause(name, words, change, (factor,), is_of_unit=True)
     has_both = PRESSURE_1 in names and PRESSURE_2 in names
     if has_both:
         yield CandidateCause(
@@ -209,7 +198,7 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
         factors = tuple(factor for factor in _FACTORS if quantity.minimum <= factor * value <= quantity.maximum)
         if value > 0.0 and len(factors) > 2:
             words = f"{path} seems to be {{:.3g}} times the model's value"
-            change = partial(_scaled, path, value)
+            change = partial(lambda path, value, factor: ModelChange(numbers={path: factor * value}), path, value)
             usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
             yield CandidateCause(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
@@ -234,10 +223,6 @@ def _unit_of_pressure(device: Device) -> tuple[str, float]:
         return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
-def _scaled(path: str, value: float, factor: float) -> ModelChange:
-    return ModelChange(numbers={path: factor * value})
-
-
 class _UnknownEffect(NamedTuple):
     """Effect that is off in the model and may be present in the device, with one magnitude to fit.
 
@@ -253,45 +238,29 @@ class _UnknownEffect(NamedTuple):
     constant: Mapping[str, float] = MappingProxyType({})
 
 
+_OPENING, _STRIBECK = MappingProxyType({"rise": 0.3}), MappingProxyType({"share": 0.9})
+_VIRIAL = MappingProxyType({"coefficient": SECOND_VIRIAL["CO2"]})
 _EFFECTS = (
+    _UnknownEffect("leak_opening", "the leak seems to open at {:.3g} Pa", ("pressure",), 1e3, 2e5, _OPENING),
     _UnknownEffect(
-        name="leak_opening",
-        words="the leak seems to open at {:.3g} Pa",
-        scaled=("pressure",),
-        lowest=1e3,
-        highest=2e5,
-        constant={"rise": 0.3},
+        "stribeck", "friction seems to be higher up to {:.2g} rad/s (Stribeck)", ("velocity",), 0.02, 6.0, _STRIBECK
     ),
     _UnknownEffect(
-        name="stribeck",
-        words="friction seems to be higher up to {:.2g} rad/s (Stribeck)",
-        scaled=("velocity",),
-        lowest=0.02,
-        highest=6.0,
-        constant={"share": 0.9},
+        "seal_friction",
+        "friction seems to grow with pressure by {:.2g} N m/Pa",
+        ("static_per_pressure", "dynamic_per_pressure"),
+        1e-8,
+        5e-6,
     ),
     _UnknownEffect(
-        name="seal_friction",
-        words="friction seems to grow with pressure by {:.2g} N m/Pa",
-        scaled=("static_per_pressure", "dynamic_per_pressure"),
-        lowest=1e-8,
-        highest=5e-6,
+        "second_virial",
+        "the gas seems to have {:.2g} times the virial coefficient of CO2",
+        ("share",),
+        0.05,
+        8.0,
+        _VIRIAL,
     ),
-    _UnknownEffect(
-        name="second_virial",
-        words="the gas seems to have {:.2g} times the virial coefficient of CO2",
-        scaled=("share",),
-        lowest=0.05,
-        highest=8.0,
-        constant={"coefficient": SECOND_VIRIAL["CO2"]},
-    ),
-    _UnknownEffect(
-        name="spool_play",
-        words="the spool seems to have a play of {:.2g} of full command",
-        scaled=("width",),
-        lowest=0.005,
-        highest=0.4,
-    ),
+    _UnknownEffect("spool_play", "the spool seems to have a play of {:.2g} of full command", ("width",), 0.005, 0.4),
 )
 _SIZES_OF_AN_EFFECT = 5
 """Number of trial magnitudes of an effect, in geometric progression."""

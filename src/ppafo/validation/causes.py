@@ -16,6 +16,7 @@ from ppafo.errors import PpafoError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.device import Device
 from ppafo.progress import Report, report_nothing
+from ppafo.simulation.recorded.channels import COMMAND
 from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.simulation.recorded.usual_errors import usual_errors
 from ppafo.validation.agreement import RecordingAgreement, compare_recording
@@ -39,6 +40,18 @@ _SHORT_INTERVAL = 2.0e-5
 
 _AT_REST = 2.0
 """Ratio of the angle's standard deviation to its noise [-] below which the vane may be locked."""
+
+_LONGEST_SEARCHED = 10.0
+"""Duration [s] of all recordings up to which a device with a measured angle is searched for causes beside samples."""
+
+_OF_MOTION = ("friction", "foot_plate", "stribeck", "seal_friction")
+"""Sections and effects that act on the motion of the vane alone, and say nothing if the angle is prescribed."""
+
+_TRIED_WITH_MEASURED_ANGLE = "faulty samples, errors and units of the pressures, numbers of the set, effects"
+_TRIED_IN_LONG_RECORDINGS = (
+    "faulty samples alone (the angle is measured, over more than 10 s; validate a shorter part to try sensors, units, "
+    "numbers of the set and effects)"
+)
 
 _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 """Trial initial values of a channel whose first samples are wrong, as fractions of its range [-].
@@ -73,13 +86,15 @@ class Diagnosis:
     """Result of the search for a cause of a disagreement.
 
     ``found`` is the cause, if any; ``nearest`` is the best candidate if none explains the recordings. ``tried`` is the
-    number of candidates compared. ``is_noise`` is true if the residuals are noise, so that no cause is needed.
+    number of candidates compared, ``kinds`` the kinds of causes where not all were tried. ``is_noise`` is true if the
+    residuals are noise, so that no cause is needed.
     """
 
     found: ResidualCause | None = None
     nearest: ResidualCause | None = None
     tried: int = 0
     is_noise: bool = False
+    kinds: str = ""
 
 
 @on_one_thread
@@ -104,16 +119,27 @@ def causes_of(
     none = search.evaluated([ModelChange()])[0]
     if none is None or none.is_noise:
         return Diagnosis(is_noise=none is not None)
-    if settings.motion == "measured":
-        # A measured angle is an input, and a delay of the sensors would be one of an input: samples alone are searched.
+    is_measured = settings.motion == "measured"
+    if is_measured and sum(measured.recording.duration for measured in read) > _LONGEST_SEARCHED:
+        # Hundreds of replays of a minute each would take minutes of computing time.
         tried = search.compared(_samples(records), none)
         explaining = [cause for cause in tried if cause.explains]
-        # That no change explains the recordings would say too much.
-        return _explained(search, none, tried, explaining, []) if explaining else Diagnosis()
+        return (
+            _explained(search, none, tried, explaining, [])
+            if explaining
+            else Diagnosis(tried=len(tried), kinds=_TRIED_IN_LONG_RECORDINGS)
+        )
     names = set.intersection(*(set(measured.recording.names) for measured in read))
     units = _units_of_moving(read, agreements, device)
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
-    sized = [*sizes(device, names), *numbers(read[0], device, settings)]
+    swaps, sized, lacking = (
+        [candidate for candidate in candidates if not (is_measured and _acts_on_inputs_or_motion(candidate))]
+        for candidates in (
+            exchanges(device, names, units),
+            [*sizes(device, names), *numbers(read[0], device, settings)],
+            effects(device),
+        )
+    )
     first = [_samples(records), _motions(records, settings)]
     tried, explaining = _tried_in_turn(search.compared(stage, none) for stage in first)
     if not explaining:
@@ -126,9 +152,9 @@ def causes_of(
             return Diagnosis(errors, None, len(tried) + len(of_bench))
 
         def stages() -> Iterator[list[SizedCause]]:
-            yield search.compared(list(exchanges(device, names, units)), none)
+            yield search.compared(swaps, none)
             yield of_bench + search.compared([candidate for candidate in sized if not candidate.usual], none)
-            yield search.compared(list(effects(device)), none)
+            yield search.compared(lacking, none)
 
         later, explaining = _tried_in_turn(stages())
         tried += later
@@ -140,7 +166,21 @@ def causes_of(
         key=lambda cause: (cause.candidate.is_of_samples, cause.gain),
         default=None,
     )
-    return Diagnosis() if nearest is None else Diagnosis(None, _cause_of([nearest], search.penalty), len(tried))
+    return Diagnosis(
+        nearest=None if nearest is None else _cause_of([nearest], search.penalty),
+        tried=len(tried),
+        kinds=_TRIED_WITH_MEASURED_ANGLE if is_measured else "",
+    )
+
+
+def _acts_on_inputs_or_motion(candidate: CandidateCause) -> bool:
+    """Return whether a candidate changes command, angle or clock, or the motion: with a measured angle no cause."""
+    change = candidate.at(candidate.grid[0])
+    sections = {name for path in (*change.numbers, *change.effects) for name in path.split(".")[:1]}
+    has_delay = change.has_delay or any(sensor.delay for sensor in change.sensors.values())
+    return bool(
+        {COMMAND, ANGLE} & change.sensors.keys() or sections & {*_OF_MOTION} or has_delay or change.clock != 1.0
+    )
 
 
 def _units_of_moving(

@@ -410,3 +410,43 @@ def test_what_is_usual_on_a_bench_is_the_same_for_limits_causes_and_the_fit() ->
         assert by_name[f"zero of {channel}"] == usual.zero_of(channel) == COMPARED[channel].usual_zero(device)
     # A fit takes an angle sensor as exact where nothing is stated.
     assert by_name["gain of pressure_1"] == usual.gain_of("pressure_1")
+
+
+@pytest.mark.parametrize(
+    ("mistake", "words"),
+    [
+        (read_with_gain, "pressure_1 seems to be read 1.04 times too large"),
+        (swapped, "pressure_1 and pressure_2 seem to be swapped"),
+        (clipped, "pressure_1 is clipped"),
+    ],
+    ids=lambda one: getattr(one, "__name__", None),
+)
+def test_a_mistake_is_named_beside_a_measured_angle_too(
+    mistake: Callable[[Recording], Recording], words: str, bench: Recording
+) -> None:
+    found = causes(mistake(bench), motion="measured").found
+    assert found is not None
+    assert found.in_words.startswith(words)
+
+
+def test_what_was_tried_beside_a_measured_angle_is_said_where_nothing_explains_it(bench: Recording) -> None:
+    wrong = with_channel(fast_clock(read_with_gain(bench)), "pressure_2", bench["pressure_2"] - 2.0e4)
+    diagnosis = causes(wrong, motion="measured")
+    assert diagnosis.found is None
+    assert diagnosis.tried > 20
+    assert "numbers of the set" in diagnosis.kinds
+
+
+@pytest.mark.parametrize(
+    ("true", "stated", "factor"),
+    [("MPa", "bar_g", 10.0), ("psi", "kPa_g", 6.895), ("bar", "psi_g", 14.5), ("bar", "kPa_g", 100.0)],
+)
+def test_a_misread_unit_is_named_with_its_factor(true: str, stated: str, factor: float, bench: Recording) -> None:
+    per_true = {"MPa": 1.0e6, "bar": 1.0e5, "psi": PASCALS_PER_PSI}[true]
+    per_read = {"bar_g": 1.0e5, "kPa_g": 1.0e3, "psi_g": PASCALS_PER_PSI}[stated]
+    values = ROOM + (bench["pressure_2"] - ROOM) * per_read / per_true
+    channel = Channel(values, "Pa", stated=stated)
+    found = causes(replace(bench, channels={**bench.channels, "pressure_2": channel})).found
+    assert found is not None
+    mistake = f"pressure_2 seems to be {true} read as {stated.removesuffix('_g')}"
+    assert found.in_words == f"{mistake}: the unit is probably wrong, by a factor of {factor:g}"

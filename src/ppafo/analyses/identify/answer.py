@@ -11,11 +11,12 @@ import numpy as np
 from ppafo.documents.json_text import plain
 from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, bench_figure, figure_3
-from ppafo.identification.estimate import Estimate
+from ppafo.identification.estimate import WRONG_UNIT, Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
+from ppafo.identification.unit_check import FAR_FROM_SET
 from ppafo.identification.wording import digits_of, in_shown_unit, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure
@@ -33,8 +34,6 @@ _FAR = 2.0
 """Number of standard deviations above which a tolerance counts as contradicted by the recordings."""
 _SHOWN = 0.05
 """Smallest share of a variance that the report shows [-]."""
-_FAR_FROM_SET = 5.0
-"""Ratio to the previous value above which a wrong unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
 _ROW_HEAD = ("",) * 4
 """Empty column heads for the rows of ``estimate_row``."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
@@ -70,8 +69,9 @@ class Identification:
 
     @property
     def is_good(self) -> bool:
-        """True if no recordings contradict each other and the new set is a valid device."""
+        """True if no recordings contradict each other, no unit is probably wrong, and the new set is a valid device."""
         is_fitted = self.trajectory is None or self.trajectory.is_good
+        is_fitted &= all(estimate.verdict != WRONG_UNIT for estimate in self.estimates)
         return is_fitted and not self.new_set.problem and not any(result.conflict for result in self.results)
 
     @property
@@ -142,7 +142,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     for result in identification.results:
         kind = "" if result.kind == "measured" else f" ({result.kind})"
         remarks = [
-            *_conflict(result.conflict),
+            *([f"holds for this model only: {result.conflict}"] if result.conflict else []),
             *(f"{estimate.path}: {estimate.explanation}" for estimate in result.estimates),
         ]
         for estimate in result.estimates:
@@ -151,7 +151,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
             if entry is None or not estimate.is_usable or not (entry.value > 0.0 and value > 0.0):
                 continue
             ratio = value / entry.value
-            if not 1.0 / _FAR_FROM_SET < ratio < _FAR_FROM_SET:
+            if not 1.0 / FAR_FROM_SET < ratio < FAR_FROM_SET:
                 times = f"{ratio:.3g} times the previous value, {entry.value:.4g} {unit}".rstrip()
                 remarks.append(f"remark: {estimate.path} is {times}: check the units of the recording")
         remarks += [f"remark: {remark}" for remark in result.remarks]
@@ -182,17 +182,12 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     )
 
 
-def _conflict(sentence: str) -> tuple[str, ...]:
-    """Return a remark that numbers hold for this model only, with the conflict; empty without a conflict."""
-    return (f"holds for this model only: {sentence}",) if sentence else ()
-
-
 def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Section:
     """Return the section of the trajectory fit: estimates, tolerances, remarks and proposed next experiments."""
     kind, fit = kind_of_fit(outcome.fit), outcome.fit
     origin = "" if kind == "measured" else f" ({kind})"
     remarks = [
-        *_conflict(fit.conflict),
+        *([f"holds for this model only: {fit.conflict}"] if fit.conflict else []),
         # Of a conflict the explanation of each number is the one sentence that stands above.
         *(
             f"{estimate.path}: {estimate.explanation}"

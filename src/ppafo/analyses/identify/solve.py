@@ -15,6 +15,7 @@ from ppafo.identification.source import RecordingSource, UsedRecording, double_u
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.identification.trajectory.layout import ExperimentSection
 from ppafo.identification.trajectory.section import SectionContext, solve_section
+from ppafo.identification.unit_check import FAR_FROM_SET, with_wrong_units
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
@@ -66,6 +67,9 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         for task in tasks:
             context = ProcedureContext(current, valve, task.label, tolerances)
             result = run_procedure(task.sources, task.procedure, context)
+            known = {item.path: number_in_si(current, item.path) for item in result.estimates}
+            recordings = [source.recording for source in task.sources]
+            result = replace(result, estimates=with_wrong_units(result.estimates, known, recordings))
             results.append(result)
             # The next procedure leans on what this one found; the new set is made of the old one at the end.
             current = with_estimates(current, result.estimates).parameter_set
@@ -83,6 +87,16 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
                 tolerances=tolerances,
             )
             trajectory = solve_section(problem.trajectory, section, progress)
+            fit = trajectory.fit
+            # A start near to the value says that the person expects it, whatever the set has.
+            starts = {number.free.name: number.free.start * FAR_FROM_SET for number in fit.numbers}
+            known = {
+                path: value if value < starts[path] < value * FAR_FROM_SET**2 else number_in_si(current, path)
+                for path, value in fit.values.items()
+            }
+            recordings = [experiment.recording for experiment in fit.problem.experiments]
+            estimates_of_fit = with_wrong_units(fit.estimates, known, recordings)
+            trajectory = replace(trajectory, fit=replace(fit, estimates=estimates_of_fit))
             estimates += trajectory.fit.estimates
         new_set = with_estimates(before, estimates, valve)
         identification = Identification(problem.name, tuple(results), trajectory, before, new_set)

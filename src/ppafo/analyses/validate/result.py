@@ -103,14 +103,15 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
         verdict += ", as on any bench" if causes.found.is_usual and passes else ""
         same = ", ".join(cause.name for cause in causes.found.same)
         return f"{verdict} (indistinguishable with these recordings: {same})" if same else verdict
-    if not causes.tried:
+    if not (causes.tried or causes.kinds):
         return ""
+    tried = f"; tried: {causes.kinds}" if causes.kinds else ""
     nearest = causes.nearest
     explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
     if nearest is None or not explains:
-        return "no single change explains the residual"
-    left = _times(nearest.left)
-    return f"no single change explains the residual; nearest: {in_words(nearest)}, which leaves {left} times the noise"
+        return f"no single change explains the residual{tried}"
+    nearest_text = f"{in_words(nearest)}, which leaves {_times(nearest.left)} times the noise"
+    return f"no single change explains the residual; nearest: {nearest_text}{tried}"
 
 
 def _times(size: float) -> str:

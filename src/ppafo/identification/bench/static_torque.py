@@ -148,9 +148,7 @@ def static_torque(
                 f"{unknowns.slope.capitalize()}, the common slope of both branches",
             ),
             ReportedNumber(
-                unknowns.friction_path,
-                unknowns.unit,
-                f"{unknowns.friction.capitalize()} without a pressure difference",
+                unknowns.friction_path, unknowns.unit, f"{unknowns.friction.capitalize()} without a pressure difference"
             ),
             ReportedNumber(
                 unknowns.growth_path,

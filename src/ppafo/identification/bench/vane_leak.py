@@ -381,11 +381,7 @@ def _ratio(
 
 
 def _sought(
-    size: ReportedNumber,
-    has_volume: bool,
-    decays: tuple[_ClosedChambers, ...],
-    opening: Opening,
-    emptied: float,
+    size: ReportedNumber, has_volume: bool, decays: tuple[_ClosedChambers, ...], opening: Opening, emptied: float
 ) -> tuple[Paths, tuple[ReportedNumber, ...], OpeningSizes, OpeningSizes]:
     """Return paths, reported quantities, start sizes, and sizes of each part alone, for closed chambers."""
     gas = opening.gas

@@ -140,11 +140,7 @@ def check_no_wrong_reading(
 
 
 def meter_readings(
-    sources: tuple[RecordingSource, ...],
-    procedure: str,
-    direction: Floats,
-    zero: float,
-    used: Flags | None = None,
+    sources: tuple[RecordingSource, ...], procedure: str, direction: Floats, zero: float, used: Flags | None = None
 ) -> tuple[Floats, Flags, tuple[str, ...]]:
     """Return flow meter readings with sign [kg/s], flags of possible readings, and remarks on the others.
 

@@ -14,13 +14,7 @@ from ppafo.identification.keys import positive_in, quantity_in
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
 from ppafo.identification.tolerances import Tolerances, quantity_of
 from ppafo.identification.trajectory.expected import CandidateExperiment, ExpectedBenefit, expected_information
-from ppafo.identification.trajectory.experiment import (
-    FITTED_CHANNELS,
-    INPUTS,
-    FittedExperiment,
-    refuse_first,
-    use_of,
-)
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, INPUTS, FittedExperiment, refuse_first, use_of
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.identification.trajectory.layout import ExperimentSection, ParameterSection, TrajectorySection
 from ppafo.identification.trajectory.numbers import TIME_OFFSET, FreeParameter, declaration_of, full_path

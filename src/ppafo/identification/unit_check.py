@@ -1,0 +1,59 @@
+"""Unit mistakes that explain estimates far from the values of the parameter set."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from ppafo.identification.estimate import WRONG_UNIT, Estimate
+from ppafo.signals.recording import Recording
+from ppafo.simulation.recorded.misread_units import misread_units
+
+FAR_FROM_SET = 5.0
+"""Ratio to the value of the set above which a wrong unit is suspected: psi read as kPa makes 6.89."""
+_NEAR = 1.5
+"""Largest ratio [-] of an estimate, divided by the value of the set, to the factor of a unit mistake."""
+
+
+def with_wrong_units(
+    estimates: tuple[Estimate, ...], known: Mapping[str, float | None], recordings: Sequence[Recording]
+) -> tuple[Estimate, ...]:
+    """Return the estimates, with the verdict of a wrong unit where a unit mistake in a recording explains the values.
+
+    A mistake explains them if every value far from the one ``known`` of the set depends on the unit, and every value
+    that depends on the unit is off by nearly its factor: a larger device, or one worn part, is no mistake.
+    """
+    ratios = {
+        estimate.path: abs(math.log(estimate.value / reference))
+        for estimate in estimates
+        if estimate.is_usable and estimate.value > 0.0 and (reference := known.get(estimate.path) or 0.0) > 0.0
+    }
+    far = {path for path, ratio in ratios.items() if ratio > math.log(FAR_FROM_SET)}
+    channels = {name: channel for recording in recordings for name, channel in recording.channels.items()}
+    nearest, explained = math.log(_NEAR), estimates
+    for si_unit in dict.fromkeys(channel.unit.removesuffix("_d") for channel in channels.values()) if far else ():
+        names = [name for name, channel in channels.items() if channel.unit.removesuffix("_d") == si_unit]
+        # Beside a measured torque or force a pressure scales no torque; in a motion it drives everything with mass.
+        has_load = bool({"torque", "force"} & channels.keys())
+        acted_on = set[str]()
+        for path, unit in ((item.path, item.unit) for item in estimates if item.is_usable):
+            has_mass = "N" in unit or "kg" in unit
+            # A torque constant, in N m/Pa, is stated in m^3.
+            per_pressure = "Pa" in unit or unit == "m^3" or "mass_flow" in channels or (has_mass and not has_load)
+            depends = {"Pa": per_pressure, "N m": has_mass or "torque" in channels, "rad": unit == "N m"}
+            acted_on |= {path} if depends.get(si_unit) else set()
+        mistakes = misread_units(si_unit, [channels[name].stated for name in names]) if far <= acted_on else []
+        for mistake, factor in mistakes:
+            size = abs(math.log(factor))
+            distance = max(abs(ratios[path] - size) for path in acted_on & ratios.keys())
+            if distance < nearest:
+                text = (
+                    f"{' and '.join(names)} {'seem' if len(names) > 1 else 'seems'} to be {mistake}, a factor of "
+                    f"{max(factor, 1.0 / factor):.4g}; correct the unit in the header or the column map, or give the "
+                    "value that you expect in device.overrides"
+                )
+                nearest = distance
+                explained = tuple(
+                    replace(item, verdict=WRONG_UNIT, explanation=text) if item.path in acted_on else item
+                    for item in estimates
+                )
+    return explained

@@ -1,0 +1,113 @@
+"""A value far from the set that a unit mistake explains is not called identified; a larger device is no mistake."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.analyses.identify.answer import Identification
+from ppafo.analyses.identify.question import identify
+from ppafo.identification.estimate import Estimate
+from ppafo.identification.source import RecordingSource
+from ppafo.identification.unit_check import with_wrong_units
+from ppafo.signals import Channel, Recording
+from ppafo.units import from_si
+from tests.unit.identification import planted
+
+STATIC = (planted.static(growth=8.0e-7), 'kind = "static-torque"\n')
+FLOW = (planted.flow(), 'kind = "open-valve-flow"\n')
+PRESSURES = ("upstream_pressure", "downstream_pressure")
+
+
+def solved(
+    folder: Path, source: RecordingSource, kind: str, units: dict[str, tuple[str, str]], overrides: str = ""
+) -> Identification:
+    """Identify from a file whose header states the second unit over numbers in the first unit, by channel."""
+    recording = source.recording
+    columns = {"time [s]": recording.time}
+    for name, channel in recording.channels.items():
+        true, stated = units.get(name, (channel.unit, channel.unit))
+        si_unit = "Pa_a" if channel.unit == "Pa" else channel.unit
+        values = [value if true == channel.unit else from_si(value, true, si_unit) for value in channel.values.tolist()]
+        columns[f"{name} [{stated}]"] = np.array(values)
+    text = "\n".join(",".join(map(repr, row)) for row in np.column_stack([*columns.values()]).tolist())
+    (folder / "bench.csv").write_text(f"{','.join(columns)}\n{text}\n")
+    problem = f'schema_version = 1\nname = "twin"\ndevice.set = "ppafo2011"\n{overrides}'
+    (folder / "problem.toml").write_text(f'{problem}[[procedure]]\n{kind}recordings = ["bench.csv"]\n')
+    return identify(folder / "problem.toml").found
+
+
+@pytest.mark.parametrize(
+    ("bench", "channels", "true", "read", "factor"),
+    [
+        (STATIC, ("pressure_difference",), "psi_d", "kPa_d", "6.895"),
+        (STATIC, ("pressure_difference",), "bar_d", "psi_d", "14.5"),
+        (STATIC, ("pressure_difference",), "bar_d", "kPa_d", "100"),
+        (STATIC, ("pressure_difference",), "MPa_d", "bar_d", "10"),
+        (STATIC, ("torque",), "N cm", "N m", "100"),
+        (FLOW, PRESSURES, "psi_a", "kPa_a", "6.895"),
+    ],
+)
+def test_a_value_off_by_a_unit_is_not_identified_and_its_verdict_names_the_factor(
+    bench: tuple[RecordingSource, str],
+    channels: tuple[str, ...],
+    true: str,
+    read: str,
+    factor: str,
+    tmp_path: Path,
+) -> None:
+    found = solved(tmp_path, *bench, dict.fromkeys(channels, (true, read)))
+    wrong = found.estimates[0]
+    mistake = f"{true.partition('_')[0]} read as {read.partition('_')[0]}, a factor of {factor}"
+    seem = "seem" if len(channels) > 1 else "seems"
+    assert wrong.verdict_text == f"unit probably wrong: {' and '.join(channels)} {seem} to be {mistake}"
+    assert wrong.path not in (*found.new_set.written, *found.new_set.fitted)
+    assert not found.is_good
+
+
+def test_the_friction_beside_a_pressure_in_the_wrong_unit_stays_identified(tmp_path: Path) -> None:
+    found = solved(tmp_path, planted.static(), STATIC[1], {"pressure_difference": ("psi_d", "kPa_d")})
+    assert found.new_set.written == ("friction.static_torque",)
+
+
+def test_a_value_that_the_person_expects_is_no_mistake_of_units(tmp_path: Path) -> None:
+    expected = 'device.overrides = ["actuator.torque_constant=100 cm^3"]\n'
+    found = solved(tmp_path, *STATIC, {"pressure_difference": ("psi_d", "kPa_d")}, expected)
+    assert found.estimates[0].verdict == "identified"
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0, 4.0, 7.0, 8.0, 10.0, 15.0, 30.0])
+def test_a_device_that_is_larger_throughout_is_no_mistake_of_units(size: float, tmp_path: Path) -> None:
+    source = planted.static(noise=0.03 * size)
+    channel = source.recording.channels["torque"]
+    larger = source.recording.with_channel("torque", size * channel.values, "N m")
+    found = solved(tmp_path, RecordingSource(larger), STATIC[1], {})
+    assert {estimate.verdict for estimate in found.estimates[:2]} == {"identified"}
+    assert found.is_good
+
+
+def values(**factors: float) -> tuple[Estimate, ...]:
+    return tuple(
+        Estimate(path, factor, "N m", 0.9 * factor, 1.1 * factor, "identified", "said", ("r.csv",))
+        for path, factor in factors.items()
+    )
+
+
+@pytest.mark.parametrize(
+    ("factors", "wrong"),
+    [
+        ({"inertia": 103.0, "damping": 97.0}, {"inertia", "damping"}),
+        ({"inertia": 103.0, "damping": 97.0, "friction": 1.2}, set()),
+        ({"inertia": 103.0, "damping": 31.0}, set()),
+        ({"inertia": 40.0}, set()),
+        ({"inertia": 1.3, "damping": 4.0}, set()),
+    ],
+)
+def test_values_of_a_fit_of_motion_that_are_all_off_by_one_factor_have_a_wrong_unit(
+    factors: dict[str, float], wrong: set[str]
+) -> None:
+    torque = Recording("r", np.arange(3.0), {"external_torque": Channel(np.ones(3), "N m", stated="N m")})
+    judged = with_wrong_units(values(**factors), dict.fromkeys(factors, 1.0), [torque])
+    named = {item.path for item in judged if item.verdict == "unit probably wrong"}
+    assert named == wrong
+    assert all("N cm read as N m, a factor of 100" in item.verdict_text for item in judged if item.path in named)
