@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+import pickle
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -60,8 +61,12 @@ def shorter() -> Callable[[Scenario, float], Scenario]:
 
 @pytest.fixture(scope="session")
 def reproduction() -> Reproduction:
-    """The paper's experiments."""
-    return reproduce_paper()
+    """The paper's experiments, run once in a session, whichever process needs them first."""
+    from tests.built_once import once  # a plugin, which pytest loads first
+
+    run = once(("the paper's experiments",), lambda: pickle.dumps(reproduce_paper()))
+    found: Reproduction = pickle.loads(run.read_bytes())
+    return found
 
 
 @pytest.fixture

@@ -100,7 +100,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             try:
                 if point.name in self._own:
                     name = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
-                    raise KindError(f"{name}: ppafo already has a kind of this name; rename it")
+                    raise KindError(f"{name}: ppafo already has a kind with this name; rename the kind of the package")
                 if point.name not in self._kinds:
                     self._kinds[point.name] = self._load(point)
             except KindError as error:

@@ -88,10 +88,10 @@ def _found(plugin: str | Path) -> tuple[_Plugin, ...]:
         return (found, _Plugin(dotted, str(Path.cwd()))) if is_another else (found,)
     module = text.partition(":")[0]
     if path.suffix == _SUFFIX or not _MODULE.fullmatch(module):
-        raise KindError(f"plugin '{one_line(text)}': there is no such file; give a .py file, or the name of a module")
+        raise KindError(f"plugin '{one_line(text)}': file not found; give a .py file, or the name of a module")
     named = _of_module(module)
     if not named.folder and not _is_installed(module.partition(".")[0]):
-        raise KindError(f"plugin '{one_line(text)}': there is no such module here; give the path of its .py file")
+        raise KindError(f"plugin '{one_line(text)}': module not found; give the path of its .py file")
     return (named,)
 
 
@@ -175,7 +175,7 @@ def _imported(module: str, folder: str) -> Any:
             sys.path.remove(folder)
     files = [*getattr(loaded, "__path__", ()), getattr(loaded, "__file__", None) or ""]
     if folder and not any(Path(file).is_relative_to(folder) for file in files):
-        raise KindError(f"the module '{module}' of {folder} has the name of another one ({files[-1]}); rename it")
+        raise KindError(f"module '{module}' of {folder} has the name of another module ({files[-1]}); rename it")
     return loaded
 
 

@@ -123,7 +123,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     if not names:
         return verdict
     advice = f"{verdict.advice}; " if verdict.advice else ""
-    return replace(verdict, tried=f"{advice}other {names} alone did not mend it")
+    return replace(verdict, tried=f"{advice}other values of {names} alone did not suffice")
 
 
 def _trial_run(scenario: Scenario) -> RunSettings:

@@ -160,7 +160,7 @@ def test_the_check_of_the_scenario_page_finds_what_the_page_shows(
     found, rows = ({line.split("  ")[0]: line.endswith("  sensitive") for line in table} for table in tables)
     assert set(rows.values()) == {True, False}
     assert {name: found[name] for name in rows} == rows
-    assert "a measurement moved by 1e-07 of its range, far below what can be measured" in printed
+    assert "changed by moving a measurement by 1e-07 of its range, far less than can be measured" in printed
 
 
 def test_the_message_on_the_scenario_page_is_the_real_one() -> None:

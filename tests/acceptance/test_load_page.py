@@ -108,4 +108,4 @@ def test_gains_that_are_computed_for_an_angle_say_that_they_do_not_know_it() -> 
     for more, knows in (((), True), ((FAN,), False)):
         found = gains(load_scenario("swing-foot-angle", more))
         assert found is not None
-        assert found.sentence.endswith("; without the load of effects.fan") is not knows
+        assert found.sentence.endswith("; the load of effects.fan is not included") is not knows

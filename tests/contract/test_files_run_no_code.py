@@ -270,7 +270,8 @@ def test_a_module_that_is_not_there_is_one_line(
 ) -> None:
     assert main(["simulate", "torque-task-proportional", *words]) == 2
     said = capsys.readouterr().err
-    assert said.startswith(f"ppafo: plugin '{words[1]}': there is no such ")
+    assert said.startswith(f"ppafo: plugin '{words[1]}': ")
+    assert " not found; give " in said
     assert len(said.splitlines()) == 1
 
 

@@ -45,7 +45,7 @@ def test_the_printed_error_covers_temperatures_and_metrics() -> None:
     warm = ["gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"]
     error = simulate("step-response", overrides=[*warm, "gas_model.wall_area_per_volume=100 1/m"]).error()
     assert error.temperature is not None
-    assert f"and {error.temperature:.1e} K over time; of a metric at most {error.share:.1e} of it" in error.sentence
+    assert f"and {error.temperature:.1e} K over time; at most {error.share:.1e} of a metric's value" in error.sentence
     assert error.largest in error.metrics
     plain = simulate(load_scenario("step-response")).error()
     assert plain.temperature is None

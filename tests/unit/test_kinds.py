@@ -89,7 +89,10 @@ def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
     ours = CONTROLLERS["pid"]
     install("clashing_laws", LAW.format(name="on_off", call="pid"), controllers="pid")
     (problem,) = CONTROLLERS.load_all()
-    assert problem == ("controller 'pid' of package 'clashing_laws': ppafo already has a kind of this name; rename it")
+    assert problem == (
+        "controller 'pid' of package 'clashing_laws': ppafo already has a kind with this name; rename the kind of the "
+        "package"
+    )
     assert CONTROLLERS["pid"] is ours
 
 
@@ -256,7 +259,7 @@ def test_a_module_of_the_name_of_another_one_is_refused(tmp_path: Path, monkeypa
     monkeypatch.setattr(plugins, "_named", {})
     monkeypatch.setenv(plugins.VARIABLE, "")
     plugins.name_plugins(tmp_path / "json.py")
-    with pytest.raises(KindError, match=r"the module 'json' of .* has the name of another one .*; rename it"):
+    with pytest.raises(KindError, match=r"module 'json' of .* has the name of another module .*; rename it"):
         METRICS["json:KIND"]
 
 

@@ -185,7 +185,7 @@ class StepText:
             tree.body = [*tree.body, ast.copy_location(ast.Return(value), tree)]
         elif effects.results:
             raise reduction.refuse(
-                tree, f"function '{function.__name__}' both returns a value and sets 'lane' groups; do one of them"
+                tree, f"function '{function.__name__}' both returns a value and sets 'lane' groups; do only one"
             )
         parameters = [argument.arg for argument in tree.args.args]
         # The groups that it reads come before its own parameters.

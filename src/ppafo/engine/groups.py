@@ -113,7 +113,7 @@ def check_rows(count: int, rows: Mapping[str, Any], role: Role) -> None:
     sizes = {name: len(leaf_paths(row, name)) for name, row in rows.items()}
     if count != sum(sizes.values()):
         raise ProgramError(
-            f"{role.value}: a block must have {sum(sizes.values())} rows, it has {count}; rows of the program: "
+            f"{role.value}: a block must have {sum(sizes.values())} rows, not {count}; rows of the program: "
             + ", ".join(f"{name} {size}" for name, size in sizes.items() if size)
         )
 

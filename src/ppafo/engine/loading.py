@@ -123,7 +123,7 @@ def _load_by(source: str, compilers: tuple[Compiler, ...], effort: Effort) -> Mo
         return _load_by(source, left, effort)
     except UntranslatableError as refused:
         if os.environ.get(BACKEND_VARIABLE):
-            raise ProgramError(f"{refused}; {BACKEND_VARIABLE}={PYTHON} runs it") from refused
+            raise ProgramError(f"{refused}; set {BACKEND_VARIABLE}={PYTHON} to run it in Python") from refused
         # A law that calls, for instance, ``math.sin``.
         _say_slow(str(refused))
         return None

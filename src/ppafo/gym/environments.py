@@ -98,7 +98,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         if self.render_mode is None:
             return None
         if not self._frames:
-            raise SimulationError("there is no episode; call reset() first")
+            raise SimulationError("no episode has started; call reset() first")
         return picture(self._frames, self.world.task.unit, self._period, self.world.episodes.base.device)
 
     def _remember(self, error: float) -> None:
@@ -110,7 +110,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         Raises SimulationError before the first ``reset``.
         """
         if self._drawn is None:
-            raise SimulationError("there is no episode; call reset() first")
+            raise SimulationError("no episode has started; call reset() first")
         return self.world.episodes.shown(self._drawn)
 
     def numbers(self) -> dict[str, float]:

@@ -36,7 +36,7 @@ class FromOutside:
     def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
         """Raise an error, because an agent acts through its environment."""
         raise ScenarioError(
-            "this scenario has no controller, because the agent of an environment gives the commands; set a controller"
+            "this scenario has no controller, because the agent of an environment gives the commands; give a controller"
         )
 
 

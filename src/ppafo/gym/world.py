@@ -65,7 +65,7 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> _
     """
     for name in ("task_sequence", "bottle"):
         if getattr(walk_of(configuration), name) is not None:
-            raise ScenarioError(f"{configuration.origin.file}: {name}: is not supported in an environment; omit it")
+            raise ScenarioError(f"{configuration.origin.file}: {name}: not supported in an environment; omit this key")
     settings = configuration.controller.settings
     if not set(TorqueProfile._fields) <= set(settings):
         kind = configuration.controller.kind

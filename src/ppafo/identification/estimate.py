@@ -68,13 +68,13 @@ class Estimate:
 
     def __post_init__(self) -> None:
         if self.verdict not in _VERDICTS:
-            raise IdentificationError(f"'{self.verdict}' is not a verdict; allowed are {', '.join(_VERDICTS)}")
+            raise IdentificationError(f"verdict '{self.verdict}' is unknown; allowed: {', '.join(_VERDICTS)}")
         if not 0.0 < self.confidence < 1.0:
-            raise IdentificationError(f"a confidence must lie between 0 and 1, not {self.confidence!r}")
+            raise IdentificationError(f"confidence must be between 0 and 1, not {self.confidence!r}")
         if self.is_usable and not (math.isfinite(self.value) and self.low <= self.value <= self.high):
             raise IdentificationError(
-                f"{self.path}: a value called '{self.verdict}' must lie inside its interval, "
-                f"not {self.value!r} in {self.low!r} to {self.high!r}"
+                f"{self.path}: value {self.value!r} with verdict '{self.verdict}' must lie inside its interval, "
+                f"{self.low!r} to {self.high!r}"
             )
 
     @property

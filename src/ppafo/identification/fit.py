@@ -120,13 +120,13 @@ def fit(
     """
     if not numbers or not blocks:
         raise IdentificationError(
-            f"a fit needs at least one number and one block of residuals, it has {len(numbers)} and {len(blocks)}"
+            f"a fit needs at least one parameter and one block of residuals, not {len(numbers)} and {len(blocks)}"
         )
     for number in numbers:
         if not (number.low <= number.start <= number.high and number.low < number.high):
             raise IdentificationError(
-                f"{number.name}: bounds {number.low:g} to {number.high:g} with the start {number.start:g}: the lower "
-                "must be below the upper and the start between them"
+                f"{number.name}: bounds {number.low:g} to {number.high:g}, start {number.start:g}: the lower bound "
+                "must be below the upper bound and the start between them"
             )
     runs = FitRuns(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
     samples = sum(block.rows.stop - block.rows.start for block in blocks)

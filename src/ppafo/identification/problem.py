@@ -66,7 +66,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
     problem = validate(ProblemFile, document, file, IdentificationError)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
-        raise IdentificationError(f"{file}: give a [[procedure]] or a [trajectory]; it has neither")
+        raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]; give at least one")
     fitted = () if problem.trajectory is None else problem.trajectory.experiments
     named = [(f"procedure {number}", item.columns) for number, item in enumerate(problem.procedure, start=1)]
     named += [(f"experiment '{item.label}'", item.columns) for item in fitted]

@@ -139,8 +139,8 @@ class FreeDecayProblem(StrictTable):
             turned = float(angles.max() - angles.min())
             if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
                 raise IdentificationError(
-                    f"{source.name}: free-decay: 'angle' goes over {turned:.4g} rad, {turned / math.tau:.3g} turns, "
-                    f"and the stops of the set are {math.degrees(high - low):.4g} deg apart: is its unit deg?"
+                    f"{source.name}: free-decay: 'angle' covers {turned:.4g} rad ({turned / math.tau:.3g} turns), "
+                    f"but the stops of the set are {math.degrees(high - low):.4g} deg apart: is its unit deg?"
                 )
         static = number_in_si(context.parameter_set, "friction.static_torque")
         dynamic = number_in_si(context.parameter_set, "friction.dynamic_torque")
@@ -218,8 +218,8 @@ class VaneLeakProblem(StrictTable):
         if angle is not None:
             if context.parameter_set.actuator_kind != VANE:
                 raise IdentificationError(
-                    f"{context.label}: angle = {self.angle!r}: volumes follow from the angle of a vane only; give "
-                    "volume_1 and volume_2"
+                    f"{context.label}: angle = {self.angle!r}: volumes can be computed from the angle only for a vane; "
+                    "give volume_1 and volume_2"
                 )
             names = ("angle_min", "angle_max", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
             lower, upper, per_angle, dead_1, dead_2 = (context.number(f"actuator.{name}") for name in names)

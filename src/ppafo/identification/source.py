@@ -85,8 +85,8 @@ def double_use(uses: Iterable[UsedRecording], others: Iterable[UsedRecording] | 
     for (use, digest), (other, other_digest) in pairs:
         if digest == other_digest and use.overlaps(other):
             return (
-                f"{use.by} ({use.trace}) and {other.by} ({other.trace}) are the same recording, sha256 {digest[:12]} "
-                f"of its numbers: its samples would count twice"
+                f"{use.by} ({use.trace}) and {other.by} ({other.trace}) are the same recording (SHA-256 "
+                f"{digest[:12]}), so its samples would count twice"
             )
     return ""
 
@@ -133,7 +133,7 @@ def remarks_on_readings(sources: tuple[RecordingSource, ...]) -> tuple[str, ...]
             values = source.recording[name]
             remarks += [
                 f"{source.name}: '{name}' stays at {source.shown(name, plateau.value)} for {plateau.count} "
-                f"samples, from sample {plateau.first + 1}: a limit of the sensor?"
+                f"samples, from sample {plateau.first + 1}: the sensor may be at its limit"
                 for plateau in plateaus(values)
                 # Values that scatter elsewhere do not stay at an extreme for long by themselves.
                 if is_at_limit(values, plateau) or (plateau.count >= FEWEST_AT_LIMIT and scatters(values))

@@ -73,6 +73,6 @@ def conflict_in_words(fitted: Fit, remedy: str) -> str:
         return f"the residual of {conflict.group} is {errors:.0f} times its noise and too smooth to be noise; {remedy}"
     give = "give" if _SEVERAL & set(conflict.group.split()) else "gives"
     return (
-        f"fitted alone, {conflict.group} {give} different values, {conflict.number} by {errors:.1f} standard "
+        f"{conflict.group}, fitted alone, {give} different values: {conflict.number} by {errors:.1f} standard "
         f"errors; {remedy}"
     )

@@ -232,8 +232,8 @@ def advance_supply(
     if mass >= state.mass:
         raise SimulationError(
             f"{mass * GRAMS_PER_KILOGRAM:.3g} g of gas were drawn within {step:.3g} s from a bottle with "
-            f"{state.mass * GRAMS_PER_KILOGRAM:.3g} g: set bottle.coupling shorter, or bottle.least_torque higher, "
-            f"so that the walk ends before the bottle is bare"
+            f"{state.mass * GRAMS_PER_KILOGRAM:.3g} g: reduce bottle.coupling, or increase bottle.least_torque, "
+            f"so that the walk ends before the bottle is empty"
         )
     flow = mass / step
     # Heun's rule is stable up to 2 over the fastest rate; a tenth of that keeps it accurate too.

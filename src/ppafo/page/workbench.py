@@ -90,7 +90,7 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
         shorter = usual_values(named_scenario).get("run.duration") if isinstance(named_scenario, Scenario) else None
         if isinstance(named_scenario, Scenario) and shorter is not None and shorter < named_scenario.run.duration:
             part = f"{shorter:g} s of the {named_scenario.run.duration:g} s above"
-            remark = max(remark, f"It begins with {part}: lengthen run.duration to compare the numbers.")
+            remark = max(remark, f"The workbench begins with {part}: increase run.duration to compare the numbers.")
     html, policy = block_of(content, modules)
     return LivePart(policy, html, remark)
 
@@ -107,7 +107,7 @@ def _content(
     loaded = [load_scenario(scenario, overrides) if isinstance(scenario, str) else scenario for scenario in scenarios]
     repeated = [name for name, count in Counter(scenario.name for scenario in loaded).items() if count > 1]
     if repeated:
-        raise ScenarioError(f"two scenarios are called '{repeated[0]}'; a workbench distinguishes them by name")
+        raise ScenarioError(f"two scenarios are named '{repeated[0]}'; a workbench needs different names")
     simulated = []
     for scenario in loaded:
         with shown_in(scenario.device.shown):

@@ -132,7 +132,7 @@ def _cortex(name: str, part: str, pins: Mapping[str, str], flash: int, ram: int,
     """Declare a Cortex-M on a micro:bit with flash and RAM [bytes]; compilers are gcc, clang or zig."""
     for_zig = f"zig cc -target thumb-freestanding-eabi -mcpu={name.replace('-', '_')}"
     copy_rule = _FLASH.format(
-        said="Onto the drive that the board is", needs="firmware.hex", command='cp firmware.hex "$(MICROBIT)"'
+        said="Copy to the USB drive of the board", needs="firmware.hex", command='cp firmware.hex "$(MICROBIT)"'
     )
     words = {
         "needs": "gcc for ARM without a system",
@@ -146,7 +146,7 @@ def _cortex(name: str, part: str, pins: Mapping[str, str], flash: int, ram: int,
         "not_run": "timer and outputs run in QEMU's micro:bit V1, converter and watchdog have no simulator",
         "script": f"{part}.ld",
         "flash": copy_rule + _HEX,
-        "flash_said": "onto the drive that the board is, as in make flash MICROBIT=/media/MICROBIT",
+        "flash_said": "to the USB drive of the board, for example make flash MICROBIT=/media/MICROBIT",
         **{f"pin_{pin}": place for pin, place in pins.items()},
     }
     return Target(

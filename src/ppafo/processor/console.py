@@ -56,7 +56,7 @@ class Console:
 
     def _last(self) -> str:
         last = self._unread.decode(errors="replace").strip().splitlines()[-1:]
-        return f"the last it said: {one_line(' '.join(last))}"
+        return f"its last output: {one_line(' '.join(last))}"
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:

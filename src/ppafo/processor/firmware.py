@@ -200,7 +200,7 @@ def integer_form(scenario: Scenario) -> Scenario:
         return scenario
     if f"{kind}{FIXED_POINT}" not in FIXED_LAWS:
         raise ScenarioError(
-            f"{scenario.name}: the controller '{kind}' has no fixed-point form; controllers that have one: "
+            f"{scenario.name}: the controller '{kind}' has no fixed-point form; available: "
             f"{', '.join(name.removesuffix(FIXED_POINT) for name in FIXED_LAWS)}"
         )
     scenario.device.check_torque_constant("a fixed-point controller")

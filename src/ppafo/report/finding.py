@@ -252,7 +252,7 @@ class Finding(Generic[T_co]):
                 raise ArgumentError(f"'{name}' is an animation, not a figure: save() writes it as {name}.gif")
             named = f"no figure '{name}'" if name else "no figure"
             available = (
-                f": available are {', '.join(figures)}" if figures else ": print it, or save() its text and page"
+                f"; available: {', '.join(figures)}" if figures else "; print the result, or save() its text and page"
             )
             raise ArgumentError(f"a result of '{self.name}' has {named}{available}")
         return shown(drawn)

@@ -19,6 +19,6 @@ def live_part(scenarios: Sequence[Any], name: str = "workbench") -> LivePart | N
     try:
         make = LIVE_PARTS[name]
     except KindError as error:
-        return LivePart(remark=f"Nothing simulates on this page: the {error}.")
+        return LivePart(remark=f"This page cannot simulate: the {error}.")
     part: LivePart | None = make(scenarios)
     return part

@@ -78,11 +78,11 @@ def record(
     if not isinstance(preset, Preset):
         preset = load_preset(preset, of_preset)
     elif of_preset:
-        raise ParameterError(f"override '{of_preset[0]}': change a preset object itself, with Preset.with_value")
+        raise ParameterError(f"override '{of_preset[0]}': not allowed with a preset object; use Preset.with_value")
     kind = load_parameter_set(device).actuator_kind
     if kind != VANE:
         raise ParameterError(
-            f"the simulated test bench supports vane actuators only, and '{one_line(device)}' has an actuator '{kind}'"
+            f"the simulated test bench supports vane actuators only, but '{one_line(device)}' has an actuator '{kind}'"
         )
     result = run(ExperimentRequest(preset, seed, device, valve, others, progress))
     truth = {

@@ -70,13 +70,13 @@ def real_device(device: Device, preset: Preset) -> Device:
     Raises ParameterError for a device with an active effect, because the rig has its own physics and would ignore the
     effect, and for a device that works on vacuum, because the supplies of the rig are pressure regulators.
     """
-    device.check_pressurised("the simulated bench", "; take the recording of a simulated run")
+    device.check_pressurised("the simulated bench", "; use the recording of a simulated run")
     for effect in (effect for effect, is_on in switches_of(device).items() if is_on):
         zeros = {quantity.name: f"0 {quantity.unit}".strip() for quantity in effect.quantities}
         off = " and ".join(f"'{SECTION}.{effect.name}.{name}={zeros[name]}'" for name in effect.switch)
         raise ParameterError(
-            f"the simulated bench has no effect '{effect.name}': switch it off with {off}, or take the recording of a "
-            "simulated run"
+            f"the simulated bench has no effect '{effect.name}': switch the effect off with {off}, or use the "
+            "recording of a simulated run"
         )
     declared = {quantity.name for quantity in VALVES[device.valve.kind].quantities}
     settings = dict(device.valve.settings)

@@ -93,7 +93,7 @@ def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float 
     run = plan_run(replace(scenario, device=device))
     if run.program.valve.joint is not None:
         raise ScenarioError(
-            f"the simulated test bench has no valve between the chambers: valve '{device.valve.kind}' has one"
+            f"the simulated test bench does not support valve '{device.valve.kind}', which joins the chambers"
         )
     physics, (plant, line) = rig_physics(device, preset), with_line(device, run.plant, preset)
     run = replace(run, plant=plant)

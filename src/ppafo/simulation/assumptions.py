@@ -62,7 +62,7 @@ def _value_text(reading: DocumentReader, hardware: Hardware, path: str) -> str |
             return "false"
         quantity = hardware.parameter_set.declarations().get(full)
     if quantity is not None and quantity.default is None and quantity.follows:
-        return "the value that follows from the device"
+        return "the value computed from the device"
     return None if quantity is None or quantity.default is None else written_text(quantity.default, quantity.unit)
 
 

@@ -126,7 +126,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
             if law.needs_reference and law.controls == (TORQUE,):
                 # These open the valve by their own idea of the device, where a command above 0 raises the torque.
                 able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
-                device.check_pressurised(f"the controller '{control.kind}'", f"; take one of {able}")
+                device.check_pressurised(f"the controller '{control.kind}'", f"; set controller.kind to one of {able}")
             if law.plan is not None:
                 device.check_torque_constant("a fixed-point controller")
         except ParameterError as error:
@@ -164,11 +164,11 @@ def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:
         if isinstance(word, str) and not any(character.isdigit() for character in word):
             words = ", ".join(PRESSURE_WORDS)
             hint = nearest_name(word, PRESSURE_WORDS)
-            raise reading.refusal(path, f"is neither a pressure such as '50 psi_g' nor one of {words}{hint}")
+            raise reading.refusal(path, f"must be a pressure, for example '50 psi_g', or one of {words}{hint}")
         pressures.append(reading.number(path, quantity, supply.atmospheric_pressure))
         links[path] = gauge_link(path, *split_quantity(str(word)))
     if device.actuator.has_one_chamber and pressures[1] != supply.atmospheric_pressure:
-        raise reading.refusal("initial.pressure_2", f"{WHY_ONE_CHAMBER}; leave it out, or write '{AT_REST}'")
+        raise reading.refusal("initial.pressure_2", f"{WHY_ONE_CHAMBER}; omit this key, or write '{AT_REST}'")
     return Initial(*pressures), {path: links for path, links in links.items() if links}
 
 
@@ -217,12 +217,10 @@ def _controlled(reading: DocumentReader) -> str:
         return controlled
     able = ", ".join(name for name, other in CONTROLLERS.items() if controlled in other.controls)
     follows = " or ".join(CONTROLLED[name].words for name in law.controls)
-    remedy = f'give [reference] of = "{law.controls[0]}", or take one of {able}'
+    remedy = f'give [reference] of = "{law.controls[0]}", or set controller.kind to one of {able}'
     # A reference that says nothing is of a torque, which a law of another quantity cannot follow.
     path = REFERENCE_OF if value_at(reading.document, REFERENCE_OF) is not None else "controller.kind"
-    raise reading.refusal(
-        path, f"the controller '{kind}' follows a reference of {follows}, not of {controlled}; {remedy}"
-    )
+    raise reading.refusal(path, f"the controller '{kind}' follows a reference of {follows}, not {controlled}; {remedy}")
 
 
 def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> tuple[ProfileChoice, Graph]:
@@ -250,7 +248,7 @@ def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> t
 def _sensors(reading: DocumentReader, clock: RunTimes) -> Sensors:
     values: dict[str, Any] = reading.section("sensors", SENSORS)
     if values["delay"] > clock.duration:
-        raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
+        raise reading.refusal("sensors.delay", "must not be longer than run.duration, or no measurement would arrive")
     if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
         longest = shown_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
         raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
@@ -283,8 +281,8 @@ def read_supply_line(reading: DocumentReader, device: Device) -> SupplyLine | No
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
         raise ScenarioError(
-            f"{reading.file}: [{SUPPLY_LINE}]: its second regulator is fed by the first, so "
-            f"supply.dorsiflexion_pressure, {second}, cannot be above supply.pressure, {first}"
+            f"{reading.file}: [{SUPPLY_LINE}]: the first regulator feeds the second, so "
+            f"supply.dorsiflexion_pressure = {second} must not exceed supply.pressure = {first}"
         )
     read = {line: reading.section(f"{SUPPLY_LINE}.{line}", line_quantities(line)) for line in SUPPLY_LINES}
     return SupplyLine(**{line: RegulatedLine(**numbers) for line, numbers in read.items()})

@@ -98,12 +98,12 @@ class ErrorEstimate:
         in_display_units = [metric_change(error, unit) for unit, error in errors.items() if error is not None]
         texts = [f"{without_exponent(value, '.1e')} {unit}" for value, unit in in_display_units]
         over_time = f"{', '.join(texts[:-1])} and {texts[-1]}"
-        of_metrics = f"; of a metric at most {self.share:.1e} of it ({self.largest})" if self.largest else ""
+        of_metrics = f"; at most {self.share:.1e} of a metric's value ({self.largest})" if self.largest else ""
         beyond = ""
         if self.over_promise > 1.0:
             remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it" if self.tolerance else ""
-            beyond = f" That is {self.over_promise:.2g} times the accuracy that a run promises{remedy}."
-        return f"Estimated error of the steps: at most {over_time} over time{of_metrics}.{beyond}"
+            beyond = f" That is {self.over_promise:.2g} times the promised accuracy of a run{remedy}."
+        return f"Estimated error of the time steps: at most {over_time} over time{of_metrics}.{beyond}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +165,7 @@ class Check:
         """Result of the check in plain words."""
         if self.is_determined:
             return (
-                f"All metrics are repeatable: none changes by more than {ALLOWED_CHANGE:.0e} of its value or its "
+                f"All metrics are repeatable: no metric changes by more than {ALLOWED_CHANGE:.0e} of its value or "
                 f"range. {self.error.sentence}"
             )
         sensitive = [row for row in (*self.metrics, *self.courses) if not row.is_determined]
@@ -176,17 +176,17 @@ class Check:
             sweep = argument_text("ppafo.sweep(..., statistic=...)", option="ppafo sweep --statistic")
             kinds = {name.split()[0] for row in sensitive for name in row.changed_by & _PERTURBATIONS}
             sentences.append(
-                f"{', '.join(perturbed)}: a {' or '.join(sorted(kinds, reverse=True))} moved by {MOVE:.0e} of its "
-                "range, far below what can be measured, changes them. One run is no evidence of their values; give "
+                f"{', '.join(perturbed)}: changed by moving a {' or '.join(sorted(kinds, reverse=True))} by {MOVE:.0e} "
+                "of its range, far less than can be measured. One run does not determine these values; give "
                 f"the spread over many runs ({sweep})."
             )
         if inexact:
             sentences.append(
-                f"{', '.join(inexact)}: finer steps with a sixteenth of the error change them. Take a smaller "
+                f"{', '.join(inexact)}: changed by finer steps with a sixteenth of the error. Set a smaller "
                 "run.tolerance and check again; metrics that still change are not repeatable."
             )
         if self.failed:
-            sentences.append(f"how it ends: the run with {' and that with '.join(self.failed)} diverged.")
+            sentences.append(f"completion: the run with {' and the run with '.join(self.failed)} diverged.")
         separation = [] if self.parts_at is None else [f"The runs separate at t = {self.parts_at:.4g} s."]
         return " ".join([f"Numerically sensitive: {' Also: '.join(sentences)}", self.error.sentence, *separation])
 
@@ -303,8 +303,8 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
         same = rerun([run])[0].recording
         if not all(np.array_equal(same[name], recording[name]) for name in same.names):
             raise SimulationError(
-                f"{scenario.name}: {type(controller).__name__} gives a different run each time, so nothing can be "
-                f"checked; its reset() must forget everything, and its random numbers need a fixed seed"
+                f"{scenario.name}: {type(controller).__name__} gives different results in equal runs and cannot "
+                f"be checked; reset() must restore the initial state, and random numbers need a fixed seed"
             )
     starts = [start_moved(run, move, opposite) for opposite in (1.0, -1.0) for move in (MOVE, -MOVE)]
     runs = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]

@@ -57,26 +57,27 @@ def read_clock(reading: DocumentReader) -> RunTimes:
         if output < step * (1.0 - _RELATIVE):
             raise reading.refusal(
                 _OUTPUT_PATH,
-                f"must not be below {_STEP_PATH} = {shown_text(step, 's')}; take a smaller step or record less often",
+                f"must not be below {_STEP_PATH} = {shown_text(step, 's')}; reduce the step or record less often",
             )
         _not_above(reading, _OUTPUT_PATH, output, _DURATION_PATH, duration)
         count = duration / output
         if abs(count - round(count)) > _RELATIVE * count:
             raise reading.refusal(
-                _OUTPUT_PATH, f"must divide {_DURATION_PATH} = {shown_text(duration, 's')}, it fits {count:.6g} times"
+                _OUTPUT_PATH,
+                f"must divide {_DURATION_PATH} = {shown_text(duration, 's')} evenly, not {count:.6g} times",
             )
     used = dividing_step(period, step)
     if duration / used > MAXIMUM_STEPS:
         raise reading.refusal(
             _DURATION_PATH,
             f"with a step of {shown_text(used, 's')} the run has {duration / used:.3g} steps, at most "
-            f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or take a larger {_STEP_PATH}",
+            f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or increase {_STEP_PATH}",
         )
     if duration / output > MAXIMUM_OUTPUTS:
         raise reading.refusal(
             _DURATION_PATH,
             f"recorded every {shown_text(output, 's')} the run has {duration / output:.3g} samples, at most "
-            f"{MAXIMUM_OUTPUTS:.0e} are allowed: take a larger {_OUTPUT_PATH}",
+            f"{MAXIMUM_OUTPUTS:.0e} are allowed: increase {_OUTPUT_PATH}",
         )
     return RunTimes(duration, used, output, period)
 
@@ -131,7 +132,7 @@ def output_unless_given(duration: Numeric, period: Numeric, step: Numeric) -> Nu
 
 def _not_above(reading: DocumentReader, path: str, value: float, limit_path: str, limit: float) -> None:
     if value > limit * (1.0 + _RELATIVE):
-        raise reading.refusal(path, f"must not be above {shown_text(limit, 's')}, which {limit_path} gives")
+        raise reading.refusal(path, f"must not exceed {limit_path} = {shown_text(limit, 's')}")
 
 
 TimeTexts = Mapping[str, Mapping[str, Any]]

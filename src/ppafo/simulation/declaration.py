@@ -260,8 +260,8 @@ def check_motion_kind(kind: object, place: str) -> None:
         walks = isinstance(kind, str) and is_walk(kind)
     if walks:
         raise ScenarioError(
-            f"{place}: this motion is a walk, but a scenario file has the motion of the vane alone; 'ppafo new "
-            f"walk' writes a walk file"
+            f"{place}: a walk needs a walk file, not a scenario file, which moves the vane only; 'ppafo new walk' "
+            f"writes a walk file"
         )
 
 

@@ -166,7 +166,7 @@ def loop_terms(
             parts: _GainParts | JointGainParts
             stages = None
             if gain is gain_of_joint:
-                assert loops.joint is not None, "a law of the angle knows its joint"
+                assert loops.joint is not None, "an angle controller has a joint"
                 parts = JointGainParts(loops.torque_loop, loops.joint, rule)
                 # In a study the loop costs more than the run: all gains of the joint have one.
                 shared = made_of(

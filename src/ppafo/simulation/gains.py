@@ -53,7 +53,7 @@ class Gains:
             gains = [gain for gain in self.gains if gain.computed == computed]
             texts = [f"{gain.name} {gain.value:.3g} {gain.unit}".rstrip() for gain in gains]
             parts += [f"{', '.join(texts)} {origin}"] if texts else []
-        without = f"; without the load of {', '.join(self.unknown_loads)}" if self.unknown_loads else ""
+        without = f"; the load of {', '.join(self.unknown_loads)} is not included" if self.unknown_loads else ""
         return f"gains: {'; '.join(parts)}{without}"
 
 
@@ -104,8 +104,8 @@ def remark_on_following_gains(scenario: Scenario, varied: Collection[str]) -> st
     )
     names = ", ".join(gain.name for gain in following)
     return (
-        f"{subject_text(scenario.name)}: {names} {'is' if len(following) == 1 else 'are'} computed anew from the "
-        f"varied values, as if the controller knew them in every run; for the gains of the nominal device: {options}"
+        f"{subject_text(scenario.name)}: {names} {'is' if len(following) == 1 else 'are'} recomputed from the "
+        f"varied values, as if the controller knew them in every run; for the nominal gains give {options}"
     )
 
 

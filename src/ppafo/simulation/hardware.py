@@ -90,7 +90,7 @@ def _replaced_text(
         return ""
     entries = [(item.typed, parameter_set.numbers.get(item.typed)) for item in replaced]
     kept = [f"{path}={entry.value:.12g} {entry.unit}".rstrip() for path, entry in entries if entry is not None]
-    keeping = f"; {override_text(kept)} keeps its own" if kept else ""
+    keeping = f"; {override_text(kept)} restores the replaced values" if kept else ""
     return f"values of the scenario replace values of {name}: {', '.join(map(str, replaced))}{keeping}"
 
 

@@ -80,8 +80,8 @@ def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str,
     def external_torque(torque: Floats) -> Floats:
         # T_ex by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it.
         carried, plant = _leg_of(scenario), run.plant
-        assert leg is not None, "the run has the leg of its scenario"
-        assert kind is not None, "the run has the shank of its leg"
+        assert leg is not None, "a run on a leg has a leg"
+        assert kind is not None, "a run on a leg has a shank motion"
         # The foot alone: inertia and weight of vane and foot plate are on the other side of T_ex.
         of_foot = carried.foot_mass, carried.foot_mass_centre, carried.foot_inertia
         foot = foot_load(0.0, 0.0, *of_foot, carried.shank_length)

@@ -89,7 +89,7 @@ def scenario_or_load(
         return load(scenario, overrides)
     if tuple(overrides):
         raise ScenarioError(
-            f"{scenario.name}: overrides apply to the name or file of a scenario; give them when loading the scenario"
+            f"{scenario.name}: a loaded scenario accepts no overrides; give the overrides when loading the scenario"
         )
     check_parts(scenario)
     return scenario
@@ -107,7 +107,7 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()
 def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> ScenarioRequest:
     """Return the request for a scenario of nested dictionaries; ScenarioError for other data or too deep nesting."""
     if not isinstance(content, Mapping):
-        raise ScenarioError(f"a scenario is a dictionary laid out as a scenario file, not a {type(content).__name__}")
+        raise ScenarioError(f"a scenario must be a dictionary like a scenario file, not a {type(content).__name__}")
     file = _name_in_messages(content)
     FILE.check_depth(content, file)
     # A copy: the scenario is loaded anew from it, whatever becomes of the caller's dictionaries.

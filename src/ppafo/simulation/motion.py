@@ -160,7 +160,7 @@ def _read_free(reading: DocumentReader, device: Device, _duration: float, _step:
 
 FREE_MOTION = VaneKind(
     name="free",
-    section=MotionSection("the vane moves as the torques demand", FREE, _read_free),
+    section=MotionSection("the torques move the vane", FREE, _read_free),
     plan=_plan,
     measured=_measured,
 )
@@ -223,7 +223,7 @@ def _read_leg(reading: DocumentReader, device: Device, _duration: float, _step: 
         if not PROFILES[kind].is_smooth:
             smooth = ", ".join([name for name, profile in PROFILES.items() if profile.is_smooth] + [GAIT_SHANK])
             raise reading.refusal(
-                f"{_SHANK}.kind", f"this profile has corners, at which the angular velocity jumps; use {smooth}"
+                f"{_SHANK}.kind", f"this profile has corners where the angular velocity jumps; use {smooth}"
             )
         return FreeMotion(*start, leg=Leg(**numbers, shank=shank))
     # A vane alone, or on a shank at rest, loads no gaits.
@@ -252,7 +252,7 @@ def _measured_leg(scenario: Scenario, run: "Run", times: "Floats", rows: "Mappin
 LEG_MOTION = VaneKind(
     name="leg",
     section=MotionSection(
-        "the vane moves a foot that is free, on a shank that is led",
+        "the vane moves a free foot on a shank with prescribed motion",
         LEG,
         _read_leg,
         ProfileTable(

@@ -91,7 +91,7 @@ def check_parts(scenario: Scenario) -> None:
                 name, part, "must be a text" if kind is str else f"must be an object of class {kind.__name__}"
             )
     if not hasattr(scenario.motion, "motion_kind"):
-        raise refusal("motion", scenario.motion, "must be a motion, such as FreeMotion")
+        raise refusal("motion", scenario.motion, "must be a motion object such as FreeMotion")
     if not isinstance(scenario.controlled, str) or scenario.controlled not in CONTROLLED:
         raise refusal("controlled", scenario.controlled, f"must be one of {', '.join(CONTROLLED)}")
     absent = _numbers_of_other_form(scenario.device) | {_RATE}

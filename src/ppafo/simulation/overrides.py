@@ -71,9 +71,9 @@ def apply_overrides(
             raise unknown_value(override, (*known, *declared.same), f"{file} has")
         section = f"{deciding[-1].rpartition('.')[0]}."
         names = [name for name in (*known, *declared.same) if name.startswith(section)]
-        hint = nearest_name(path, names) or f"; there it has {', '.join(names)}"
+        hint = nearest_name(path, names) or f"; available: {', '.join(names)}"
         raise ScenarioError(
-            f"overrides '{override}' and '{scenario_overrides[deciding[-1]]}': with the latter {file} has no value "
+            f"override '{override}': with override '{scenario_overrides[deciding[-1]]}' {file} has no value "
             f"'{path}'{hint}"
         )
     for path in remaining:

@@ -202,7 +202,7 @@ def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
         if is_present:
             off = " and ".join(f"{density_effect.section}.{name}=0" for name in density_effect.switch)
             raise ScenarioError(
-                f"effect '{density_effect.name}' cannot be combined with {component}; omit it, or set {off}"
+                f"effect '{density_effect.name}' cannot be combined with {component}; omit {component}, or set {off}"
             )
     from ppafo.engine.step import not_ideal  # most runs have ideal gas
 
@@ -337,7 +337,7 @@ def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
         duration, length, count = (at(number, run) for number in (scenario.run.duration, step, step_count))
         return (
             f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MAXIMUM_STEPS:.0e} "
-            "are allowed: shorten the run or take a larger run.step"
+            "are allowed: shorten the run or increase run.step"
         )
 
     return step_count > MAXIMUM_STEPS, line

@@ -115,7 +115,7 @@ def profile_problem(
             if not lowest <= reached <= highest:
                 return (
                     f"[{section}] leaves {limits.words}, {limits.text(limits.lowest)} to "
-                    f"{limits.text(limits.highest)}: it is at {limits.text(reached)} at {moment:.6g} s"
+                    f"{limits.text(limits.highest)}: {limits.text(reached)} at {moment:.6g} s"
                 )
     return ""
 
@@ -127,18 +127,18 @@ def reference_problem(scenario: Scenario) -> str:
         return ""
     if scenario.controlled == ANGLE and vane_motion(scenario).profile is not None:
         return (
-            f"reference.of = 'angle': motion.kind = '{scenario.motion.motion_kind.name}' moves the angle by itself; "
-            "take motion.kind = 'free' or 'leg'"
+            f"reference.of = 'angle': motion.kind = '{scenario.motion.motion_kind.name}' prescribes the angle; "
+            "set motion.kind to 'free' or 'leg'"
         )
     valve = scenario.device.valve.kind
     if scenario.controlled == ANGLE and VALVES[valve].vents_at_rest:
         return (
-            f"reference.of = 'angle': a valve of kind '{valve}' vents both chambers at a command of 0 and holds no "
-            "angle; take one that is closed there, such as device.valve = 'proportional'"
+            f"reference.of = 'angle': a valve of kind '{valve}' vents both chambers at command 0 and cannot hold an "
+            "angle; choose a valve that is closed at command 0, such as device.valve = 'proportional'"
         )
     if scenario.device.actuator.has_one_chamber and scenario.controlled in OF_SECOND_CHAMBER:
         return (
-            f"reference.of = '{scenario.controlled}': {scenario.device.name} has one chamber; take reference.of = "
+            f"reference.of = '{scenario.controlled}': {scenario.device.name} has only one chamber; set reference.of to "
             "'pressure_1'"
         )
     limits, run = limits_of(scenario.device, CONTROLLED[scenario.controlled]), scenario.run

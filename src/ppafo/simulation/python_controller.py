@@ -54,7 +54,7 @@ def _valve_command(command: Any, controller: PythonController, time: float, walk
     if limited != command and type(controller) not in _REPORTED_CLASSES:
         _REPORTED_CLASSES.add(type(controller))
         logger.warning(
-            "ppafo: %s.update returned %g at t = %.6g s; commands are %s: those beyond are limited",
+            "ppafo: %s.update returned %g at t = %.6g s; commands must be %s and are limited to this range",
             name,
             command,
             time,
@@ -70,7 +70,7 @@ def _programming_error(controller: PythonController, error: NameError | Attribut
     if frame.f_code.co_filename == __file__:
         # The method's own body has not begun: its arguments do not fit.
         signatures = "reset(self) and update(self, time, reference, measurement)"
-        return SimulationError(f"{type(controller).__name__}: {error}; write {signatures}")
+        return SimulationError(f"{type(controller).__name__}: {error}; define {signatures}")
     name, hint = getattr(error, "name", None), ""
     if name is not None and isinstance(error, AttributeError):
         hint = nearest_name(name, [known for known in dir(error.obj) if not known.startswith("_")])

@@ -107,9 +107,7 @@ class FreeMotion:
     @property
     def form(self) -> str:
         """Form of the motion in words, independent of its numbers."""
-        return (
-            "free" if self.leg is None else f"free with the foot of a leg, whose shank is led, `{self.leg.shank.kind}`"
-        )
+        return "free" if self.leg is None else f"free with the foot of a leg, shank motion `{self.leg.shank.kind}`"
 
     @property
     def label(self) -> str:

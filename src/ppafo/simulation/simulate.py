@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ppafo.simulation.tracking import Tracking
 
 REMEDY = (
-    "the step may be too long for this device, or a value unrealistic: try a smaller run.step, "
+    "the time step may be too long for this device, or a value unrealistic: try a smaller run.step, "
     "and check the inertia, the volumes and the valve area (ppafo sets audit)"
 )
 
@@ -186,7 +186,7 @@ class Result:
         time.
         """
         if not self.status.is_completed:
-            raise SimulationError(f"{self.scenario.name}: the run diverged, so there is nothing to check")
+            raise SimulationError(f"{self.scenario.name}: the run diverged and cannot be checked")
         from ppafo.simulation.check import checked
 
         return checked(self, plan_run(self.scenario), partial(results_of, self.scenario))

@@ -104,7 +104,7 @@ def study_of(
     if not isinstance(study, Study):
         return load_study(study, overrides, draws=draws, seed=seed)
     if tuple(overrides) or draws is not None or seed is not None:
-        raise StudyError("a loaded Study takes no overrides, draws or seed; give them to load_study, or give its name")
+        raise StudyError("a loaded Study accepts no overrides, draws or seed; give these to load_study")
     return study
 
 
@@ -114,10 +114,10 @@ def uncertainty_of(study: Study) -> Uncertainty:
     if study.axes:
         raise StudyError(
             f"study '{study.name}': '{study.axes[0].path}' is varied over a grid or list, which has no "
-            "probability; give it a distribution, or omit it"
+            "probabilities; give a distribution, or omit this [[vary]]"
         )
     if not study.drawn:
-        raise StudyError(f"study '{study.name}': nothing in it has a distribution; give it a [[vary]] of kind 'normal'")
+        raise StudyError(f"study '{study.name}': no value has a distribution; give a [[vary]] with kind = 'normal'")
     return Uncertainty(study.drawn, study.scores, study.same, study.gauge)
 
 
@@ -126,9 +126,7 @@ def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
     whole = uncertainty_of(study)
     kept = [row for row, drawn in enumerate(whole.drawn) if study.varies(drawn.path, configuration.name)]
     if not kept:
-        raise StudyError(
-            f"study '{study.name}': nothing has a distribution in the configuration '{configuration.name}'"
-        )
+        raise StudyError(f"study '{study.name}': no value has a distribution in configuration '{configuration.name}'")
     same, scores = study.same_in(configuration.name), whole.scores
     if len(kept) == len(whole.drawn):
         return replace(whole, same=same)

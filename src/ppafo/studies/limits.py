@@ -31,7 +31,7 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
             raise StudyError(f"scenario '{scenario.name}' has no '{name}': {reason}")
     repeated = first_twice(metrics)
     if repeated is not None:
-        raise StudyError(f"the metric '{repeated}' is named twice")
+        raise StudyError(f"metric '{repeated}' is named twice; name it once")
 
 
 def check_fraction(value: float, name: str, least: float = 0.0) -> None:
@@ -62,8 +62,8 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
     level = levels.pop() if len(levels) == 1 else None
     if level is None:
         raise StudyError(
-            f"{what}: is a gauge pressure, but {ATMOSPHERE_PATH} varies; give an absolute pressure, for example "
-            "'446 kPa_a'"
+            f"{what}: must not be a gauge pressure, because {ATMOSPHERE_PATH} varies; give an absolute pressure, for "
+            "example '446 kPa_a'"
         )
     return level
 

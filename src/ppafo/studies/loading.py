@@ -139,7 +139,7 @@ def _load(
         if given and parsed.sample is None:
             if any(not isinstance(entry, declared.NOT_RANDOM) for entry in parsed.vary):
                 raise StudyError(NO_SAMPLE)
-            raise StudyError("has no [sample], so its runs are not random; omit draws and seed")
+            raise StudyError("has no [sample], so the runs are not random; omit draws and seed")
         if given:
             document["sample"] |= given
     parsed = validate(declared.StudyFile, document, source.file, StudyError)
@@ -174,7 +174,7 @@ def _build(
     """
     repeated = first_twice([configuration.name for configuration in parsed.configurations])
     if repeated is not None:
-        raise StudyError(f"there are two configurations named '{repeated}'; give each its own name")
+        raise StudyError(f"two configurations are named '{repeated}'; give every configuration a different name")
     configurations = tuple(_configuration(configuration, source.folder) for configuration in parsed.configurations)
     outputs = parsed.outputs
     if not parsed.vary and len(configurations) == 1:
@@ -182,10 +182,10 @@ def _build(
     paths = [entry.path for entry in parsed.vary]
     # Rows of channels over time are lists of one length, and bands are quantiles at one time.
     if "run.duration" in paths and (outputs.trajectories or outputs.bands):
-        raise StudyError("'run.duration' cannot vary where trajectories or bands are kept: they need one length")
+        raise StudyError("'run.duration' cannot vary with trajectories or bands, which need runs of equal length")
     repeated = first_twice(paths)
     if repeated is not None:
-        raise StudyError(f"'{repeated}' is varied twice; give it only one [[vary]]")
+        raise StudyError(f"'{repeated}' is varied twice; omit one [[vary]]")
     _check_set_or_varied(parsed, configurations)
     scenarios = [configuration.scenario for configuration in configurations]
     varied_paths = {entry.path: _common_path(entry, configurations, parsed) for entry in parsed.vary}
@@ -247,8 +247,8 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
                 continue
             raise StudyError(
                 f"configuration '{section.name}': '{set_values[ignored]}' is set and '{entry.path}' is varied, so the "
-                "set value would be ignored; omit one, or restrict the [[vary]] to the other configurations with "
-                "'only'"
+                "set value would be ignored; omit one of them, or restrict the [[vary]] to the other configurations "
+                "with 'only'"
             )
 
 
@@ -272,7 +272,7 @@ def _common_path(
     if any(other != varied for other in others):
         raise StudyError(
             f"vary '{entry.path}': has different units, limits or atmospheres in different "
-            f"configurations; restrict it with 'only'"
+            f"configurations; restrict the [[vary]] with 'only'"
         )
     varied = given_in(varied, texts_of(entry))
     # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
@@ -313,7 +313,7 @@ def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, Varie
             continue
         if entry.same_as not in independent:
             hint = nearest_name(entry.same_as, independent) or f"; available: {', '.join(independent) or 'none'}"
-            raise StudyError(f"vary '{entry.path}': same_as = '{entry.same_as}' does not vary independently here{hint}")
+            raise StudyError(f"vary '{entry.path}': same_as = '{entry.same_as}' does not vary independently{hint}")
         unit, other = varied_paths[entry.path].quantity.unit, varied_paths[entry.same_as].quantity.unit
         if unit != other:
             raise StudyError(
@@ -339,7 +339,7 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Factor 
         for path in pair.between:
             if path not in paths:
                 raise StudyError(
-                    f"correlations: '{path}' has no distribution here{nearest_name(path, paths)}; available: {paths}"
+                    f"correlations: '{path}' has no distribution{nearest_name(path, paths)}; available: {paths}"
                 )
         if first == other or (first, other) in coefficients or (other, first) in coefficients:
             raise StudyError(
@@ -354,7 +354,7 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Factor 
     if factor is None:
         shown = ", ".join(f"{first} with {other}: {value:g}" for (first, other), value in coefficients.items())
         raise StudyError(
-            f"correlations: contradict each other, their matrix is not positive definite ({shown}); make them smaller"
+            f"correlations: the correlation matrix is not positive definite ({shown}); reduce the coefficients"
         )
     return factor
 
@@ -363,7 +363,7 @@ def _sample(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Samplin
     """Return the sampling plan of the distributions; without distributions, one run at each point of the grid."""
     if not drawn:
         if parsed.sample is not None:
-            raise StudyError("[sample] is given, but nothing has a distribution; omit it")
+            raise StudyError("[sample] is given, but no value has a distribution; omit [sample]")
         return SamplingPlan(None, 1, 0)
     # Enough where something else draws, such as a sensitivity analysis.
     if parsed.sample is None:

@@ -57,7 +57,7 @@ def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario
     references = {kind.reference: name for name, kind in CONTROLLED.items()}
     for channel in channels:
         if channel in references and all(scenario.controller.is_open_loop for scenario in scenarios):
-            raise StudyError(f"outputs: '{channel}' needs a reference, and the controllers here follow none")
+            raise StudyError(f"outputs: '{channel}' needs a reference, but no controller of the study has a reference")
         if channel in references and all(scenario.controlled != references[channel] for scenario in scenarios):
             raise StudyError(
                 f"outputs: '{channel}' needs reference.of = '{references[channel]}', which no scenario has"
@@ -73,7 +73,7 @@ def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario
     shortest = min(scenario.run.duration for scenario in scenarios)
     if channels and not 0.0 < every <= shortest:
         raise StudyError(
-            f"outputs.every = {outputs.every!r} must be more than 0 s and at most run.duration, {shortest:g} s"
+            f"outputs.every = {outputs.every!r} must be above 0 s and at most run.duration = {shortest:g} s"
         )
     return Outputs(
         metrics=metrics,
@@ -94,7 +94,7 @@ def _check_names(key: str, requested: Sequence[str], known: Collection[str], sho
             raise StudyError(f"outputs.{key}: there is no {what} '{name}'{hint}; available: {', '.join(apply)}")
     repeated = first_twice(requested)
     if repeated is not None:
-        raise StudyError(f"outputs.{key}: '{repeated}' is named twice")
+        raise StudyError(f"outputs.{key}: '{repeated}' is named twice; name it once")
 
 
 SamplingMethod = Literal["random", "latin_hypercube", "sobol"]
@@ -235,10 +235,10 @@ def choose_configurations(
         )
         repeated = first_twice(names)
         if repeated is not None:
-            raise StudyError(f"two of the scenarios are named '{repeated}'; give them different names in a study file")
+            raise StudyError(f"two scenarios are named '{repeated}'; give different names in a study file")
         chosen = tuple(map(Configuration, names, scenarios))
     if len(chosen) < 2:
-        raise StudyError(f"a comparison needs at least two configurations, there is {len(chosen)}")
+        raise StudyError(f"a comparison needs at least two configurations, not {len(chosen)}")
     return configurations_with(chosen, overrides)
 
 
@@ -319,4 +319,4 @@ def check_can_be_swept(study: Study) -> None:
             raise StudyError(NO_SAMPLE)
         if not (study.outputs.metrics or study.outputs.traces):
             known = ", ".join(list(METRICS)[:4])
-            raise StudyError(f"[outputs] requests nothing: give metrics (such as {known}), trajectories or bands")
+            raise StudyError(f"[outputs] is empty: give metrics (such as {known}), trajectories or bands")

@@ -72,7 +72,7 @@ class VariedPath:
         # A difference of pressures counts from nothing; in degC it would get the offset of the scale.
         unit = _UNIT_OF_DIFFERENCE.get(self.quantity.unit, self.quantity.unit)
         if isinstance(value, str) and split_quantity(value)[1] in _OFFSET_UNITS:
-            raise UnitError("a difference of temperatures is given in K")
+            raise UnitError("a temperature difference must be given in K")
         return self._in_si(value, replace(self.quantity, unit=unit))
 
     def quote(self, value: float) -> str:
@@ -85,7 +85,7 @@ class VariedPath:
         if isinstance(value, str):
             return _parse(value, quantity, self.atmosphere)
         if quantity.unit not in PLAIN:
-            raise UnitError(f"a number without a unit; give a text with a unit such as {quantity.unit}")
+            raise UnitError(f"has no unit; give a text with a unit such as {quantity.unit}")
         return float(value)
 
 
@@ -151,7 +151,7 @@ def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
     if not all(gauge):
         other = units[gauge.index(not gauge[0])]
         raise UnitError(
-            f"the atmosphere varies, so '{units[0]}' and '{other}' do not go together; give gauge or absolute pressures"
+            f"the atmosphere varies, so '{units[0]}' and '{other}' cannot be mixed; give gauge or absolute pressures"
         )
     return replace(varied, is_gauge=True)
 
@@ -166,10 +166,10 @@ def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | R
     """Convert a ``[[vary]]`` table to an axis or distribution; UnitError with the key of an unusable value."""
     is_counted, is_whole = entry.path in WHOLE_NUMBERS, entry.kind == "whole_numbers"
     if is_whole and not is_counted:
-        raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE_NUMBERS)} alone; use 'choice' or 'uniform'")
+        raise UnitError(f"kind = 'whole_numbers' is only for {' and '.join(WHOLE_NUMBERS)}; use 'choice' or 'uniform'")
     if is_counted and entry.kind not in ("grid", "list", "choice", "whole_numbers"):
         raise UnitError(
-            f"kind = '{entry.kind}' gives no whole numbers, which '{entry.path}' needs; use 'whole_numbers'"
+            f"kind = '{entry.kind}' does not give whole numbers, which '{entry.path}' needs; use 'whole_numbers'"
         )
     if isinstance(entry, declared.Listed):
         levels = tuple(_level("values", value, varied) for value in entry.values)
@@ -178,10 +178,10 @@ def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | R
         return RandomValue(entry.path, _DISTRIBUTIONS[entry.kind](entry, varied))
     first, last = _key(entry, "first", varied), _key(entry, "last", varied)
     if first == last:
-        raise UnitError(f"first and last are both {entry.first!r}; a grid needs two different ends")
+        raise UnitError(f"first and last are both {entry.first!r}; they must differ")
     is_logarithmic = entry.spacing == "logarithmic"
     if is_logarithmic and min(first, last) <= 0.0:
-        raise UnitError("spacing = 'logarithmic' needs both ends above 0")
+        raise UnitError("spacing = 'logarithmic' needs first and last above 0")
     spaced = np.geomspace if is_logarithmic else np.linspace
     return Axis(entry.path, _all_whole(entry.path, tuple(spaced(first, last, entry.count).tolist())))
 
@@ -205,7 +205,7 @@ def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: Varied
     if isinstance(entry, declared.LogUniform):
         minimum, maximum = _bounds(entry, absolute)
         if minimum <= 0.0:
-            raise UnitError(f"minimum = {entry.minimum!r}: a log-uniform distribution needs both bounds above 0")
+            raise UnitError(f"minimum = {entry.minimum!r}: must be above 0 for a log-uniform distribution")
         distribution = LogUniformBetween(minimum, maximum)
     else:
         median = _key(entry, "median", absolute)
@@ -222,7 +222,7 @@ def _normal(entry: declared.Normal | declared.TruncatedNormal, varied: VariedPat
     with refused_as(UnitError, said, UnitError):
         deviation = varied.distance(entry.standard_deviation)
     if deviation <= 0.0:
-        raise UnitError(f"{said} must be more than 0")
+        raise UnitError(f"{said} must be above 0")
     return NormalAround(mean, deviation) if bounds is None else NormalBetween(mean, deviation, *bounds)
 
 
@@ -288,9 +288,9 @@ def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[NormalAround,
     inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
     entry = parameters.numbers.get(inside)
     if entry is None or not entry.uncertainty:
-        why = "was changed by an override" if entry is not None and entry.source == "override" else "has none"
+        why = "an override replaced it" if entry is not None and entry.source == "override" else "it states none"
         raise UnitError(
-            f"kind 'stated' needs an uncertainty in the parameter set '{scenario.origin.parameter_set}', which {why}"
+            f"kind 'stated' needs an uncertainty in the parameter set '{scenario.origin.parameter_set}', but {why}"
         )
     unit = _STATED_DIFFERENCES.get(entry.unit, entry.unit)
     if unit.endswith(("_g", "_a")):

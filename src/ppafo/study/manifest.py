@@ -197,7 +197,7 @@ class _Stored(_Part):
             raise ValueError(f"{self.chunks} chunks of {self.runs} runs do not fit {len(names)} configurations")
         lost = [number.path for number in self.study.vary if number.path not in self.varied]
         if lost:
-            raise ValueError(f"'{one_line(lost[0])}' varies and has no unit")
+            raise ValueError(f"'{one_line(lost[0])}' varies, but has no unit in 'varied'")
         for si_unit, unit in self.shown.items():
             try:
                 to_si(1.0, "Pa_a" if si_unit == GAUGE_ZERO else unit, "Pa_a" if si_unit == GAUGE_ZERO else si_unit)

@@ -136,7 +136,7 @@ class Expressions:
         row = owner.type.row if isinstance(owner.type, RowReference) else owner.type
         if not isinstance(row, Row) or node.attr not in dict(row.fields):
             fields = [field for field, _ in row.fields] if isinstance(row, Row) else []
-            hint = nearest_name(node.attr, fields) or f"; it has {', '.join(fields)}"
+            hint = nearest_name(node.attr, fields) or f"; available: {', '.join(fields)}"
             problem = f"has no '{node.attr}'{hint}" if fields else f"is {kind_of(row)} and has no '{node.attr}'"
             raise self.mistaken(node, f"{ast.unparse(node.value)} {problem}", f".{node.attr}")
         return typed.field_of(owner, node.attr)
@@ -191,7 +191,7 @@ class Expressions:
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         extents = kind.shape or (None,) * kind.dimensions
         if len(indices) != len(extents):
-            raise self.refused(node, f"'{ast.unparse(node)}' must have {len(extents)} indices, it has {len(indices)}")
+            raise self.refused(node, f"'{ast.unparse(node)}' must have {len(extents)} indices, not {len(indices)}")
         terms = []
         for dimension, (index, extent) in enumerate(zip(indices, extents, strict=True)):
             count = Term("extent", INT, (owner,), dimension) if extent is None else Term("number", INT, (), extent)

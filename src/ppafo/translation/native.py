@@ -105,7 +105,7 @@ def compiler(name: str) -> CCompiler:
     """Return the C compiler ``gcc``, ``clang`` or ``zig``. Raises SimulationError if it is not installed."""
     command = _command(name)
     if not command:
-        raise SimulationError(f"PPAFO_BACKEND={name}: '{name}' is not on this computer: {HOW_TO_INSTALL}; {WITHOUT_C}")
+        raise SimulationError(f"PPAFO_BACKEND={name}: '{name}' is not installed: {HOW_TO_INSTALL}; {WITHOUT_C}")
     return CCompiler(name, command)
 
 

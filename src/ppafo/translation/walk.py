@@ -177,7 +177,7 @@ class _FunctionWalk:
         if self.writes is not None and self.returns is not None:
             raise self.refused(
                 self.writes,
-                f"function '{self.definition.name}' both returns a value and writes into an array; do one of them",
+                f"function '{self.definition.name}' both returns a value and writes into an array; do only one",
             )
         passed = tuple(Parameter(name, self.types[name]) for name in names if not is_empty(self.types[name]))
         bound = tuple(

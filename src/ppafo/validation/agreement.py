@@ -164,7 +164,7 @@ def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySetti
         motion, initial = "locked", {**initial, **beside}
     if motion == "measured" and ANGLE not in measured.recording:
         prescribed = argument_text("motion", "measured")
-        raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe ({prescribed})")
+        raise DataError(f"{measured.file}: {prescribed} needs a channel '{ANGLE}', which the recording does not have")
     start = start_of(measured.recording, device, initial, measured.file, initial_remedies())
     return Replay(measured, device, start, motion, settings.longest_delay, settings.leg)
 
@@ -237,7 +237,7 @@ def _curves(
             )
     if not curves:
         needed = "pressure_1" if settings.volume is not None else "a channel other than the prescribed angle"
-        raise DataError(f"{measured.file}: has nothing to compare; it needs {needed}")
+        raise DataError(f"{measured.file}: no channel can be compared; the recording needs {needed}")
     return curves
 
 
@@ -263,7 +263,7 @@ def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettin
         verb = "was" if len(shown) == 1 else "were"
         remarks.append(f"the supply pressure was not recorded; {' and '.join(shown)} {verb} used")
     if regular_interval(measured.recording.time) is None:
-        remarks.append("samples are not regular in time; changes of the command were moved to the nearest step")
+        remarks.append("samples are not equally spaced in time; changes of the command were moved to the nearest step")
     if settings.volume is not None:
         remarks.append(
             f"chamber 1 was treated as a fixed volume of {shown_text(settings.volume, 'm^3', '.4g')} without a vane"
@@ -271,5 +271,5 @@ def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettin
     elif settings.motion == "locked":
         remarks.append("the vane was locked at its initial angle; the angle is not compared")
     if settings.motion == "measured":
-        remarks.append("the recorded angle was prescribed, and is therefore not compared")
+        remarks.append("the recorded angle was prescribed and is therefore not compared")
     return tuple(remarks)

@@ -251,7 +251,7 @@ def _in_other_unit(
                 gain += 2.0 * len(as_read.measured) * math.log(ratio)
             left = max(left, after.in_noise)
     remedy = f'write time [{unit}] in the header, or unit = "{unit}" for time in a column map'
-    return ResidualCause(name, f"times seem to be {name} ({remedy})", gain, left)
+    return ResidualCause(name, f"times seem to be in {name} ({remedy})", gain, left)
 
 
 def _samples(records: Sequence[Record]) -> list[CandidateCause]:
@@ -288,7 +288,7 @@ def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candid
     angles = [record.values[record.channels.index(ANGLE)] for record in records if ANGLE in record.channels]
     if not angles or any(float(np.std(angle)) >= _AT_REST for angle in angles):
         return []
-    words = f"the vane seems to be locked, as its recorded angle is constant ({argument_text('motion', 'locked')})"
+    words = f"the vane seems to be locked, because its recorded angle is constant ({argument_text('motion', 'locked')})"
     return [CandidateCause("motion", words, lambda _: ModelChange(motion="locked"))]
 
 

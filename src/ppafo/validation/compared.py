@@ -62,7 +62,7 @@ EXPLAINED_FRACTION = 0.5
 """Least explained fraction of signal variance (R^2) [-] for an acceptable model; the mean explains 0."""
 
 _FRACTION_UNITS = ("%", "percent")
-_EXAMPLES = "a threshold is written 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
+_EXAMPLES = "for example 'angle=10%', 'pressure_1=3.7 psi_d', or '5%' for all channels"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def _limit(value: str, text: str, unit: str) -> ErrorLimit:
     except UnitError as error:
         raise DataError(f"threshold '{one_line(text)}': {error}; {_EXAMPLES}") from error
     if not unit and not is_fraction:
-        raise DataError(f"threshold '{one_line(text)}': a limit for all channels is a percentage of the full range")
+        raise DataError(f"threshold '{one_line(text)}': a limit for all channels must be in %, for example '5%'")
     if number <= 0.0:
         raise DataError(f"threshold '{one_line(text)}': must be above 0; {_EXAMPLES}")
     return ErrorLimit(number, is_fraction)

@@ -100,7 +100,7 @@ def read_all(
 ) -> list[MeasuredRecording]:
     """Read all recordings of a validation. Raises DataError for no recording or for a recording given twice."""
     if not sources:
-        raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
+        raise DataError("no recording was given; give at least one .csv or .nc file or result folder")
     column_map, map_name = (None, "") if columns is None else column_map_of(columns)
     read: dict[str, MeasuredRecording] = {}
     for source in sources:
@@ -108,7 +108,7 @@ def read_all(
         # Given twice, under two names too, a recording would count twice as evidence.
         if measured.sha256 in read:
             same = read[measured.sha256].file
-            raise DataError(f"{measured.file}: the same recording as {same}; give each once")
+            raise DataError(f"{measured.file}: the same recording as {same}; give every recording only once")
         read[measured.sha256] = measured
     return list(read.values())
 
@@ -140,7 +140,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     if gauge <= 0.0:
         owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
         raise DataError(
-            f"{file}: {owner} is not above the atmosphere, so there is no full range to compare pressures with"
+            f"{file}: {owner} is not above the atmosphere, but errors of pressure are fractions of its gauge pressure"
         )
     # Every model would agree with a recording in which no channel changes.
     compared = [name for name in COMPARED if name in recording]
@@ -166,16 +166,16 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
     for name in unknown:
         hint = nearest_name(name, missing)
         if hint:
-            raise DataError(f"{file}: channel '{name}' is not known{hint}")
+            raise DataError(f"{file}: channel '{name}' is unknown{hint}")
     if COMMAND not in recording:
         names = ", ".join(recording.names)
-        remedy = f'a column map can give a constant one, {COMMAND} = {{ constant = "1" }}'
+        remedy = f'for a constant command write {COMMAND} = {{ constant = "1" }} in a column map'
         raise DataError(
             f"{file}: there is no channel '{COMMAND}', which the replay needs; available: {names}; {remedy}"
         )
     if not any(name in recording for name in COMPARED):
         raise DataError(f"{file}: has none of the channels to compare: {', '.join(COMPARED)}")
-    return tuple(f"channel '{name}' is not known and was ignored" for name in unknown)
+    return tuple(f"channel '{name}' is unknown and was ignored" for name in unknown)
 
 
 def _check_pressures(recording: Recording, device: Device, file: str) -> None:
@@ -194,7 +194,7 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
             shown = [shown_text(pressure, "Pa_a", ".4g", atmosphere) for pressure in (level, highest)]
             owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
             given = override_text([f"supply.pressure={shown[0]}"])
-            remedy = "check both sensors" if is_recorded else f"record it, or give {given}"
+            remedy = "check both sensors" if is_recorded else f"record the supply pressure, or give {given}"
             top = float(recording[name].max()) - atmosphere
             if _LEAST_OF_SUPPLY * (highest - atmosphere) < top * _KILOPASCALS_AS_PSI < allowed - atmosphere:
                 remedy += f"; '{name}' looks like kPa read as psi"

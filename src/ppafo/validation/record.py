@@ -146,7 +146,7 @@ def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement,
     if np.ptp(values) == 0.0:
         locked = argument_text("motion", "locked")
         other_cause = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
-        words = f"never changes: {other_cause}its sensor is dead or not connected"
+        words = f"never changes: {other_cause}the sensor is dead or not connected"
         return _Wrong(words, np.ones(len(values), dtype=bool))
     clipped = _clipped_samples(values)
     if clipped is not None:

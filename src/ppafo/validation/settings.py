@@ -49,17 +49,15 @@ def replay_settings(
 ) -> ReplaySettings:
     """Check the arguments of a validation and return its settings. Raises DataError for contradictions."""
     if volume is not None and not volume > 0.0:
-        raise DataError(f"volume of {volume:g} m^3: must be above 0")
+        raise DataError(f"volume = {volume:g} m^3: must be above 0")
     if not 0.0 <= longest_delay <= LARGEST_DELAY:
-        raise DataError(f"longest delay of {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
+        raise DataError(f"longest delay = {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
     chosen = next((known for known in MOTIONS if known == motion), None)
     if chosen is None:
         hint = nearest_name(motion, MOTIONS)
-        raise DataError(f"motion '{one_line(motion)}': must be {', '.join(MOTIONS)}{hint}")
+        raise DataError(f"motion '{one_line(motion)}': must be one of {', '.join(MOTIONS)}{hint}")
     if volume is not None and chosen != "free":
-        raise DataError(
-            f"motion '{chosen}': a fixed volume has no vane that could move; give motion or volume, not both"
-        )
+        raise DataError(f"motion '{chosen}': a fixed volume has no moving vane; give motion or volume, not both")
     states = parse_initial(initial, device.supply.atmospheric_pressure)
     return ReplaySettings(chosen, states, longest_delay, parse_thresholds(thresholds), volume)
 

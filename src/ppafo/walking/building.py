@@ -143,7 +143,7 @@ def _motion(
     for part in broken:
         if line is not None and part.startswith(("regulator", "bottle")):
             raise reading.refusal(
-                f"faults.{part}.kind", "a walk with [supply_line] has regulators of its own: leave these lines out"
+                f"faults.{part}.kind", "not allowed with [supply_line], which has its own regulators: omit this fault"
             )
     person = reading.number(f"wearer.{PERSON.name}", PERSON)
     if person != int(person):

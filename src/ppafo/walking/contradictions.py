@@ -108,8 +108,8 @@ def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
             # In six digits, as the number that it contradicts.
             default = shown_text(number, quantity.unit, unit=_IN_FILES.get(quantity.unit, ""))
             raise ScenarioError(
-                f"{reading.file}: {path}, which is not given and takes its default, {default}: {reason(0)}; "
-                f"give it in the file or with {override_text([f'{path}=...'])}"
+                f"{reading.file}: {path} is not given and has its default, {default}: {reason(0)}; "
+                f"give a value in the file or with {override_text([f'{path}=...'])}"
             )
 
 
@@ -129,8 +129,8 @@ def check_no_bottle(scenario: Scenario) -> None:
     """Raise ScenarioError if the walk is on a bottle, which is supported by ``ppafo walk`` alone."""
     if walk_of(scenario).bottle is not None:
         raise ScenarioError(
-            f"{scenario.name}: a walk with a bottle runs in 'ppafo walk' only, which steps bottle and device in "
-            "turn; omit the bottle, or add [supply_line]"
+            f"{scenario.name}: only 'ppafo walk' can simulate a walk with a bottle, step by step in turn with the "
+            "device; omit the bottle, or add [supply_line]"
         )
 
 
@@ -147,8 +147,8 @@ def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:
             def reason(run: int, pair: _Pair = pair, other: Any = other) -> str:
                 value = _text(other, run, pair.unit)
                 if pair.words:
-                    return f"{pair.words}: {pair.other} is {value}"
-                return f"must be {pair.relation} {pair.other}, which is {value}"
+                    return f"{pair.words}: {pair.other} = {value}"
+                return f"must be {pair.relation} {pair.other} = {value}"
 
             yield _Contradiction(pair.path, _IS_BAD[pair.relation](number, other), reason)
     # An object in charge has no settings that could contradict.
@@ -161,8 +161,8 @@ def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:
         "controller.kind",
         valve != "proportional" and not law_of(scenario).only_switches,
         lambda _run: (
-            f"opens its valve gradually{switching}, which in a walk only a proportional valve does, not a {valve} one: "
-            f"take device.valve 'proportional', or controller.kind {fitting}"
+            f"opens its valve gradually{switching}, which in a walk needs a proportional valve, not a {valve} valve: "
+            f"set device.valve to 'proportional', or controller.kind to {fitting}"
         ),
     )
     # A controller with a threshold of force finds the events of the gait by itself.
@@ -189,12 +189,12 @@ def _of_stops(scenario: Scenario) -> Iterator[_Contradiction]:
     yield _Contradiction(
         highest,
         actuator.angle_max < high - _BEYOND_STOP,
-        lambda run: f"{needed}, this joint ends at {_text(actuator.angle_max, run, 'rad')}",
+        lambda run: f"{needed}, but the upper stop is at {_text(actuator.angle_max, run, 'rad')}",
     )
     yield _Contradiction(
         lowest,
         actuator.angle_min > low + _BEYOND_STOP,
-        lambda run: f"{needed}, this joint begins at {_text(actuator.angle_min, run, 'rad')}",
+        lambda run: f"{needed}, but the lower stop is at {_text(actuator.angle_min, run, 'rad')}",
     )
 
 
@@ -205,9 +205,7 @@ def _of_times(scenario: Scenario) -> Iterator[_Contradiction]:
     yield _Contradiction(
         "controller.first_stride_time",
         np.logical_or(first_stride <= 0.5 * stride, first_stride >= 2.0 * stride),
-        lambda run: (
-            f"must be between half and twice the stride of the gait, which is {_text(round(stride, 4), run, 's')}"
-        ),
+        lambda run: f"must be between half and twice the stride time of the gait, {_text(round(stride, 4), run, 's')}",
     )
     # A valve that has not moved yet neither fills nor vents, and would be taken for one that fails.
     dead_time = venting_valve(scenario.device.valve).command_delay(valve_settings(scenario.device.valve))
@@ -215,12 +213,12 @@ def _of_times(scenario: Scenario) -> Iterator[_Contradiction]:
         yield _Contradiction(
             f"controller.{name}",
             settings[name] <= dead_time,
-            lambda run: f"must be longer than the dead time of the valve, which is {_text(dead_time, run, 's')}",
+            lambda run: f"must be longer than the dead time of the valve, {_text(dead_time, run, 's')}",
         )
     yield _Contradiction(
         "controller.frozen_time",
         settings["frozen_time"] <= 2.0 * period,
-        lambda run: f"must be longer than two sample periods of the controller, {_text(period, run, 's')} each",
+        lambda run: f"must be longer than two sample periods of the controller, each {_text(period, run, 's')}",
     )
 
 
@@ -234,15 +232,15 @@ def _of_swing(scenario: Scenario) -> Iterator[_Contradiction]:
         "controller.swing_angle",
         np.logical_or(swing <= lowest, swing >= highest),
         lambda run: (
-            f"lies outside the range of sensor and device, {_text(lowest, run, 'rad')} to {_text(highest, run, 'rad')}"
+            f"must be in the range of sensor and device, {_text(lowest, run, 'rad')} to {_text(highest, run, 'rad')}"
         ),
     )
     yield _Contradiction(
         "controller.kind",
         gait.vertical_force is None,
         lambda _run: (
-            f"needs force sensors, and gait '{gait.name}' has no vertical_force; import it with the ground reaction, "
-            "or take controller.kind=off"
+            f"needs force sensors, and gait '{gait.name}' has no vertical_force; import the gait with ground "
+            "reaction forces, or set controller.kind=off"
         ),
     )
 
@@ -257,13 +255,13 @@ def _of_pressures(scenario: Scenario) -> Iterator[_Contradiction]:
     yield _Contradiction(
         "controller.lowest_pressure",
         settings["lowest_pressure"] >= atmosphere,
-        lambda run: f"must be below the atmosphere, which is {_text(atmosphere, run, 'Pa_a')}",
+        lambda run: f"must be below atmospheric pressure, {_text(atmosphere, run, 'Pa_a')}",
     )
     yield _Contradiction(
         "controller.filled_pressure",
         np.logical_or(filled <= atmosphere, filled >= lower_supply),
         lambda run: (
-            "must be between atmosphere and supply, which are "
+            "must be between atmospheric and supply pressure, "
             f"{_text(atmosphere, run, 'Pa_a')} and {_text(lower_supply, run, 'Pa_a')}"
         ),
     )

@@ -49,7 +49,7 @@ class WalkKind:
 
     def further_command(self, file: str) -> str:
         """Return the one-line command that compares the walk in a file with others."""
-        return f"'ppafo walk {shlex.quote(file)}' compares it with no device and with a healthy ankle"
+        return f"'ppafo walk {shlex.quote(file)}' compares it with a walk without device and a healthy ankle"
 
 
 WALK_KIND = WalkKind(WALK)

@@ -45,7 +45,7 @@ def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None
         override.typed == "run.duration" for override in read_overrides(overrides, ScenarioError)
     ):
         argument = argument_text("overrides", option="--set")
-        raise ScenarioError(f"{argument} run.duration: the same as {argument_text('minutes')}; leave one out")
+        raise ScenarioError(f"{argument} run.duration and {argument_text('minutes')} are the same value; omit one")
 
 
 @checked
@@ -94,8 +94,8 @@ def load_walk(
         other = instead.get(OF_A_WALK.same.get(path, path))
         if other is not None:
             raise ScenarioError(
-                f"{file}: override '{override}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
-                "already; give it once"
+                f"{file}: override '{override}': the {path.partition('.')[0]} is already given as "
+                f"'{one_line(other)}'; omit one of them"
             )
     with at_fault("scenario"):
         content = (SCENARIO_FILE if str(scenario) in list_scenarios() else FILE).read(scenario)
@@ -114,8 +114,8 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
     request = replace(request_again(scenario.origin), file=scenario.name)
     if _without_bottle(scenario_of(request, WALKING)) != _without_bottle(scenario):
         raise ScenarioError(
-            f"{scenario.name}: this walk differs from its file (changed after it was loaded, or file or package "
-            f"changed since): give the bottle where the walk is loaded, with {argument_text('bottle')}"
+            f"{scenario.name}: this walk differs from its file (the walk, the file or the package was changed after "
+            f"loading): give {argument_text('bottle')} when loading the walk"
         )
     content, before, instead = request.content, request.overrides, {}
     if bottle is not None:

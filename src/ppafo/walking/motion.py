@@ -160,7 +160,7 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
 
     def line(run: int) -> str:
         return (
-            f"a walk of {at(seconds, run) / 60.0:.6g} min: must be {shortest / 60.0:.2g} min ({least}) or more, and "
+            f"a walk of {at(seconds, run) / 60.0:.6g} min: must be at least {shortest / 60.0:.2g} min ({least}) and "
             f"at most {LONGEST_MINUTES:g} min"
         )
 

@@ -130,15 +130,15 @@ def walk_population(
     ['-0.035 m', '-0.033 m']
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
-        raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
+        raise ScenarioError(f"wearers = {wearers}: must be from 1 to {MAXIMUM_WEARERS}")
     configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
     if walk_of(configuration).bottle is not None:
         raise ScenarioError(
-            "several wearers walk at a constant supply pressure: omit the bottle, or the number of wearers"
+            "walks of several wearers need a constant supply pressure: omit the bottle, or the number of wearers"
         )
     if walk_of(configuration).person:
         raise ScenarioError(
-            "several wearers are drawn at random, so wearer.person cannot be given; omit wearer.person, or the "
+            "wearer.person is not allowed with several wearers, which are drawn at random; omit wearer.person, or the "
             "number of wearers"
         )
     motion = walk_of(configuration)

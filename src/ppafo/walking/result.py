@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 _REQUEST_ROW = "controller_state.request.torque"
 """Path of the row for the requested torque of a torque-following controller."""
 
-REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
+REMEDY = "the time step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
 
 
 def led_leg(run: Run) -> Walk:
@@ -366,17 +366,17 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
     reasons = (
         (
             bool(kind.of_reference),
-            "a walk has no one reference that its torque follows: push_off_error is the error in push-off",
+            "a walk has no single torque reference; push_off_error is the error in push-off",
         ),
-        (bool(kind.traced), "it needs the whole run over time, which is not kept of a walk"),
-        (LED_SHANK in needs, "it needs a leg without ground, whose shank follows a gait"),
+        (bool(kind.traced), "the metric needs the whole run over time, which a walk does not keep"),
+        (LED_SHANK in needs, "the metric needs a leg without ground contact, whose shank follows a gait"),
         (
             STEADY in needs and motion.task_sequence is not None,
-            "it is a mean over equal strides, and a task sequence has others: leave the task sequence out",
+            "the metric is a mean over equal strides, but strides of a task sequence differ: omit the task sequence",
         ),
         (
             REQUESTED in needs and (law is None or not requests_torque(law)),
-            f"its controller '{control}' requests no torque",
+            f"controller '{control}' requests no torque",
         ),
     )
     return next((reason for is_so, reason in reasons if is_so), "")

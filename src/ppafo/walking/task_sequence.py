@@ -119,16 +119,16 @@ def _contradictions(segments: Iterable[TaskSegment]) -> Iterator[tuple[int, str]
         if segment.kind in _NEED_WALKING and not walks:
             yield index, "the wearer is standing at this point; insert a walking segment first"
         if segment.kind == "start" and walks:
-            yield index, "the wearer walks there already: take 'ramp', or stop before it"
+            yield index, "the wearer is already walking at this point: use 'ramp', or insert a 'stop' segment first"
         if "speed" in values and "cadence" in values:
             yield index, "give either speed or cadence, not both"
         if "radius" in values and abs(values["radius"]) < TIGHTEST:
-            yield index, f"radius must be at least {TIGHTEST:g} m in either direction"
+            yield index, f"radius must be at least {TIGHTEST:g} m, or at most -{TIGHTEST:g} m"
         extents = [name for name in ("duration", "strides") if name in values]
         if segment.kind in ("walk", "ramp", "stairs", "turn") and len(extents) != 1:
             yield index, "give either duration or strides" + (", not both" if extents else "")
         if segment.kind == "ramp" and not {"speed", "cadence"} & values.keys():
-            yield index, "give the speed or the cadence at its end"
+            yield index, "give speed or cadence at the end of the ramp"
         walks = segment.kind not in _STANDING
 
 

@@ -155,8 +155,8 @@ def plan_task_sequence(
         planner.walk(NEVER, planner.ratio, planner.stride, slope=planner.slope)
     if len(planner.parts) > PARTS:
         raise ScenarioError(
-            f"{sequence.file}: has {len(planner.parts)} parts, changes of speed included, but at most {PARTS} are "
-            f"allowed: omit segments, or split it into two task sequences"
+            f"{sequence.file}: has {len(planner.parts)} parts including changes of speed, but at most {PARTS} are "
+            f"allowed: omit segments, or split the file into two task sequences"
         )
     # The engine has a fixed number of parts: unused ones never begin.
     unused = planner.parts[0]._replace(start=NEVER)
@@ -228,7 +228,7 @@ def _ratio(sequence: TaskSequence, index: int, gait: Gait) -> float:
     if "speed" in values:
         if recorded is None:
             raise sequence.refusal(
-                index, f"speed: gait '{gait.name}' has no walking speed, so it cannot be scaled to one; give a cadence"
+                index, f"speed: gait '{gait.name}' has no walking speed and cannot be scaled; give a cadence"
             )
         # The ratio of step length and cadence is constant over the walking speeds: both follow the root of the speed.
         return math.sqrt(values["speed"] / recorded)
@@ -239,7 +239,7 @@ def _ratio(sequence: TaskSequence, index: int, gait: Gait) -> float:
         raise sequence.refusal(
             index,
             (
-                f"cadence: gives {speed:.3g} m/s with the walk ratio of gait '{gait.name}'; a task sequence needs "
+                f"cadence: results in {speed:.3g} m/s with the walk ratio of gait '{gait.name}'; must be "
                 f"{SLOWEST:g} to {FASTEST:g} m/s"
             ),
         )

@@ -89,8 +89,7 @@ def walk(
     if isinstance(scenario, Scenario):
         if any(choice is not None for choice in (gait, task_sequence, bottle)) or tuple(overrides):
             raise ScenarioError(
-                "overrides, gait, task sequence and bottle apply to the name or file of a walk; for a Scenario "
-                "give them to load_walk"
+                "a loaded Scenario accepts no overrides, gait, task sequence or bottle; give these to load_walk"
             )
         check_parts(scenario)
         chosen = scenario
@@ -200,8 +199,8 @@ def compare_walks(
     ending = None if worn.supply is None or worn.supply.ending.kind == WALKED else worn.supply.ending
     if ending is not None and ending.time < shortest:
         raise SimulationError(
-            f"{worn.scenario.name} on its bottle: {ending.message}, after {ending.time:.3g} s: fewer than "
-            f"{SHORTEST_STRIDES} strides; take a fuller, larger or warmer bottle"
+            f"{worn.scenario.name} on its bottle: {ending.message}, after {ending.time:.3g} s, which is less than "
+            f"{SHORTEST_STRIDES} strides; use a fuller, larger or warmer bottle"
         )
     # Without the device for the same time, which a bottle may have shortened.
     duration = minutes if ending is None else float(worn.recording.time[-1]) / 60.0

@@ -264,8 +264,8 @@ def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
         is_usable = quantity.minimum <= value <= quantity.maximum
         if not is_usable and value_at(reading.document, path) is None:
             raise ScenarioError(
-                f"{reading.file}: gait '{gait.name}' is of a subject of {gait.body_mass:g} kg, which makes "
-                f"{path} {value:.3g} {quantity.unit}; a wearer has {quantity.minimum:g} to "
+                f"{reading.file}: the subject of gait '{gait.name}' has {gait.body_mass:g} kg, so "
+                f"{path} would be {value:.3g} {quantity.unit}; must be {quantity.minimum:g} to "
                 f"{quantity.maximum:g} {quantity.unit}: give {path}"
             )
     return Wearer(**reading.section("wearer", quantities))
@@ -290,11 +290,11 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     default_stature = (gait.stature if is_subject else None) or _PAPER.stature
     if abs(wearer.stature - default_stature) > _SAME * wearer.stature:
         low, high = STATURES
-        line += f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
+        line += f"; {wearer.stature:.4g} m tall, segments scaled by mass and stature"
         if not low <= wearer.stature <= high:
             line += (
-                f" in the proportions of adults of {low:g} to {high:g} m, extrapolated here: set measured segments, "
-                "wearer.shank_length and the others of [wearer]"
+                f" in the proportions of adults of {low:g} to {high:g} m, extrapolated here: give the measured "
+                "segments in [wearer]"
             )
         line += "; the curves of the gait are not scaled by stature"
     elif wearer.shank_mass == _PAPER.shank_mass and abs(wearer.body_mass / _PAPER.body_mass - 1.0) > _SAME:
@@ -310,7 +310,7 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     low, high = (fraction * gait.body_mass for fraction in SCALED_MASS)
     if not low <= wearer.body_mass <= high:
         line += (
-            f", extrapolated outside {low:.0f} to {high:.0f} kg; a gait recorded of such a person, imported by "
-            "'ppafo gait import', replaces it"
+            f", extrapolated outside {low:.0f} to {high:.0f} kg; better import a gait recorded of such a person "
+            "with 'ppafo gait import'"
         )
     return line

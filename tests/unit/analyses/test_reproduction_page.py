@@ -52,7 +52,7 @@ def test_the_table_begins_with_what_it_does_not_show_and_ends_with_what_u_decide
     assert first == "No experimental result is confirmed independently of fitted settings."
     assert any(line.startswith("16 claims: ") for line in lines)
     assert lines[-1] == (
-        "15 % needs 'U is the opening' and a level beyond the supply's reach; the saving needs neither."
+        "15 % less error needs U as the opening and a reference above the torque ceiling; less gas needs neither."
     )
 
 

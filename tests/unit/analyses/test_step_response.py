@@ -86,7 +86,7 @@ def test_a_pressure_1_that_rises_beyond_breakaway_says_how_far() -> None:
         pressure_1=pressure({0.0: 0.0, BREAKAWAY: 40.0, BREAKAWAY + 0.003: 42.0, 0.15: 30.0, STOP: 30.0})
     )
     told = {item.id: item for item in step_observations(peaked, LEVELS, step_events(peaked))}
-    assert told["pressure_1_falls_in_motion"].difference == "from breakaway it goes on rising for 3 ms, by 2.0 psi"
+    assert told["pressure_1_falls_in_motion"].difference == "after breakaway it still rises for 3 ms, by 2.0 psi"
 
 
 def test_a_peak_of_pressure_1_late_in_the_motion_is_no_fall_from_the_start() -> None:

@@ -80,7 +80,7 @@ def test_a_walk_prints_its_table_and_where_the_files_are(ran: tuple[Path, list[s
 
 def test_toes_below_the_ground_would_drag_by_no_number_and_no_foot_has_a_rate(walked: Path) -> None:
     text = (walked / "walk.txt").read_text(encoding="utf-8")
-    toes = next(line for line in text.splitlines() if line.startswith("Lowest toes over the ground"))
+    toes = next(line for line in text.splitlines() if line.startswith("Lowest toe height above ground"))
     assert "would drag" in toes
     assert "-" not in toes.partition("(cm)")[2]
     assert "deg/s" not in text

@@ -100,14 +100,14 @@ def unannotated(plant, shown):  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"port": BlendedPort}, r"plant\.py:\d+: single_ports makes tuple.*, and the valve has ports BlendedPort"),
+        ({"port": BlendedPort}, r"plant\.py:\d+: single_ports returns tuple.*, but the valve has ports BlendedPort"),
         (
             {"connect": unannotated},
             r"test_edits_of_the_step\.py:\d+: unannotated\(plant, shown\) must be annotated with float and tuple\[Sing",
         ),
         (
             {"shown": Mine, "connect": connect_ideal},
-            r"vent_valve\.py:\d+: connect_ideal takes a VentedOpening, and .* shows a Mine",
+            r"vent_valve\.py:\d+: connect_ideal takes a VentedOpening, but .* shows a Mine",
         ),
     ],
 )

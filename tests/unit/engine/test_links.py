@@ -168,13 +168,13 @@ def test_what_would_lose_a_row_is_refused(function: Any, said: str) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"name": "two words"}, "must be an identifier"),
+        ({"name": "two words"}, "not a Python identifier"),
         ({"settings": Needed}, "'share' has no default"),
-        ({"settings": Half}, "its defaults leave it on"),
-        ({"switch": ("other",)}, "switch names 'other', which is no quantity with a minimum of 0"),
+        ({"settings": Half}, "is on with its defaults"),
+        ({"switch": ("other",)}, "switch names 'other', which must be a quantity with minimum 0"),
         ({"switch": ()}, "has no switch"),
         ({"laws": {place: apart, apart: hides_it}, "name": "third"}, ""),
-        ({"laws": {place: applied}}, "applied(function, amount) must take (amount), as place does"),
+        ({"laws": {place: applied}}, "applied(function, amount) must take the arguments of place: (amount)"),
     ],
 )
 def test_an_effect_that_cannot_act_says_why(change: dict[str, Any], said: str) -> None:

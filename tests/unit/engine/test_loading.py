@@ -254,7 +254,9 @@ def test_what_a_named_compiler_cannot_compile_is_an_error_that_names_the_other(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv(BACKEND_VARIABLE, "gcc")
-    with pytest.raises(ProgramError, match=r"cannot be translated to C: .*; PPAFO_BACKEND=python runs it"):
+    with pytest.raises(
+        ProgramError, match=r"cannot be translated to C: .*; set PPAFO_BACKEND=python to run it in Python"
+    ):
         load_source(text("math.sin(x[0, 0])"))
 
 

@@ -232,7 +232,7 @@ def test_gains_that_nobody_gives_are_the_devices_in_firmware_too(tmp_path: Path)
 @pytest.mark.parametrize(
     ("name", "overrides", "said"),
     [
-        ("step-response", (), "'constant' has no fixed-point form; controllers that have one: pid, on_off"),
+        ("step-response", (), "'constant' has no fixed-point form; available: pid, on_off"),
         (
             "torque-task-solenoid",
             ("controller.rate=900 Hz",),

@@ -213,10 +213,10 @@ def test_as_many_samples_as_numbers_are_refused() -> None:
 @pytest.mark.parametrize(
     ("numbers", "blocks", "said"),
     [
-        ((), _BLOCKS, "a fit needs at least one number and one block of residuals, it has 0 and 4"),
-        (_NUMBERS, (), "a fit needs at least one number and one block of residuals, it has 6 and 0"),
-        ((FitVariable("rate", 2.0, 2.0, 2.0, 2.0),), _BLOCKS, "rate: bounds 2 to 2 with the start 2"),
-        ((FitVariable("rate", 9.0, 0.1, 5.0, 2.0),), _BLOCKS, "rate: bounds 0.1 to 5 with the start 9"),
+        ((), _BLOCKS, "a fit needs at least one parameter and one block of residuals, not 0 and 4"),
+        (_NUMBERS, (), "a fit needs at least one parameter and one block of residuals, not 6 and 0"),
+        ((FitVariable("rate", 2.0, 2.0, 2.0, 2.0),), _BLOCKS, "rate: bounds 2 to 2, start 2"),
+        ((FitVariable("rate", 9.0, 0.1, 5.0, 2.0),), _BLOCKS, "rate: bounds 0.1 to 5, start 9"),
     ],
     ids=["no number", "no block", "equal bounds", "start outside"],
 )

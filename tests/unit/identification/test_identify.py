@@ -92,7 +92,7 @@ def test_an_angle_in_degrees_that_is_called_radians_is_refused(bench: Path, solv
     one = planted.decay().recording
     write_csv(bench / "turned.csv", one.with_channel("angle", np.degrees(one["angle"]), "rad"))
     with pytest.raises(
-        IdentificationError, match=r"turned.csv: free-decay: 'angle' goes over 2.* turns, .* is its unit deg\?"
+        IdentificationError, match=r"turned.csv: free-decay: 'angle' covers 2.* turns\), .* is its unit deg\?"
     ):
         solved(DECAY.replace("decay.csv", "turned.csv"))
 
@@ -112,7 +112,7 @@ def test_a_valve_map_that_was_swept_one_way_tells_what_its_dead_band_holds(bench
     one = planted.sweep().recording
     write_csv(bench / "rising.csv", one.between(0.0, 10.0))
     remarks = solved(MAP.replace("sweep.csv", "rising.csv")).results[0].remarks
-    assert any("half the width of any hysteresis is included in the dead band" in remark for remark in remarks)
+    assert any("the dead band includes half the width of any hysteresis" in remark for remark in remarks)
     both = solved(MAP).results[0].remarks
     assert not any("half of its width" in remark for remark in both)
 
@@ -221,7 +221,7 @@ def test_friction_that_grows_is_written_with_its_growth(solved: Solve) -> None:
 def test_the_same_recording_twice_is_refused_by_the_hash_of_its_numbers(solved: Solve, bench: Path, name: str) -> None:
     (bench / "copy.csv").write_text("# a copy\n" + (bench / "decay.csv").read_text())
     for text in (DECAY.replace('"decay.csv"', f'"decay.csv", "{name}"'), DECAY + DECAY.replace("decay.csv", name)):
-        with pytest.raises(PpafoError, match=r"problem\.toml: .* are the same recording, sha256 \w{12} of its numbers"):
+        with pytest.raises(PpafoError, match=r"problem\.toml: .* are the same recording \(SHA-256 \w{12}\)"):
             solved(text)
 
 

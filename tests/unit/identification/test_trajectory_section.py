@@ -233,7 +233,7 @@ def test_a_fit_that_contradicts_the_bench_says_so(solve: Solve) -> None:
     truth = load_scenario("step-response").device.friction.viscous_damping
     assert not bench.low <= truth <= bench.high
     assert any(
-        "friction.viscous_damping: fitted " in remark and ", from the bench " in remark
+        "friction.viscous_damping: fitted " in remark and ", bench procedure " in remark
         for remark in outcome.trajectory.remarks
     )
 
@@ -292,7 +292,7 @@ def test_the_published_schema_has_the_section() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "problem.toml: give a [[procedure]] or a [trajectory]; it has neither"),
+        ("", "problem.toml: has neither a [[procedure]] nor a [trajectory]; give at least one"),
         (FIT.replace("scenario =", "scenaro ="), "did you mean 'scenario'"),
         (FIT.replace('"step-response"', '"step-respons"'), "step-respons"),
         (FIT.replace("step.csv", "nowhere.csv"), "nowhere.csv"),
@@ -301,7 +301,7 @@ def test_the_published_schema_has_the_section() -> None:
         (FIT.replace("2 g m^2", "2 g m"), "parameter 'foot_plate.inertia': low = '2 g m': unit 'g m' does not fit"),
         (
             FIT.replace("2 g m^2", "70 g m^2"),
-            "problem.toml: trajectory: foot_plate.inertia: low, 0.07, must be below high, 0.05",
+            "problem.toml: trajectory: foot_plate.inertia: low = 0.07 must be below high = 0.05",
         ),
         (f"{FIT}columns = 'rig'\n", "experiment 'step': there is no column map 'rig'; available: none"),
         (f"{FIT}inputs = ['comand']\n", "experiment 'step': 'comand' is not a measured input, did you mean 'command'"),
@@ -323,16 +323,16 @@ def test_the_published_schema_has_the_section() -> None:
         ),
         (f"{FIT}{SLOW}interval = '0 s'\n", "candidate 'slow': interval = '0 s' must be from 1e-06 to"),
         (f"{FIT}{SLOW}interval = '9 s'\n", "candidate 'slow': interval = '9 s' must be from 1e-06 to"),
-        (FIT.replace("50 g m^2", "2 g m^2"), "foot_plate.inertia: low, 0.002, must be below high, 0.002"),
+        (FIT.replace("50 g m^2", "2 g m^2"), "foot_plate.inertia: low = 0.002 must be below high = 0.002"),
         (FIT.replace(PARAMETERS, "parameters = []"), "problem.toml: trajectory.parameters"),
         (f"[trajectory]\nexperiments = []\n{PARAMETERS}", "problem.toml: trajectory.experiments"),
         (
             FIT.replace("[trajectory]", "[trajectory]\nprofiles = ['foot_plate.inertia']"),
-            "problem.toml: trajectory: profiles: the table of the result has the intervals; omit it",
+            "problem.toml: trajectory: profiles: the table of the result has the intervals; omit this key",
         ),
         (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "loss: the first pass is always robust; omit"),
-        (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: numbers are scaled automatically; omit it"),
-        (f"{FIT}{REPLAYED}held = '75 deg'\n", "trajectory: held: is renamed to locked; write locked = '75 deg'"),
+        (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: parameters are scaled automatically; omit this key"),
+        (f"{FIT}{REPLAYED}held = '75 deg'\n", "trajectory: held: was renamed to locked; write locked = '75 deg'"),
         (f"{FIT}[bench.can]\nsupply_pressure = ['20 psi_g', '90 psi_g']\n", "to rank in [[trajectory.candidates]]"),
     ],
 )
@@ -417,10 +417,10 @@ def test_a_held_vane_is_fitted_in_its_pressures(solve: Solve, laboratory: Path) 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"{TANK}locked = '75 deg'\n", "locked and volume: with a fixed volume there is no vane"),
+        (f"{TANK}locked = '75 deg'\n", "locked and volume exclude each other: a fixed volume has no vane"),
         (TANK.replace("60 cm^3", "0 cm^3"), "volume = '0 cm^3' must be above zero"),
         (TANK.replace("60 cm^3", "60 psi"), "volume"),
-        (f"{TANK}inputs = ['command', 'angle']\n", "the vane is locked or absent, but inputs has 'angle'"),
+        (f"{TANK}inputs = ['command', 'angle']\n", "'angle' cannot be an input with locked or volume"),
         (f"{TANK}scenario = 'step-response'\n", "volume cannot be combined with a scenario"),
         (f"{STEP}inputs = ['angel']\n", "did you mean 'angle'"),
     ],

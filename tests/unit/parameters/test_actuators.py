@@ -272,7 +272,7 @@ def test_stops_beyond_what_was_measured_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "override", "said"),
     [
-        ("cylinder-lever", "actuator.lever_offset=60 deg", "lever and base are 80 to 190 deg apart"),
+        ("cylinder-lever", "actuator.lever_offset=60 deg", "the angle between lever and base is 80 to 190 deg"),
         ("cylinder-lever", "actuator.rod_diameter=30 mm", "rod_diameter must be below bore"),
         ("cylinder-lever", "actuator.torque_constant=1e-5 m^3", "has no value 'actuator.torque_constant'"),
     ],
@@ -296,7 +296,7 @@ def test_a_run_of_an_ensemble_whose_lever_comes_to_its_dead_centre_is_refused_an
     offsets = np.radians([15.0, 60.0, 20.0])
     screen = screen_columns(check_columns(base, {"actuator.lever_offset": offsets}))
     assert screen.members.tolist() == [0, 2]
-    assert "actuator: lever and base are 80 to 190 deg apart" in screen.reasons[1]
+    assert "actuator: the angle between lever and base is 80 to 190 deg" in screen.reasons[1]
 
 
 def test_the_bench_refuses_another_actuator_in_one_line(
@@ -305,5 +305,5 @@ def test_the_bench_refuses_another_actuator_in_one_line(
     monkeypatch.chdir(tmp_path)
     assert main(["rig", "simulate", "step-response", "--device", "cylinder-lever", "--out", "out"]) == 2
     said = capsys.readouterr().err
-    assert "supports vane actuators only, and 'cylinder-lever' has an actuator 'cylinder'" in said
+    assert "supports vane actuators only, but 'cylinder-lever' has an actuator 'cylinder'" in said
     assert said.count("\n") == 1

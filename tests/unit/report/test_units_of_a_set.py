@@ -106,7 +106,7 @@ def test_a_refusal_is_in_the_unit_of_what_it_refuses_else_in_that_of_the_set(in_
     )
     assert "must be at least 0 mm^2 and at most 10000 mm^2" in refusal("valve.area=-1 mm^2")
     lines = refusal("supply_line.plantarflexion.droop=1 bar_d", "supply.dorsiflexion_pressure=5 bar_g")
-    assert "supply.dorsiflexion_pressure, 5 bar_g, cannot be above supply.pressure, 3.44738 bar_g" in lines
+    assert "supply.dorsiflexion_pressure = 5 bar_g must not exceed supply.pressure = 3.44738 bar_g" in lines
 
 
 @pytest.mark.parametrize(

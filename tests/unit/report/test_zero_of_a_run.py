@@ -41,7 +41,7 @@ def test_zero_has_neither_sign_nor_exponent() -> None:
     kind = of_metric("gas_supplied", "+.3g")
     assert kind.change_interval(ConfidenceInterval(1.0e-18, -1.0e-18, 0.0)) == "0 [0, 0]"
     assert ErrorEstimate(0.0, 0.3, {}).sentence.startswith(
-        "Estimated error of the steps: at most 0 deg and 4.4e-05 psi"
+        "Estimated error of the time steps: at most 0 deg and 4.4e-05 psi"
     )
 
 

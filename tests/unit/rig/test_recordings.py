@@ -53,7 +53,7 @@ WANTED = {
 def test_an_effect_that_the_rig_does_not_have_is_refused_before_it_records_without_it(name: str) -> None:
     with pytest.raises(
         ParameterError,
-        match=r"no effect 'silencer': switch it off with 'effects\.silencer\.sonic_conductance=0 m\^3/\(s Pa\)'",
+        match=r"no effect 'silencer': .* off with 'effects\.silencer\.sonic_conductance=0 m\^3/\(s Pa\)'",
     ):
         record(name, "ideal-laboratory", 1, overrides=["effects.silencer.sonic_conductance=1e-8 m^3/(s Pa)"])
     record("valve-map", "ideal-laboratory", 1, overrides=["effects.silencer.sonic_conductance=0 m^3/(s Pa)"])
@@ -212,7 +212,7 @@ def test_the_truth_names_the_preset_with_overrides_and_the_device() -> None:
         ({"overrides": ["rig.line.area=0 m^2"]}, "must be above 0 with a line"),
         ({"overrides": ["friction.statik_torque=1 N m"]}, "did you mean"),
         ({"valve": "solenoyd"}, "did you mean 'solenoid'"),
-        ({"valve": "solenoid_recycling"}, "has no valve between the chambers"),
+        ({"valve": "solenoid_recycling"}, "does not support valve 'solenoid_recycling'"),
     ],
 )
 def test_bad_input_is_one_line_with_the_nearest_name(words: dict[str, object], message: str) -> None:

@@ -128,16 +128,15 @@ def test_what_only_the_error_changes_is_told_from_what_nobody_could_measure() ->
     assert (moved.changed_by, gone.changed_by) == ({FINER, MOVED_START}, {MOVED_START})
     assert inexact.changed_by == {FINER}
     sentence = Check("loop", (moved, inexact, firm), (), NO_ERROR, None, ()).sentence
-    assert sentence.startswith("Numerically sensitive: switchings: a start moved by 1e-07 of its range")
+    assert sentence.startswith("Numerically sensitive: switchings: changed by moving a start by 1e-07 of its range")
     assert (
-        "Also: rms_error: finer steps with a sixteenth of the error change them. Take a smaller run.tolerance"
-        in sentence
+        "Also: rms_error: changed by finer steps with a sixteenth of the error. Set a smaller run.tolerance" in sentence
     )
     assert "peak_error" not in sentence
     assert Check("loop", (firm,), (), NO_ERROR, None, ()).is_determined
     diverged = Check("loop", (firm,), (), NO_ERROR, 0.1, (MOVED_START,))
     assert not diverged.is_determined
-    assert "how it ends: the run with start moved diverged." in diverged.sentence
+    assert "completion: the run with start moved diverged." in diverged.sentence
     assert diverged.sentence.endswith(" The runs separate at t = 0.1 s.")
 
 
@@ -188,7 +187,9 @@ def test_a_controller_that_gives_another_run_each_time_is_refused(torque_task: C
     before = torque_task("proportional")
     scenario = dataclasses.replace(before, run=dataclasses.replace(before.run, duration=0.05))
     result = simulate(scenario.controlled_by(Unforgetting(0.0)))
-    with pytest.raises(SimulationError, match=r"Unforgetting gives a different run each time.* reset\(\) must forget"):
+    with pytest.raises(
+        SimulationError, match=r"Unforgetting gives different results in equal runs.* reset\(\) must restore"
+    ):
         result.check()
 
 

@@ -260,5 +260,5 @@ def test_metrics_of_the_swing_are_the_same_in_a_study() -> None:
 
 def test_a_leg_at_rest_has_no_error_of_the_foot() -> None:
     assert "foot_angle_error" not in simulate(on_leg(AT_REST)).metrics
-    assert lacking(on_leg(AT_REST), METRICS["foot_angle_error"]) == "it needs a leg whose shank follows a gait"
+    assert lacking(on_leg(AT_REST), METRICS["foot_angle_error"]) == "the metric needs a leg whose shank follows a gait"
     assert lacking(load_scenario(SWING), METRICS["foot_angle_error"]) == ""

@@ -51,7 +51,7 @@ def test_the_scenarios_of_the_package_do_not_oscillate_and_a_pair_that_only_swit
 ) -> None:
     verdict = simulate(scenario).tracking
     assert verdict is not None
-    assert "the actuator gives 5 N m at most; on purpose: " in verdict.sentence
+    assert "the actuator gives at most 5 N m; intended: " in verdict.sentence
     assert verdict.kind == "does not follow"
     assert not verdict.is_useless
 
@@ -93,7 +93,7 @@ def test_a_walk_says_it_and_meters_count_what_its_recording_shows() -> None:
     verdict = alone.tracking
     assert verdict is not None
     assert verdict.per == "stride"
-    assert "its gains do not suit this device: overrides=['controller.torque_gain=" in verdict.sentence
+    assert "the gains do not suit this device: overrides=['controller.torque_gain=" in verdict.sentence
 
 
 def test_find_counts_what_oscillates_as_not_met() -> None:

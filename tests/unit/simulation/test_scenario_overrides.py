@@ -232,5 +232,5 @@ def test_values_of_the_scenario_s_own_device_that_replace_those_of_another_set_a
     assert caplog.messages == [
         f"ppafo: step-response: values of the scenario replace values of {own}: supply.pressure=55 psi_g, "
         "supply.dorsiflexion_pressure=55 psi_g; overrides=['supply.pressure=50 psi_g', "
-        "'supply.dorsiflexion_pressure=50 psi_g'] keeps its own"
+        "'supply.dorsiflexion_pressure=50 psi_g'] restores the replaced values"
     ]

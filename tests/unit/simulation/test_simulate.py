@@ -130,7 +130,7 @@ def test_a_python_controller_beyond_the_range_of_commands_is_limited_and_a_line_
     assert simulate(scenario).recording["command"].max() == 1.0
     simulate(scenario)
     assert caplog.messages == [
-        "ppafo: Seven.update returned 7 at t = 0 s; commands are -1 to 1: those beyond are limited"
+        "ppafo: Seven.update returned 7 at t = 0 s; commands must be -1 to 1 and are limited to this range"
     ]
 
 

@@ -25,8 +25,8 @@ def test_a_joint_that_friction_holds_is_named_with_a_stiffness_that_moves_it() -
     verdict = simulate(servo(*STUCK, *weak)).tracking
     assert verdict is not None
     assert verdict.moved == 0.0
-    assert verdict.sentence.startswith("the angle loop does not move: 0 of 10 deg wanted; static friction holds")
-    assert "with 2 N m, and the law asks for" in verdict.sentence
+    assert verdict.sentence.startswith("the angle loop does not move: 0 of the requested 10 deg; static friction holds")
+    assert "with 2 N m, but the controller requests only" in verdict.sentence
     mended = tried(servo(*STUCK, *weak), verdict)
     assert mended is not None
     assert re.match(r"controller.angle_stiffness=\S+ N m/rad", mended.mended[0])

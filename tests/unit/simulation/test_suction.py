@@ -263,7 +263,7 @@ def test_a_walk_on_a_vacuum_is_refused_in_one_line() -> None:
 
 def test_a_verdict_asks_for_a_deeper_vacuum_where_one_gives_the_torque() -> None:
     said = str(simulate(TASK, (*SUCTION, "reference.level=1 N m")))
-    assert "the actuator gives 0.871 N m at most" in said
+    assert "the actuator gives at most 0.871 N m" in said
     assert "overrides=['supply.dorsiflexion_pressure=-72.4 kPa_g']" in said
 
 

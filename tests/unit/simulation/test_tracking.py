@@ -42,7 +42,7 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     told = simulate(TASK).tracking
     assert told is not None
     assert told.sentence.startswith(
-        "the torque stays 1 N m below its reference, of 6 N m wanted; at 75 deg and 50 psi_g"
+        "the torque stays 1 N m below its reference (requested change 6 N m); at 75 deg and 50 psi_g"
     )
     assert not told.is_useless
     assert told.accepted.startswith("above the 5.0 N m that 50 psi_g can hold")
@@ -72,13 +72,13 @@ def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> No
 @pytest.mark.parametrize(
     ("changes", "share"),
     [
-        (["reference.level=4 N m"], "2.19 N m in its dead time of 75 ms, 0.55 times the 4 N m wanted"),
+        (["reference.level=4 N m"], "2.19 N m in its dead time of 75 ms, 0.55 times the requested 4 N m"),
         (["reference.level=4 N m", "valve.switching_interval=5 ms", "controller.rate=300 Hz"], ""),
         (["reference.level=4 N m", "valve.area=4.5 mm^2"], ""),
         (["device.valve=proportional", "valve.area=60 mm^2"], ""),
         (
             ["reference.of=pressure_1", "reference.start_level=0 psi_g", "reference.level=30 psi_g"],
-            "0.73 times the 30 psi wanted",
+            "0.73 times the requested 30 psi",
         ),
     ],
 )
@@ -127,7 +127,7 @@ def test_a_walk_with_an_actuator_that_pushes_one_way_is_told_to_ask_for_no_dorsi
     scenario = load_scenario("proportional", changes)
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
-    assert "it pushes one way only" in verdict.cause
+    assert "it acts in one direction only" in verdict.cause
     assert len(verdict.mended) == 4
     assert simulate("proportional", [*changes, *verdict.mended]).tracking is None
 
@@ -174,7 +174,7 @@ def test_a_valve_that_opens_away_from_the_reference_is_not_called_too_small() ->
 
     told = simulate(load_scenario(TASK, ["reference.level=2 N m"]).controlled_by(Opens())).tracking
     assert told is not None
-    assert "away from the reference for 100 % of it; reverse the sign" in told.sentence
+    assert "drives away from the reference for 100 % of this time; reverse the sign" in told.sentence
 
 
 @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ def test_a_joint_that_is_flung_at_the_start_is_told_so_with_pressures_that_carry
     scenario = load_scenario("cylinder-servo", changes)
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
-    assert "at the start its chambers give 0 N m for a load of 4 N m: the joint moves 19" in verdict.sentence
+    assert "at the start the chambers give 0 N m for a load of 4 N m: the joint moves away by 19" in verdict.sentence
     assert [text.partition("=")[0] for text in verdict.mended] == ["initial.pressure_1", "initial.pressure_2"]
     again = simulate("cylinder-servo", [*changes, *verdict.mended])
     assert again.tracking is None
@@ -220,7 +220,7 @@ def test_a_joint_that_is_flung_at_the_start_is_told_so_with_pressures_that_carry
 def test_a_load_keeps_its_sign_beside_a_reach_of_the_same_sign() -> None:
     verdict = simulate("cylinder-servo", ["motion.external_torque=-30 N m"]).tracking
     assert verdict is not None
-    assert re.search(r"needs -30 N m at \S+ deg, where the actuator gives -\S+ N m at most", verdict.sentence)
+    assert re.search(r"needs -30 N m at \S+ deg, the actuator gives at most -\S+ N m", verdict.sentence)
 
 
 def test_an_error_that_is_less_than_that_of_the_table_says_from_when_it_counts() -> None:
@@ -228,7 +228,7 @@ def test_an_error_that_is_less_than_that_of_the_table_says_from_when_it_counts()
     result = simulate("cylinder-servo", changes)
     assert result.tracking is not None
     assert result.tracking.since == pytest.approx(0.6, abs=0.01)
-    assert "of 10 deg wanted from 0.6 s on" in result.tracking.sentence
+    assert "(requested change 10 deg) from 0.6 s on" in result.tracking.sentence
     late = result.recording.time >= result.tracking.since - 1e-9
     error = (result["angle"] - result["reference_angle"])[late]
     assert result.tracking.error == pytest.approx(float(np.sqrt(np.mean(error**2))))
@@ -253,7 +253,7 @@ def test_a_bladder_that_nothing_pulls_back_is_said_to_push_one_way_only() -> Non
         "cylinder-servo", ["supply.dorsiflexion_pressure=0 bar_g", "motion.external_torque=-1 N m"]
     ).tracking
     assert verdict is not None
-    assert "where the actuator gives 0 N m at most: it pushes one way only" in verdict.sentence
+    assert "the actuator gives at most 0 N m: it acts in one direction only" in verdict.sentence
 
 
 @pytest.mark.long
@@ -269,8 +269,8 @@ def test_a_bladder_whose_material_pulls_too_little_is_given_a_load_that_helps() 
     )
     verdict = simulate(scenario).tracking
     assert verdict is not None
-    assert "it needs -3 N m at 30 deg" in verdict.sentence
-    assert "pushes one way only" not in verdict.sentence
+    assert "the load needs -3 N m at 30 deg" in verdict.sentence
+    assert "acts in one direction only" not in verdict.sentence
     assert verdict.remedies[0].numbers["motion.external_torque"] > 0.0
 
 
@@ -399,7 +399,7 @@ def test_a_law_on_the_angle_alone_that_load_and_friction_hold_is_told_the_law_th
     scenario = load_scenario("cylinder-servo", changes)
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
-    assert "`pid` acts on the angle without a torque loop inside" in verdict.cause
+    assert "`pid` controls the angle without an inner torque loop" in verdict.cause
     assert verdict.tried == "with overrides=['controller.kind=cascade'] it follows, as a further run shows"
 
 
@@ -407,7 +407,7 @@ def test_a_free_joint_that_its_torque_presses_on_a_stop_is_told_so() -> None:
     changes = ["motion.kind=free", "reference.level=9 N m"]
     told = simulate(TASK, changes).tracking
     assert told is not None
-    assert "nothing resists the torque but the upper stop, on which the joint lies" in told.cause
+    assert "only the upper stop, on which the joint lies, resists the torque" in told.cause
     assert told.remedies == ()
 
 
@@ -417,8 +417,8 @@ def test_a_law_on_a_pair_of_valves_is_told_the_step_of_its_valves_and_no_gain(la
     scenario = load_scenario("torque-task-solenoid", [*changes, "valve.opening_delay=10 ms"])
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
-    assert "its valves change it by" in verdict.cause
-    assert (f"`{law}` asks for openings that on/off valves do not have" in verdict.cause) == (law != "on_off")
+    assert "the valves cause a step of" in verdict.cause
+    assert (f"`{law}` requests partial openings, which on/off valves do not have" in verdict.cause) == (law != "on_off")
     assert verdict.mended[0].startswith("valve.area=")
     assert most_reversals(scenario) == math.inf
 
@@ -436,7 +436,7 @@ def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> Non
     assert quick.tracking is None
     (remark,) = (said for said in quick.warnings if "a second" in said)
     assert re.match(
-        r"its valves are reversed \d+ times a second, and no value of the parameter set limits the rate ", remark
+        r"the valves are reversed \d+ times a second, and no value of the parameter set limits this rate ", remark
     )
     assert remark in str(quick)
     for limited in ("valve.switching_interval=20 ms", "valve.opening_delay=5 ms"):
@@ -448,7 +448,7 @@ def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> Non
 def test_a_reference_just_beyond_reach_that_is_followed_within_the_limit_is_told_the_reach() -> None:
     told = simulate(TASK, ["reference.level=5.1 N m", "run.duration=6 s"]).following
     assert re.search(
-        r"; from [\d.]+ s on: RMS error .*; at 75 deg and 50 psi_g the actuator gives 5 N m at most$", told
+        r"; from [\d.]+ s on: RMS error .*; at 75 deg and 50 psi_g the actuator gives at most 5 N m$", told
     )
     assert "at most" not in simulate(TASK, ["reference.level=4 N m"]).following
 
@@ -456,7 +456,7 @@ def test_a_reference_just_beyond_reach_that_is_followed_within_the_limit_is_told
 def test_a_verdict_has_the_limits_by_which_it_was_judged_and_the_swing() -> None:
     """The wide limit of valves without gradual openings is given its reason."""
     torque = simulate("torque-task-solenoid", ["reference.level=3 N m", "valve.area=3.45 mm^2"]).following
-    allowed = r"\(0.75 N m allowed, as its valves are only open or shut\)"
+    allowed = r"\(0.75 N m allowed, because the valves are either open or shut\)"
     assert re.fullmatch(
         rf"the torque follows its reference; from 2 s on: RMS error 0.\d+ N m {allowed}, swing 1?[.]?\d+ N m", torque
     )
@@ -492,7 +492,7 @@ def test_a_run_without_a_verdict_says_why_and_its_remedy_gives_one(changes: list
 def test_a_verdict_writes_thousands_without_an_exponent() -> None:
     verdict = simulate(TASK, ["reference.level=3000 N m"]).tracking
     assert verdict is not None
-    assert verdict.sentence.startswith("the torque loop does not move: 5 of 3000 N m wanted")
+    assert verdict.sentence.startswith("the torque loop does not move: 5 of the requested 3000 N m")
 
 
 LEVEL = "reference.level=3 N m"
@@ -504,16 +504,16 @@ LEVEL = "reference.level=3 N m"
         (
             TASK,
             [LEVEL, "supply.pressure=20 psi_g"],
-            "at 75 deg and 20 psi_g the actuator gives 2 N m",
+            "at 75 deg and 20 psi_g the actuator gives at most 2 N m",
             "supply.pressure",
         ),
         (
             TASK,
             [LEVEL, "controller.rate=2 Hz"],
-            "its controller decides every 500 ms, 2 times",
+            "the controller decides every 500 ms, only 2 times",
             "controller.rate=20 Hz",
         ),
-        ("pressure-loop", ["controller.rate=2 Hz"], "its controller decides every 500 ms", "controller.rate=200 Hz"),
+        ("pressure-loop", ["controller.rate=2 Hz"], "the controller decides every 500 ms", "controller.rate=200 Hz"),
         (TASK, [LEVEL, "sensors.delay=200 ms"], "(`sensors.delay = 0.2 s`)", "sensors.delay=0.02 s"),
         (TASK, [LEVEL, "sensors.pressure_noise=5 bar_d"], "`sensors.pressure_noise", "sensors.pressure_noise"),
         ("cylinder-servo", ["sensors.delay=2 s"], "`sensors.delay = 2 s`", "sensors.delay=0.002 s"),
@@ -527,13 +527,13 @@ LEVEL = "reference.level=3 N m"
         (
             TASK,
             [LEVEL, "controller.proportional_gain=95 1/(N m)"],
-            "its gains do not suit this device",
+            "the gains do not suit this device",
             "proportional_gain",
         ),
         (
             TASK,
             ["reference.level=3000 N m"],
-            "at 75 deg and 50 psi_g the actuator gives 5 N m at most",
+            "at 75 deg and 50 psi_g the actuator gives at most 5 N m",
             "reference.level",
         ),
     ],
@@ -556,7 +556,7 @@ def test_a_wrong_set_up_is_told_its_cause_and_a_remedy_that_works(
     [
         (TASK, "controller.proportional_gain=-0.1 1/(N m)", "must be at least 0 1/(N m)"),
         ("cylinder-servo", "reference.level=200 deg", "leaves the stops of cylinder-lever, 20 deg to 130 deg"),
-        (TASK, "run.step=0.5 s", "must not be above 0.001 s"),
+        (TASK, "run.step=0.5 s", "must not exceed controller.rate = 0.001 s"),
     ],
 )
 def test_a_wrong_sign_a_reference_beyond_the_stops_and_a_coarse_step_are_refused(

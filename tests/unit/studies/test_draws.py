@@ -106,7 +106,7 @@ def test_metrics_are_checked_before_anything_runs() -> None:
     closed, opened = load_scenario("torque-task-proportional"), load_scenario("step-response")
     with pytest.raises(StudyError, match="no metric 'rms_eror', did you mean 'rms_error'"):
         check_metrics(["rms_eror"], closed)
-    with pytest.raises(StudyError, match="has no 'rms_error': its controller follows no reference"):
+    with pytest.raises(StudyError, match="has no 'rms_error': the controller has no reference"):
         check_metrics(["rms_error"], opened)
     with pytest.raises(StudyError, match="'peak_error' is named twice"):
         check_metrics(["peak_error", "peak_error"], closed)
@@ -175,7 +175,7 @@ def test_what_is_drawn_in_a_configuration_has_the_noise_and_can_leave_correlatio
 def test_gains_that_follow_a_varied_value_are_named_with_the_nominal_ones_and_given_ones_are_not() -> None:
     scenario = load_scenario("torque-task-proportional", ["controller.kind=sliding_mode"])
     remark = remark_on_following_gains(scenario, ["valve.area"])
-    assert "surface_slope, boundary_layer are computed anew from the varied values" in remark
+    assert "surface_slope, boundary_layer are recomputed from the varied values" in remark
     assert "overrides=['controller.surface_slope=83.3333 1/s'" in remark
     assert remark_on_following_gains(scenario, ["sensors.seed"]) == ""
     assert remark_on_following_gains(load_scenario("torque-task-proportional"), ["valve.area"]) == ""

@@ -119,7 +119,7 @@ def test_a_path_that_is_the_same_as_a_gauge_pressure_counts_from_the_same_atmosp
 
 TASK, METRIC, ATMOSPHERE = "torque-task-proportional", "largest_pressure", "supply.atmospheric_pressure"
 HIGH_UP = (f"{ATMOSPHERE}=80 kPa_a", "supply.pressure=400 kPa_a")
-REFUSED = rf"50 kPa_g'.*: is a gauge pressure, but {ATMOSPHERE} varies; give an absolute pressure"
+REFUSED = rf"50 kPa_g'.*: must not be a gauge pressure, because {ATMOSPHERE} varies; give an absolute pressure"
 
 
 def high_study(path: str, minimum: str, maximum: str) -> dict[str, Any]:

@@ -97,12 +97,12 @@ def test_a_seed_varies_as_whole_numbers() -> None:
     [
         (
             {"path": NOISE, "kind": "uniform", "minimum": 1, "maximum": 9},
-            "gives no whole numbers, which 'sensors.seed' needs",
+            "does not give whole numbers, which 'sensors.seed' needs",
         ),
         ({"path": NOISE, "kind": "list", "values": [1, 2.5]}, "2.5 must be a whole number"),
         ({"path": NOISE, "kind": "grid", "first": 1, "last": 4, "count": 3}, "2.5 must be a whole number"),
         ({"path": NOISE, "kind": "whole_numbers", "minimum": 9, "maximum": 3}, "must be less than maximum"),
-        ({"path": "valve.area", "kind": "whole_numbers"}, "is for sensors.seed and wearer.person alone"),
+        ({"path": "valve.area", "kind": "whole_numbers"}, "is only for sensors.seed and wearer.person"),
     ],
 )
 def test_a_seed_that_is_no_whole_number_is_one_line(item: dict[str, Any], text: str) -> None:

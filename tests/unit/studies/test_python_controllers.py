@@ -122,7 +122,7 @@ def test_the_device_around_it_is_tuned_and_gains_that_it_does_not_declare_are_re
     assert tuned.after.objective <= tuned.before.objective
     gain = {"path": "controller.proportional_gain", "minimum": "0.05 1/(N m)", "maximum": "1 1/(N m)"}
     problem = ppafo.load_tuning(document | {"search": [gain]})
-    with pytest.raises(StudyError, match="a Python object has no declared settings"):
+    with pytest.raises(StudyError, match="a Python controller object has no declared settings"):
         ppafo.tune(replace(problem, scenario=problem.scenario.controlled_by(Integral())))
 
 

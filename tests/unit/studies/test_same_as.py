@@ -69,7 +69,7 @@ def test_path_follows_only_where_it_is_to() -> None:
     [
         (
             {"same_as": "actuator.dead_volume_3"},
-            "does not vary independently here, did you mean 'actuator.dead_volume_1'",
+            "does not vary independently, did you mean 'actuator.dead_volume_1'",
         ),
         ({"same_as": "actuator.dead_volume_2"}, "does not vary independently"),
         ({"same_as": 3}, "same_as"),

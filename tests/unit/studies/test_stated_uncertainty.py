@@ -50,9 +50,9 @@ def test_an_uncertainty_of_a_gauge_pressure_is_a_difference(stating: Callable[..
 @pytest.mark.parametrize(
     ("path", "overrides", "expected"),
     [
-        ("valve.area", (), "needs an uncertainty in the parameter set 'mine.toml', which has none"),
-        ("supply.pressure", ("supply.pressure=40 psi_g",), "was changed by an override"),
-        ("reference.level", (), "which has none"),
+        ("valve.area", (), "needs an uncertainty in the parameter set 'mine.toml', but it states none"),
+        ("supply.pressure", ("supply.pressure=40 psi_g",), "an override replaced it"),
+        ("reference.level", (), "but it states none"),
     ],
 )
 def test_what_the_set_does_not_state_is_refused(

@@ -93,7 +93,7 @@ def test_without_a_folder_for_it_a_program_of_gcc_runs_all_the_same(
     monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path / "file"))
     forget_programs(monkeypatch)
     assert by("gcc", batch, monkeypatch) == expected
-    assert "compiled models are not kept" in caplog.text
+    assert "compiled models are not cached" in caplog.text
 
 
 def test_a_name_that_is_no_compiler_is_refused_in_one_line(

@@ -142,7 +142,7 @@ def test_an_angle_far_beyond_the_stops_is_refused_and_noise_at_a_stop_is_not(
 
 def test_a_reversed_angle_is_named_as_that(step: Step, agree: Callable[..., Any]) -> None:
     device, recording = step
-    with pytest.raises(DataError, match="with the other sign all angles would lie between them"):
+    with pytest.raises(DataError, match="with the opposite sign all angles would lie between the stops"):
         agree(recording.with_channel("angle", -recording["angle"], "rad"), device)
 
 
@@ -169,7 +169,7 @@ def test_a_prescribed_vane_needs_its_angle(step: Step, agree: Callable[..., Any]
         ("pressure_1=3 psi", "needs the kind of pressure"),
         ("angle", "does not start with a number"),
         ("3 deg", "a plain number without a unit"),
-        ("0.1", "a percentage of the full range"),
+        ("0.1", "must be in %, for example '5%'"),
         ("angle=-5%", "must be above 0"),
         ("angle=0%", "must be above 0"),
         ("", "does not start with a number"),

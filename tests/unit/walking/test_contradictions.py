@@ -19,17 +19,17 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
 
 MISTAKES = {
-    "controller.unload_threshold=80 N": "must be below controller.load_threshold, which is 60 N",
+    "controller.unload_threshold=80 N": "must be below controller.load_threshold = 60 N",
     "controller.largest_force=100 N; controller.load_threshold=200 N": "must be above controller.load_threshold",
-    "controller.first_stride_time=5 s": "between half and twice the stride of the gait, which is 1.0384 s",
-    "controller.frozen_time=10 ms; controller.rate=100 Hz": "than two sample periods of the controller, 10 ms each",
+    "controller.first_stride_time=5 s": "between half and twice the stride time of the gait, 1.0384 s",
+    "controller.frozen_time=10 ms; controller.rate=100 Hz": "than two sample periods of the controller, each 10 ms",
     "controller.lowest_angle=100 deg; controller.highest_angle=90 deg": "must be below controller.highest_angle",
-    "controller.push_off_end=0.39": "must be above controller.push_off_start, which is 0.4",
-    "controller.highest_angle=90 deg": r"its default, 96.2569 deg: .* 90 deg; give it .*'controller.swing_angle=",
-    "actuator.angle_max=90 deg": "the gait needs 76 to 109 deg, this joint ends at 90 deg",
-    "controller.swing_angle=135 deg": "lies outside the range of sensor and device, 20 deg to 130 deg",
-    "wearer.shank_mass_centre=0.5 m": "lies beyond the ankle: wearer.shank_length is 0.46 m",
-    "wearer.toe_lever=0.08 m": "which is not given and takes its default, 0.09 m: lies beyond the toes",
+    "controller.push_off_end=0.39": "must be above controller.push_off_start = 0.4",
+    "controller.highest_angle=90 deg": r"its default, 96.2569 deg: .* 90 deg; give a value .*'controller.swing_angle=",
+    "actuator.angle_max=90 deg": "the gait needs 76 to 109 deg, but the upper stop is at 90 deg",
+    "controller.swing_angle=135 deg": "must be in the range of sensor and device, 20 deg to 130 deg",
+    "wearer.shank_mass_centre=0.5 m": "lies beyond the ankle: wearer.shank_length = 0.46 m",
+    "wearer.toe_lever=0.08 m": "is not given and has its default, 0.09 m: lies beyond the toes",
     "controller.unload_treshold=20 N": "has no value 'controller.unload_treshold', did you mean 'controller.unload_th",
     "controller.load_threshold=60": "a number without a unit does not fit: a unit like 'N' is needed",
     "controller.load_threshold=60 kg": "unit 'kg' does not fit: a unit like 'N' is needed",
@@ -39,18 +39,18 @@ MISTAKES = {
     "faults.heel.kind=stuk; faults.heel.foo=3 N": "'stuk' is not known, did you mean 'stuck'",
     "faults.heel.time=3 s": "'faults.heel.kind' is missing",
     "faults.pressure_1.kind=stuck; faults.pressure_1.time=3 s; faults.pressure_1.reading=3 N": "a pressure level is",
-    "controller.kind=event_proportional": "not a solenoid one: take device.valve 'proportional', or cont",
-    "controller.flat_from=0.3": "must be below controller.flat_to, which is 0.24",
-    "supply.atmospheric_pressure=80 kPa_a; controller.lowest_pressure=90 kPa_a": "must be below the atmosphere, which",
-    "controller.filled_pressure=60 psi_g": "must be between atmosphere and supply, which are 0 psi_g and 50 psi_g",
-    "controller.filled_pressure=9 bar_g": r"atmosphere and supply, which are 0 bar_g and 3\.44738 bar_g$",
+    "controller.kind=event_proportional": "not a solenoid valve: set device.valve to 'proportional', or cont",
+    "controller.flat_from=0.3": "must be below controller.flat_to = 0.24",
+    "supply.atmospheric_pressure=80 kPa_a; controller.lowest_pressure=90 kPa_a": "must be below atmospheric pressure, ",
+    "controller.filled_pressure=60 psi_g": "must be between atmospheric and supply pressure, 0 psi_g and 50 psi_g",
+    "controller.filled_pressure=9 bar_g": r"atmospheric and supply pressure, 0 bar_g and 3\.44738 bar_g$",
     "supply.pressure=100 bar_g": r"its default, 18\.9868 bar_g: must be above \S+ bar_g: a moving foot",
     "controller.highest_pressure=60 psi_g": "must be above 88.8",
     "sensors.angle_bandwidth=-1 Hz": "must be at least 0 Hz and at most 1e",
     "sensors.pressure_lost_share=2": "must be at least 0 and at most 1",
 }
 ON_A_PROPORTIONAL_VALVE = {
-    "valve.delay=60 ms": "fill_time, which is not given and takes its default, 0.05 s: must be longer than the dead",
+    "valve.delay=60 ms": "fill_time is not given and has its default, 0.05 s: must be longer than the dead",
 }
 PROFILE = {
     "controller.peak_time=0.9; controller.fall_time=0.2": "the torque would end after the stride",
@@ -154,7 +154,7 @@ def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> Non
     bare = replace(load_gait(), name="bare", vertical_force=None, ankle_moment=None, centre_of_pressure=None)
     path = tmp_path / "bare.toml"
     path.write_text(gait_toml(bare))
-    with pytest.raises(ScenarioError, match="gait 'bare' has no vertical_force; import it with the ground reaction"):
+    with pytest.raises(ScenarioError, match="gait 'bare' has no vertical_force; import the gait with ground"):
         load_walk("solenoid", gait=path)
     assert walk_of(load_walk("off", gait=path)).gait.name == "bare"
 
@@ -173,7 +173,7 @@ def test_what_is_no_number_of_minutes_is_refused(minutes: float) -> None:
 
 def test_overrides_beside_a_configuration_are_refused() -> None:
     configuration = load_walk("off")
-    with pytest.raises(ScenarioError, match="for a Scenario give them to load_walk"):
+    with pytest.raises(ScenarioError, match="a loaded Scenario accepts no overrides"):
         walk(configuration, minutes=0.1, overrides=["wearer.body_mass=80 kg"])
 
 
@@ -186,7 +186,7 @@ def test_a_number_of_wearers_that_cannot_walk_is_refused() -> None:
 
 
 def test_a_joint_whose_stops_the_gait_passes_is_refused_with_both_ranges() -> None:
-    with pytest.raises(ScenarioError, match=r"the gait needs 76 to 109 deg, this joint ends at 70 deg$"):
+    with pytest.raises(ScenarioError, match=r"the gait needs 76 to 109 deg, but the upper stop is at 70 deg$"):
         load_walk("proportional", ["actuator.angle_max=70 deg"])
-    with pytest.raises(ScenarioError, match=r"the gait needs 76 to 109 deg, this joint begins at 85 deg$"):
+    with pytest.raises(ScenarioError, match=r"the gait needs 76 to 109 deg, but the lower stop is at 85 deg$"):
         load_walk("proportional", ["actuator.angle_min=85 deg"])

@@ -64,11 +64,11 @@ def test_a_column_of_stature_or_mass_is_the_single_run_with_it(in_file: bool) ->
 
 def test_a_stature_beyond_those_of_adults_is_said() -> None:
     (adult,) = person_remarks(load_walk("solenoid", ["wearer.stature=1.75 m"]))
-    assert "; 1.75 m tall, and the segments follow mass and stature; the curves of the gait are not scaled" in adult
+    assert "; 1.75 m tall, segments scaled by mass and stature; the curves of the gait are not scaled" in adult
     (child,) = person_remarks(load_walk("solenoid", ["wearer.stature=1.2 m", "wearer.body_mass=20 kg"]))
     assert "1.2 m tall" in child
     assert "in the proportions of adults of 1.45 to 2 m, extrapolated here" in child
-    assert "extrapolated outside 37 to 105 kg; a gait recorded of such a person" in child
+    assert "extrapolated outside 37 to 105 kg; better import a gait recorded of such a person" in child
     (thin,) = person_remarks(load_walk("solenoid", ["wearer.body_mass=30 kg"]))
     assert ", with the leg of the paper's subject, 72.5 kg; wearer.stature scales the leg; " in thin
     with pytest.raises(ScenarioError, match=r"wearer.stature=3 m: must be at least 0.5 m and at most 2.5 m"):

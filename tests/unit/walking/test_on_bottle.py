@@ -181,18 +181,18 @@ def test_ice_narrows_the_seat_until_the_gas_lacks_no_more_than_it_is_given() -> 
 
 MISTAKES = {
     "bottle.name=paper-co2-9": "did you mean 'paper-co2-9oz'",
-    "bottle.name=air-48ci-3000psi": "is fed with CO2: set gas.species=air, or take a bottle of CO2",
+    "bottle.name=air-48ci-3000psi": "the device uses CO2: set gas.species=air, or choose a bottle of CO2",
     "bottle.fill=0": "must be more than 0",
     "bottle.temperature=200 K": "must be above 216.592 K",
-    "bottle.temperature=303 K": "and 224.9 g fit into it at 303 K",
+    "bottle.temperature=303 K": "only 224.9 g fit into the bottle at 303 K",
     "bottle.regulator.area=0 mm^2": "must be more than 0",
     "bottle.regulator.are=3 mm^2": "bottle.regulator.area",
-    "supply.relieving=true": "no gas goes back into a bottle",
+    "supply.relieving=true": "must be false with a bottle",
     "supply_line.plantarflexion.droop=3 Pa s/kg": "must be omitted for a walk with a bottle",
     "bottle.regulator.pressure_margin=8 MPa_d": "the regulator needs",
-    "bottle.regulator.set_pressure=30 psi_g": "which uses supply.pressure for the regulator of the bottle",
-    "bottle.hose.heat_capacity=0.001 J/K": r"its hose follows within 0\.0\d+ ms, and a walk follows what takes 1 ms",
-    "bottle.wall_heat_capacity=0.001 J/K": r"its wall .*set bottle\.wall_heat_capacity higher",
+    "bottle.regulator.set_pressure=30 psi_g": "where supply.pressure sets the regulator of the bottle",
+    "bottle.hose.heat_capacity=0.001 J/K": r"hose has a time constant of 0\.0\d+ ms, but a walk needs at least 1 ms",
+    "bottle.wall_heat_capacity=0.001 J/K": r"wall .*increase bottle\.wall_heat_capacity",
 }
 
 
@@ -208,7 +208,7 @@ def test_a_file_that_sets_its_regulator_to_another_pressure_is_refused(tmp_path:
     shipped = (Path(str(BOTTLES.shipped)) / f"{BOTTLE}.toml").read_text(encoding="utf-8")
     file = tmp_path / "own.toml"
     file.write_text(shipped.replace('50.0\nunit = "psi_g"', '30.0\nunit = "psi_g"'), encoding="utf-8")
-    words = r"own\.toml sets regulator\.set_pressure to 30 psi_g, and supply\.pressure is 50 psi_g: give both the same"
+    words = r"own\.toml sets regulator\.set_pressure to 30 psi_g, but supply\.pressure is 50 psi_g: make both equal"
     with pytest.raises(ScenarioError, match=words):
         load_walk(WALK, bottle=file)
     lower = ["supply.pressure=30 psi_g", "supply.dorsiflexion_pressure=25 psi_g"]
@@ -240,17 +240,17 @@ def test_a_bottle_of_the_package_is_set_to_the_pressure_of_the_walk_and_says_so(
 def test_what_is_named_twice_is_refused(path: str, value: str) -> None:
     own = "bottle.name=other" if path == "bottle" else f"{path}=other"
     with pytest.raises(
-        ScenarioError, match=f"override '{own}': the {path} is given as '{value}' already; give it once"
+        ScenarioError, match=f"override '{own}': the {path} is already given as '{value}'; omit one of them"
     ):
         load_walk(WALK, [own], **{path: value})
 
 
 def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:
     configuration = load_walk(WALK, bottle=BOTTLE)
-    with pytest.raises(ScenarioError, match="several wearers walk at a constant supply"):
+    with pytest.raises(ScenarioError, match="walks of several wearers need a constant supply"):
         walk_population(configuration, minutes=0.1, wearers=3)
     changes = ["gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"]
-    with pytest.raises(ScenarioError, match=r"gas_model\.kind.*omit it, or the bottle"):
+    with pytest.raises(ScenarioError, match=r"gas_model\.kind.*omit gas_model\.kind, or the bottle"):
         load_walk(WALK, [*changes, "gas_model.wall_area_per_volume=100 1/m"], bottle=BOTTLE)
     assert walk_of(with_device_off(configuration)).bottle is None
 

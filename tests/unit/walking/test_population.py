@@ -155,7 +155,7 @@ def test_wearers_that_diverge_are_counted_and_left_out() -> None:
     )
     assert people.diverged == 8
     assert people.count == 0
-    assert "8 of 8 wearers diverged and are left out; the step may be too long" in people.message
+    assert "8 of 8 wearers diverged and are left out; the time step may be too long" in people.message
 
 
 def test_progress_of_many_wearers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,8 +21,8 @@ MISTAKES = {
     "supply_line.plantarflexion.droop=3 psi": "does not fit: a unit like 'Pa s/kg' is needed",
     "supply_line.dorsiflexion.volume=0.1 cm^3": r"must be at least 1 cm\^3",
     "supply_line.dorsiflexion.drop=3 Pa s/kg": "did you mean 'supply_line.dorsiflexion.droop'",
-    "supply.dorsiflexion_pressure=60 psi_g": "its second regulator is fed by the first, so "
-    "supply.dorsiflexion_pressure, 60 psi_g, cannot be above supply.pressure, 50 psi_g",
+    "supply.dorsiflexion_pressure=60 psi_g": "the first regulator feeds the second, so "
+    "supply.dorsiflexion_pressure = 60 psi_g must not exceed supply.pressure = 50 psi_g",
 }
 
 

@@ -55,9 +55,12 @@ MISTAKES = {
     "scuff in standing": ('[[segment]]\nkind = "scuff"\n', ("segment 1 (scuff): the wearer is standing at this",)),
     "start in walking": (
         WALK + '[[segment]]\nkind = "start"\n',
-        ("segment 2 (start): the wearer walks there already",),
+        ("segment 2 (start): the wearer is already walking at this point",),
     ),
-    "ramp to nowhere": (WALK + '[[segment]]\nkind = "ramp"\nstrides = 3\n', ("segment 2 (ramp): give the speed",)),
+    "ramp to nowhere": (
+        WALK + '[[segment]]\nkind = "ramp"\nstrides = 3\n',
+        ("segment 2 (ramp): give speed or cadence",),
+    ),
     "tight turn": ('[[segment]]\nkind = "turn"\nstrides = 2\nradius = "0.2 m"\n', ("radius must be at least 0.5 m",)),
     "steep slope": (WALK + 'slope = "20 deg"\n', ("segment 1 (walk): slope = '20 deg'", "at most")),
     "no segments": ("segment = []\n", ("segment",)),

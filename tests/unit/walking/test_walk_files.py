@@ -125,7 +125,7 @@ def test_a_misspelt_motion_is_told_of_walks_too(tmp_path: Path) -> None:
 
 def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Path) -> None:
     assert load_walk(NAME, ["motion.kind=walk"]).controller == load_walk(NAME).controller
-    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=free': a walk file needs the motion 'walk'"):
+    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=free': a walk file needs motion.kind = 'walk'"):
         load_walk(NAME, ["motion.kind=free"])
     misspelt = written(tmp_path, (text_of(NAME) + MOTION).replace('"walk"', '"wlak"'))
     with pytest.raises(
@@ -148,9 +148,9 @@ def test_a_gait_or_task_sequence_that_is_not_there_names_the_file_and_the_key(
 
 
 def test_where_only_a_vane_will_do_a_walk_is_refused_by_its_motion(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="this motion is a walk, but a scenario file has"):
+    with pytest.raises(ScenarioError, match="a walk needs a walk file, not a scenario file"):
         load_vane(written(tmp_path, text_of(NAME) + MOTION))
-    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=walk': this motion is a walk"):
+    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=walk': a walk needs a walk file"):
         load_scenario("torque-task-proportional", ["motion.kind=walk"])
 
 

@@ -129,8 +129,8 @@ _NOISE = (
     "one realisation"
 )
 _PARETO = (
-    "Marks: the nominal device; dots: draws. The line joins the configurations that no other beats in both error and "
-    "gas."
+    "Marks: the nominal device; dots: draws. The line joins the configurations that no other configuration beats in "
+    "both error and gas."
 )
 
 
@@ -256,7 +256,7 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
                 remarks.append(coarse_pair(case.scenario))
                 remarks.append(remark_on_following_gains(case.scenario, comparison.varied))
                 if case.tracking is not None and not case.follows:
-                    remarks.append(f"{where}: {case.tracking.sentence}; it is not among the best")
+                    remarks.append(f"{where}: {case.tracking.sentence}; not counted among the best")
             if not case.status.is_completed:
                 failed.append(f"{where}: {case.status.message}")
             if case.failed_draws:

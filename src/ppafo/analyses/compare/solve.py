@@ -102,7 +102,7 @@ def compared(
     named_tasks = list(tasks) or [(AS_WRITTEN, ())]
     repeated = first_twice([name for name, _ in named_tasks])
     if repeated is not None:
-        raise StudyError(f"two tasks are named '{repeated}'; give each its own name")
+        raise StudyError(f"two tasks are named '{repeated}'; give every task a different name")
     scenarios = {
         (task, configuration.name): configuration.scenario
         for task, overrides in named_tasks
@@ -167,8 +167,8 @@ def compared(
     remarks = remarks_of(comparison)
     if study is not None and study.drawn and draws.requested is None and study.sample.runs != draws.count:
         remarks.append(
-            f"the {study.sample.runs:,} runs of study '{study.name}' are for 'ppafo sweep'; 'compare' takes "
-            f"{draws.count:,} draws, or as many as {argument_text('draws')} says"
+            f"study '{study.name}': sample.runs = {study.sample.runs} applies to 'ppafo sweep' only; 'compare' used "
+            f"{draws.count:,} draws, which {argument_text('draws')} changes"
         )
     return replace(comparison, remarks=remarks)
 

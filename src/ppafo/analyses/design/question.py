@@ -68,9 +68,11 @@ def design(
         StudyError: a problem that cannot be used, and a valve with which every run fails
         ParameterError: a catalogue or a parameter set that cannot be used
 
+    >>> from dataclasses import replace
     >>> import ppafo
-    >>> ppafo.design("push-off").passed
-    True
+    >>> problem = ppafo.load_design("push-off")
+    >>> ppafo.design(replace(problem, gain_factors=(1.0,), largest_error=1.0)).found.choice.bottle.name
+    'pipeline-jacpac-9oz'
     """
     name_plugins(plugins)
     from ppafo.analyses.design.loading import load_design

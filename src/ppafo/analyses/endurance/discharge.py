@@ -102,7 +102,7 @@ def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent,
     # What a warm bottle would still give decides between the two: cold is mended by waiting, empty is not.
     if usable > _NEXT_TO_NOTHING * bottle.mass:
         return DischargeEnd("too cold", f"the bottle is too cold: {why}; {remaining}, {warm}", mass, usable)
-    return DischargeEnd("empty", f"the bottle is empty: {why}, and would be also when warm; {remaining}", mass, usable)
+    return DischargeEnd("empty", f"the bottle is empty: {why}, even at room temperature; {remaining}", mass, usable)
 
 
 MAXIMUM_INTERVALS = 2000

@@ -109,8 +109,8 @@ def bottle(
             return finding_of(replace(follow_bottle(full, draw, schedule), device_units=units))
     if peak_flow is not None:
         raise ParameterError(
-            f"{argument_text('peak_flow')} needs {argument_text('gas_per_stride')}; omit it for a recording, "
-            "which contains its largest flow"
+            f"{argument_text('peak_flow')} needs {argument_text('gas_per_stride')}; a recording already "
+            "contains its largest flow"
         )
     endurances = {
         name: endurance_of_gas_use(name, use, stride_time, bottle, schedule, changes)

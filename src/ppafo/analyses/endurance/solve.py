@@ -76,8 +76,8 @@ def endurance_of_gas_use(
             species = override.text if override.text in SPECIES else "NAME"
             again = override_text([f"{SPECIES_PATH}={species}"])
             raise ParameterError(
-                f"override '{override}': a bottle has no value '{override.typed}'; its file names the gas, and the "
-                f"scenario of the run the device's: repeat the run of {name} with {again}, then give its folder"
+                f"override '{override}': a bottle has no value '{override.typed}'; its gas is set in the bottle file, "
+                f"the gas of the device in the scenario: repeat the run of {name} with {again} and give its folder"
             )
     gas = walk_gas(use) if isinstance(use, WalkResult) else None
     if isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
@@ -119,9 +119,9 @@ def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -
     with the device, or a whole task sequence.
 
     >>> import ppafo
-    >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1))
+    >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1), bottle="co2-25g")
     >>> print(f"{endurance.discharge.walking_time / 60.0:.1f} min: {endurance.discharge.ending.kind}")
-    5.2 min: frozen
+    0.4 min: frozen
     """
     gas = walk_gas(result)
     # A walk that takes no gas lasts for ever on any bottle.
@@ -147,8 +147,8 @@ def endurance_of_walk_gas(
         fed, again = device.gas.species, reloaded(gas.scenario, [f"{SPECIES_PATH}={full.fluid.name}"])
         command = usage_text(again).partition("\n")[0]
         raise DataError(
-            f"walk '{gas.name}': its device is fed with {fed}, and bottle '{full.name}' holds {full.fluid.name}: "
-            f"repeat the walk by '{command} --out FOLDER' and give FOLDER, or take a bottle of {fed}"
+            f"walk '{gas.name}': the device uses {fed}, but bottle '{full.name}' contains {full.fluid.name}; "
+            f"repeat the walk with '{command} --out FOLDER' and give FOLDER, or choose a bottle of {fed}"
         )
     walking = on_bottle(gas.scenario, bottle, overrides)
     supply = walk_of(walking).bottle
@@ -159,7 +159,7 @@ def endurance_of_walk_gas(
     strides = max(life.repeats, 1.0e-9)
     stride_time, mass = life.walked / strides, life.course.regulated / strides
     before = Kind("", "kg", "gas mass", ".3g").text(at_set_pressure.mass_per_stride)
-    origin = f"{at_set_pressure.origin} on the bottle, mean over its strides ({before} before, at the set pressure)"
+    origin = f"{at_set_pressure.origin} on the bottle, mean over its strides ({before} at constant set pressure)"
     demand = GasDemand(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
     usable = supply.mass - smallest_mass_when_warm(supply.bottle, demand)
     return Endurance(

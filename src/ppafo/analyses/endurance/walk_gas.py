@@ -141,7 +141,7 @@ def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
     if content is None:
         return None
     source, name = configuration.get("file"), str(configuration.get("name", "walk"))
-    with refused_as(DataError, f"{file}: its walk cannot be repeated", PpafoError):
+    with refused_as(DataError, f"{file}: the walk cannot be repeated", PpafoError):
         if not (isinstance(content, dict) and isinstance(overrides, list) and isinstance(source, str | None)):
             raise DataError("'configuration' has no [motion] of a walk")
         folder = Path() if source is None else Path(source).parent

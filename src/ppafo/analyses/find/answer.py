@@ -80,7 +80,7 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
         title=f"The {wanted} {path.path} such that {'the run ' if condition.text == FOLLOWS else ''}{condition.text}",
         said=(_verdict(outcome, kind), *remarks),
         parts=(
-            Section("Met in the range that was tried", columns),
+            Section("Where the condition is met", columns),
             Section("To use the value" if used else "", code=used),
             Section(
                 "Metric over the value",
@@ -139,7 +139,7 @@ def _verdict(outcome: FindResult, kind: Kind) -> str:
     lead = f"{path} = {kind.text(value)} is the {wanted} value that {meets}{follows}"
     there = f"{condition.metric} is {of_condition.text(float(tried['metric'][index]))} there"
     if neighbour is None:
-        return f"{lead}, and the end of the range: {there}; a wider range may have a {further} one"
+        return f"{lead}, at the end of the range: {there}; a wider range may have a {further} value"
     return f"{lead}: {there} (bracketed to {kind.change(abs(value - neighbour), '.1g')})"
 
 
@@ -151,7 +151,7 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
     met = np.count_nonzero(is_met)
     where = "everywhere" if is_met.all() else f"at {met} of them" if met else "nowhere"
     yield (
-        f"{evenly} values from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}, evenly, then "
+        f"{evenly} values from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}, evenly spaced, then "
         f"{tried.size - evenly} more in the bracket; the condition is met {where}"
     )
     if (changes := np.count_nonzero(np.diff(is_met))) > 1:
@@ -174,8 +174,8 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
         yield noise
     if unsettled := int(tried["unsettled"].sum()):
         yield (
-            f"in {unsettled} runs the loop still swings in the second half of the hold, and {condition.metric} is one "
-            "sample of that: in these runs the condition must also hold for the RMS error there"
+            f"in {unsettled} runs the loop still oscillates in the second half of the hold, so {condition.metric} "
+            "depends on the instant: these runs must also meet the condition with the RMS error of that half"
         )
     if oscillating := int(tried["oscillating"].sum()):
         yield f"in {oscillating} of {runs.count} runs the loop oscillates: they count as not met"
@@ -196,7 +196,7 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
     larger = np.where(judged > metrics, judged, np.nan)
     if np.isfinite(larger).any():
         crosses = {"linestyle": "", "marker": "x", "markersize": 4}
-        label = "RMS error in the second half of the hold, where it swings"
+        label = "RMS error in the second half of the hold, if oscillating"
         marks.append(Mark("line", values, larger, label=label, colour=GREY, style=crosses))
     if condition.text != FOLLOWS:
         marks.append(Mark("level", (), condition.limit, label="limit", colour=BLACK, style=dashes))

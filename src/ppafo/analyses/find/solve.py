@@ -66,13 +66,15 @@ def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
         tracked = (f"rms_{base.controlled}_error", "rms_error", "torque_error", "peak_torque")
         errors = [name for name in tracked if name in METRICS and not lacking(base, METRICS[name])]
         if base.controller.is_open_loop or not errors:
-            raise StudyError(f"{quoted}: scenario '{base.name}' has no reference to follow; give a limit of a metric")
+            raise StudyError(
+                f"{quoted}: scenario '{base.name}' has no reference; give a condition such as 'METRIC <= LIMIT'"
+            )
         return MetricLimit(errors[0], math.inf, True, FOLLOWS)
     parts = _CONDITION.fullmatch(text)
     if parts is None:
         raise StudyError(
-            f"{quoted} is not of the form METRIC <= LIMIT or METRIC >= LIMIT, for example 'final_error <= 0.3 N m', "
-            f"nor '{FOLLOWS}', for a run that follows its reference"
+            f"{quoted} must be METRIC <= LIMIT or METRIC >= LIMIT, for example 'final_error <= 0.3 N m', "
+            f"or '{FOLLOWS}' (the run follows its reference)"
         )
     metric, sign, limit = parts.groups()
     check_metrics([metric], base)

@@ -152,7 +152,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
                 continue
             ratio = value / entry.value
             if not 1.0 / _FAR_FROM_SET < ratio < _FAR_FROM_SET:
-                times = f"{ratio:.3g} times the value before, {entry.value:.4g} {unit}".rstrip()
+                times = f"{ratio:.3g} times the previous value, {entry.value:.4g} {unit}".rstrip()
                 remarks.append(f"remark: {estimate.path} is {times}: check the units of the recording")
         remarks += [f"remark: {remark}" for remark in result.remarks]
         rows = [estimate_row(estimate, before) for estimate in result.estimates]
@@ -163,11 +163,11 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     written, fitted = new_set.written, new_set.fitted
     # What holds for this model only is in the set as well, and is never counted with what is identified.
     # Other numbers may be identified too, such as the zero of a scale, for which a set has no place.
-    count = "no value of the set identified" if fitted else "none, since no value of a set was identified"
+    count = "no value of the set identified" if fitted else "not written, since no value was identified"
     if written:
         count = f"{count_of(len(written), 'value')} of the set identified: {', '.join(written)}"
     fitted_text = f"; for this model only: {', '.join(fitted)}" if fitted else ""
-    problem = (f"it makes no device yet: {new_set.problem}",) if new_set.problem else ()
+    problem = (f"the new set is not a complete device yet: {new_set.problem}",) if new_set.problem else ()
     return Finding(
         name="identify",
         kicker="Identification",

@@ -187,8 +187,8 @@ def _described_set(identification: Identification, problem: ProblemFile) -> Para
     changes = f" with {', '.join(problem.device.overrides)}" if problem.device.overrides else ""
     origins = (
         f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}', on the set '{old.name}'"
-        f"{changes} from {identification.kind} recordings: {', '.join(files)}; the fitted are true for this model "
-        f"only, the others from '{old.name}'."
+        f"{changes} from {identification.kind} recordings: {', '.join(files)}; 'fitted' values hold for this model "
+        f"only. All other values come from '{old.name}'."
     )
     if new.written or new.fitted:
         # Values reported of another device do not describe the measured one.

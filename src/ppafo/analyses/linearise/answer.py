@@ -125,13 +125,13 @@ _REAL = 1.0e-6
 _FREQUENCY = Kind("Frequency", "Hz")
 _DASHED = {"linestyle": "--"}
 _FREQUENCY_CAPTION = (
-    "Where there are margins, the open loop first, each margin from its dot to the dashed line. The torque for a small "
-    "sine of the command; dashed: with the dead time, the age of the measurements and half a sample period, which are "
-    "not in the model."
+    "Open loop, if it has margins: each margin extends from its dot to the dashed line. Torque for a small sinusoidal "
+    "command; dashed: with the dead time, the age of the measurements and half a sample period, which the model does "
+    "not include."
 )
 _STEPS_CAPTION = (
-    "Steps of the command from the steady state, on the runs and of the linear model, in which the difference grows "
-    "with the square of the amplitude."
+    "Steps of the command from the steady state, simulated and by the linear model; their difference grows with the "
+    "square of the amplitude."
 )
 
 
@@ -149,11 +149,11 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     )
     counts = (("state", model.states), ("input", model.inputs), ("output", model.outputs))
     size = ", ".join(count_of(len(signals), noun) for noun, signals in counts)
-    sentences = [f"the plant without controller and sensors: {size}; differences from the point, SI units"]
+    sentences = [f"plant without controller and sensors: {size}; deviations from the operating point in SI units"]
     if not model.is_steady:
         sentences.append(
-            "the point is no steady state: the model is of small differences from the run itself, and holds only as "
-            "long as the run stays near the point"
+            "the operating point is not a steady state: the model describes small deviations from the run and is valid "
+            "only while the run stays near this point"
         )
     delays = (
         ("dead time of the valve", model.delays.command),
@@ -166,8 +166,8 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     for edge in model.edges:
         side, other = ("above", "below") if edge.is_above else ("below", "above")
         remarks.append(
-            f"the plant has a kink at this point: the column of `{edge.name}` is valid {side} "
-            f"{_value_at_point(model, edge.name):.5g} only; its slope differs {other} it"
+            f"the plant is not differentiable at this point: the column of `{edge.name}` is valid only {side} "
+            f"{_value_at_point(model, edge.name):.5g}; the derivative {other} this value differs"
         )
     matrices = []
     for name, values, rows, columns in (
@@ -246,8 +246,10 @@ def _loop(model: LinearModel) -> Section:
     margins, controller = model.margins, model.scenario.controller
     if margins is None:
         is_pid = controller.kind in PID_LAWS
-        reason = "its command is clipped, or has no effect" if is_pid else f"controller '{controller.kind}' is no PID"
-        return Section(remarks=[f"no margins of the loop: {reason}"])
+        reason = (
+            "the command is clipped, or has no effect" if is_pid else f"controller '{controller.kind}' is not a PID"
+        )
+        return Section(remarks=[f"no stability margins: {reason}"])
     frequency, angle = Kind(quantity="frequency", form=".3g"), Kind(quantity="angle", form=".3g")
     gain = margins.gain_margin or 1.0
     values = (
@@ -257,7 +259,7 @@ def _loop(model: LinearModel) -> Section:
     )
     # A sampled loop is real at half the sample rate: its phase may meet -180 deg there alone.
     end = (1.0 - _REAL) * 0.5 / controller.period
-    only = ", half the sample rate: the phase reaches -180 deg there only"
+    only = ", half the sample rate: the phase reaches -180 deg only there"
     none = "none below half the sample rate"
     rows = [("closed loop", "stable" if margins.is_stable else "unstable")]
     rows += [

@@ -64,7 +64,7 @@ def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
     vane = motion[point.direction]
     if point.direction == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
-        vane = "against a stop" if is_at_stop else "sticks: friction holds it"
+        vane = "against a stop" if is_at_stop else "sticks by static friction"
     valve = "closed"
     if any(openings):
         chamber = 1 if openings.source_1 > 0.0 else 2
@@ -85,9 +85,7 @@ def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: flo
 
 
 EQUILIBRIUM = "equilibrium"
-DEAF = (
-    "a small change of the command has no effect on it (dead band, slew limit, saturation): the command's column is 0"
-)
+DEAF = "a small change of the command has no effect (dead band, slew limit, saturation): the column of the command is 0"
 
 
 def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
@@ -107,7 +105,7 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
         return model_at(scenario, run, equilibrium(scenario))
     if isinstance(at, Real):
         return model_at(scenario, run, point_at(scenario, float(at)))
-    problem = f"{scenario.name}: {argument_text('at', str(at))} is neither a time nor '{EQUILIBRIUM}'"
+    problem = f"{scenario.name}: {argument_text('at', str(at))} must be a time, for example '1 s', or '{EQUILIBRIUM}'"
     with refused_as(ScenarioError, problem, UnitError):
         time = parse_quantity(str(at), "s")
     return model_at(scenario, run, point_at(scenario, time))

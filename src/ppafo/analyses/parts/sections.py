@@ -45,9 +45,7 @@ def parts_to_check(doubtful: Iterable[tuple[Part, str]], used: Iterable[Part]) -
         value = f"{figure.value:g} {figure.unit}".rstrip()
         reasons.append(f"{part.name}: {words} {value} is {figure.origin}: {figure.note or figure.source}")
     rows = facts((name, ", ".join(figures)) for name, figures in figures_by_part.items())
-    meaning = (
-        "quoted from a document that was not itself consulted, or assumed; 'ppafo sets parts PART' gives the reasons"
-    )
+    meaning = "quoted from a secondary source, or assumed; 'ppafo sets parts PART' gives the reasons"
     return [
         *sections,
         finding.Section("Check before buying", rows, [meaning]),

@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 _HEAD = ("claim", "paper", "ours", "verdict")
-_PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
+_PAPER = "'ppafo reproduce' without --study writes the page of these claims, with sources, figures and assumptions."
 _STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
 _DETAILS_HEAD = ("claim", "statement and source", "agrees", "rests on", "note")
 _RULE = (
-    "'Ours' is computed anew whenever this is run. "
+    "'Ours' is recomputed by every run of the command. "
     + " ".join(f"{VERDICTS[verdict].capitalize()}: {meaning}." for verdict, meaning in MEANINGS.items())
     + " Nothing here was measured."
 )
@@ -109,7 +109,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     sentences, missed, rows = [NOTHING_CONFIRMED], reproduction.missed, reproduction.readings_of_u
     if reproduction.overrides:
         words = f"not the paper's device: values changed with {override_text(reproduction.overrides)}"
-        sentences.append(f"{words}; the verdicts compare it with the paper all the same")
+        sentences.append(f"{words}; the verdicts still compare this device with the paper")
     # On the page a claim has its window in its note; at the command line only what misses it is said.
     remarks = [
         f"missed: {claim.id} is outside {claim.window[0]:g} to {claim.window[1]:g} {claim.unit}"
@@ -121,7 +121,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         remarks=("", count_sentence([claim.verdict for claim in reproduction.claims]), *remarks),
         left=len(_HEAD),
     )
-    head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")
+    head = ("U is", "RMS error less by", "CO2 less by", f"error at {WITHIN_REACH:g} N m less by")
     of_u = [Section(columns=columns_of(head, reading_rows(rows)), remarks=("", *result_on_u(rows)))] if rows else []
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
     return Finding(

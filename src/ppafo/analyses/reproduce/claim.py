@@ -15,8 +15,8 @@ VERDICTS: dict[Verdict, str] = {verdict: verdict.replace("_", " ") for verdict i
 MEANINGS: dict[Verdict, str] = {
     "consistent": "the reported numbers agree with each other",
     "inconsistent_as_reported": "the reported numbers do not agree with each other",
-    "met_by_fitted_settings": "simulated with settings that were chosen for it, which is no evidence for them",
-    "plausible": "simulated with assumed settings that were not chosen for it",
+    "met_by_fitted_settings": "simulated with settings chosen to meet this claim, which does not confirm them",
+    "plausible": "simulated with assumed settings that were not chosen to meet this claim",
     "undetermined": "depends on settings that are not reported",
     "not_testable": "needs a measurement that is not published",
 }

@@ -191,14 +191,14 @@ def torque_task_figure(
     # Room to the right of the longer bar for the amounts.
     ends = {"xlim": (0.0, 1.8 * most), "yticks": (1.0, 0.0), "yticklabels": [name for _, _, name in runs]}
     then = methodcaller("set", **ends)
-    panels.append(Panel(_GAS, Kind(), at_end, "Where that gas is at the end", then=then, tall=0.75))
+    panels.append(Panel(_GAS, Kind(), at_end, "Location of this gas at the end", then=then, tall=0.75))
     return draw_panels(panels, 1, (6.3, 1.0), kind=solenoid.kind)
 
 
 def _torque_marks(recording: Recording, style: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:
     """Return marks of reference, torque and largest torque, over the broad line of a synthetic experiment."""
     time, dashed = recording.time, {"linestyle": REFERENCE.line, "linewidth": 1.3}
-    ceiling_label = f"largest for the supply: {ceiling:.1f} N m"
+    ceiling_label = f"largest torque at this supply pressure: {ceiling:.1f} N m"
     marks = [
         Mark("line", time, recording["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
         Mark("level", y=ceiling, label=ceiling_label, colour=GREY, style=_LEVEL),

@@ -30,8 +30,8 @@ IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
 NOT_READ = (
-    "Not read, and likely to settle what is open: the dissertations of K. A. Shorter (2011) and Y. Li (2013), the "
-    "journal article of 2012 in Mechatronics, the volume table of the maker of the vane."
+    "Sources not consulted that are likely to settle the open points: the dissertations of K. A. Shorter (2011) and "
+    "Y. Li (2013), the journal article of 2012 in Mechatronics, the volume table of the vane's manufacturer."
 )
 _EXPERIMENTS = {STEP: "step response", SOLENOID: "torque task, solenoid", PROPORTIONAL: "torque task, proportional"}
 _SYMBOLS: dict[Verdict, str] = {

@@ -223,8 +223,8 @@ def _swept_volume(reported: ReportedSet) -> Claim:
         unit=reported.entry(path).unit,
         verdict=_verdict(reported.range(constant).meets(reported.range(path))),
         source=reported.entry(path).source,
-        note=f"Virtual work with the reported torque constant, which is free of friction: it is the line half-way "
-        f"between rising and falling readings. {reported.quotation(path)} would give the shaft {share:.0f} % of the "
+        note=f"Virtual work with the reported torque constant, which is free of friction as the mean of rising and "
+        f"falling readings. {reported.quotation(path)} would give the shaft {share:.0f} % of the "
         "work of the gas. Equation (5) is negative beyond 90 deg; figure 7 goes to 130.",
         found=reported.text(path, reported.in_reported_unit(path, needed), 3),
     )
@@ -236,8 +236,8 @@ NOT_PUBLISHED_CLAIM = Claim(
     "them (dynamics beyond the model, temperature), and size and weight of the proportional valve.",
     verdict="not_testable",
     source="sections 'Identification', 'PPAFO Model Validation' and 'Discussion'",
-    note="The recordings are not published, nor masses or sizes. That the procedures return known values is tested "
-    "in tests/, on synthetic recordings; it says nothing about the paper's device.",
+    note="The recordings, masses and sizes are not published. Tests show that the procedures recover known values from "
+    "synthetic recordings, which says nothing about the paper's device.",
     words=f"{len(NOT_PUBLISHED)} statements",
 )
 """Claim that summarises all statements that no published data can test."""

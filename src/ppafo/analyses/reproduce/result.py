@@ -108,4 +108,4 @@ def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
     is_beyond_reach = not any(low <= row.error_within_reach <= high for row in rows)
     if not (is_opening_alone and is_beyond_reach and all(row.gas >= least for row in rows)):
         return ()
-    return ("15 % needs 'U is the opening' and a level beyond the supply's reach; the saving needs neither.",)
+    return ("15 % less error needs U as the opening and a reference above the torque ceiling; less gas needs neither.",)

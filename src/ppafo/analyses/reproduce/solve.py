@@ -54,8 +54,13 @@ def torque_task_claims(
     return [
         claim("torque_rms_improvement", better, 0, over),
         claim("co2_solenoid", pair_gas, 1, over),
-        claim("co2_proportional", np.array([gas]), 2, "Decided every millisecond, so that no phase matters."),
-        claim("co2_saving", saved, 0, f"{over} It follows from the two amounts: no evidence of its own."),
+        claim(
+            "co2_proportional",
+            np.array([gas]),
+            2,
+            "The controller decides every millisecond, so the phase does not matter.",
+        ),
+        claim("co2_saving", saved, 0, f"{over} Follows from the two amounts of gas and is not independent evidence."),
     ]
 
 

@@ -135,8 +135,8 @@ def _rises(step: _Step) -> tuple[bool, str, str]:
     full = int(np.argmax(is_full))
     waits = step.recording.time[breakaway] - step.recording.time[full]
     difference = (
-        f"it reaches the supply pressure after {step.milliseconds(full)} already, so small is the volume at the stop, "
-        "and what starts the vane is the falling pressure in chamber 2"
+        f"it reaches the supply pressure already after {step.milliseconds(full)} because the volume at the stop is "
+        "small, so the falling pressure in chamber 2 starts the vane"
     )
     return bool(holds), evidence, difference if is_full[full] and waits >= _NOTABLE_TIME else ""
 
@@ -160,7 +160,7 @@ def _falls_in_motion(step: _Step) -> tuple[bool, str, str]:
     if rise_after_breakaway >= _SAME * step.levels.range:
         longer = 1e3 * (step.recording.time[peak] - step.events.breakaway_time)
         differences.append(
-            f"from breakaway it goes on rising for {longer:.0f} ms, by {rise_after_breakaway / PASCALS_PER_PSI:.1f} psi"
+            f"after breakaway it still rises for {longer:.0f} ms, by {rise_after_breakaway / PASCALS_PER_PSI:.1f} psi"
         )
     if rise_before_stop >= _SAME * step.levels.range:
         differences.append(f"it rises again by {rise_before_stop / PASCALS_PER_PSI:.1f} psi before the stop")
@@ -197,7 +197,7 @@ def _slows(step: _Step) -> tuple[bool, str, str]:
     holds = rate[slowest] <= _SLOWED * min(before, after) and rise <= _LARGEST_RISE
     first, least, last = (value / (1e3 * PASCALS_PER_PSI) for value in (before, rate[slowest], after))
     slowed = f"rises by {-least:.2f} psi/ms" if least < 0.0 else f"falls by {least:.2f} psi/ms"
-    difference = f"it does more than slow: it rises by {rise / PASCALS_PER_PSI:.1f} psi"
+    difference = f"instead of only falling more slowly it rises by {rise / PASCALS_PER_PSI:.1f} psi"
     evidence = (
         f"falls by {first:.2f} psi/ms at first, {slowed} at {step.milliseconds(slowest)}, falls by up to "
         f"{last:.1f} psi/ms later"

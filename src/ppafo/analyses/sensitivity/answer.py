@@ -26,8 +26,8 @@ _MAXIMUM_LINES = 5
 """Number of varied values whose indices are plotted over the sample size."""
 _TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
 _CAPTION = (
-    "Left: the indices with their bands, {filled} filled{open}. Right: the largest of them, in the colours and markers "
-    "of their rows, from growing parts of the sample: whether they have converged."
+    "Left: indices with confidence bands, {filled} filled{open}. Right: convergence of the largest indices with the "
+    "sample size, in the colours and markers of the left panel."
 )
 
 
@@ -42,7 +42,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
     ]
     if influences.not_following:
         sentences.append(
-            f"in {influences.not_following:,} runs the reference is not followed: the indices are of these too"
+            f"in {influences.not_following:,} runs the reference is not followed; the indices include these runs"
         )
     if influences.gains:
         sentences.append(influences.gains)
@@ -60,7 +60,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
     return Finding(
         name="sensitivity",
         kicker="Sensitivity",
-        title=f"What matters in {influences.study}",
+        title=f"Sensitivity of {influences.study}",
         said=tuple(sentences),
         parts=(*(_part(influences, metric) for metric in influences.metrics), figure),
         found=influences,
@@ -113,7 +113,7 @@ def remarks(influences: Influences, metric: MetricSensitivity) -> list[str]:
     unsettled = overlapping_pairs(influences, metric)
     if unsettled:
         pairs = ", ".join(f"{first} and {second}" for first, second in unsettled)
-        sentences.append(f"not converged at this size, their bands overlap: {pairs}")
+        sentences.append(f"not converged at this sample size, confidence bands overlap: {pairs}")
     indices = metric.indices
     if "first" in indices.values:
         alone, error = float(np.sum(indices.values["first"])), float(np.linalg.norm(indices.bands["first"]))

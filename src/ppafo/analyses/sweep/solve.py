@@ -197,7 +197,7 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
 LOG = "log.jsonl"
 """Name of the log file, the only file with date, machine and speed; all other files are equal on any machine."""
 INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
-INTERRUPTED_AT_ONCE = "interrupted; nothing was kept yet, and the same command begins anew"
+INTERRUPTED_AT_ONCE = "interrupted before the first chunk was finished; the same command starts the study again"
 
 
 @checked

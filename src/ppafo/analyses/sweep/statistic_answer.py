@@ -20,7 +20,7 @@ _ENDS = ("estimate", "low", "high")
 """Column heads of an estimate and the ends of its interval."""
 _MAXIMUM_BINS = 80
 """Largest number of bins of the histogram."""
-_CAPTION = "Left: estimate and interval at each look; grey: the target width. Right: the values of all draws."
+_CAPTION = "Left: estimate and interval at each interim look; grey: target width. Right: values of all draws."
 
 
 def kind_of(metric: str, statistic: Statistic) -> Kind:
@@ -37,26 +37,26 @@ def remarks_on(
     known = last.draws - last.missing
     if not last.is_carried and are_equal:
         sentences.append(
-            f"do not trust this interval: all {known:,} values are equal, so the distance of a rare one is unknown; "
-            f"draw at least {FEWEST_SEEN:,}"
+            f"do not trust this interval: all {known:,} values are equal, so the size of a rare deviation is unknown; "
+            f"use at least {FEWEST_SEEN:,} draws"
         )
     elif not last.is_carried:
         sentences.append(
             f"do not trust this interval: the mean has an effective sample size of {last.effective_size:.3g} of "
-            f"{known:,} draws, so that the true value lies outside more often than stated; request a quantile or a "
+            f"{known:,} draws, so the true value lies outside more often than stated; request a quantile or a "
             "probability"
         )
     if statistic.is_of_replicates and known:
         share, furthest = _RULE_OF_THREE / known, FURTHEST_UNSEEN * float(np.std(values))
         moved = (
-            f"up to {FURTHEST_UNSEEN:g} standard deviations, {kind.change(furthest)}, from the mean it would shift "
-            f"it by up to {kind.change(last.unseen)}, which the target width allows for; farther off by more"
+            f"an outcome up to {FURTHEST_UNSEEN:g} standard deviations, {kind.change(furthest)}, from the mean would "
+            f"shift the mean by up to {kind.change(last.unseen)}, which the target width includes"
         )
         if are_equal:
-            moved = f"it would shift the mean by up to {share:.2g} times its distance from it"
+            moved = f"an outcome at a distance d from the mean would shift the mean by up to {share:.2g} d"
         sentences.append(
-            f"an outcome of fewer than {100.0 * share:.2g} % of the runs may be missing from these draws (95 %): "
-            f"{moved}"
+            f"outcomes with a probability below {100.0 * share:.2g} % may be missing from these draws (95 % "
+            f"confidence): {moved}"
         )
     if noise is not None:
         sentences.append(f"sensor noise causes {fraction_text(noise)} of the variance over the draws")
@@ -79,7 +79,7 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
     width = f"{100.0 * rule.width:g} % of the value" if rule.is_relative else kind.change(rule.width)
     policy = (
         f"target width: {width}; at most {len(rule.sizes)} looks at doubling numbers of draws, each with "
-        f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all of them hold simultaneously; "
+        f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all intervals hold simultaneously; "
         f"{looks[-1].missing:,} draws have no value and are left out"
     )
     rows = []

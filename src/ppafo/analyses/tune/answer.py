@@ -180,21 +180,19 @@ def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
     name = problem.name
     if after.share_without_value:
         failing = percentage(after.share_without_value, 3)
-        return (
-            f"{name}: with the best gains found, {failing} of the runs fail, oscillate, or lack a goal or a constraint"
-        )
+        return f"{name}: with the best gains found, {failing} of the runs fail, oscillate, or lack a required metric"
     if after.off:
         where = _in_draws(problem, after.share_off)
-        beyond = f"the limits of tracking are exceeded by {percentage(after.off, 3)}{where}"
+        beyond = f"the tracking limits are exceeded by {percentage(after.off, 3)}{where}"
         why = f"{after.useless or beyond}{_by_ceiling(problem, after)}"
-        return f"{name}: no gains within the bounds let the loop follow its reference; with the best found, {why}"
+        return f"{name}: no gains within the bounds let the loop follow its reference; with the best gains found, {why}"
     if not after.is_feasible_in_search:
-        broken = f"the best found exceed the limits by {percentage(after.violation, 3)}"
+        broken = f"the best gains found exceed the limits by {percentage(after.violation, 3)}"
         return f"{name}: no gains within the bounds satisfy all constraints; {broken}{_by_ceiling(problem, after)}"
     if not after.is_feasible:
         return (
             f"{name}: the gains found satisfy all constraints over the draws of the search, but not over "
-            f"{FRESH_DRAWS:,} fresh ones{_by_ceiling(problem, after)}"
+            f"{FRESH_DRAWS:,} fresh draws{_by_ceiling(problem, after)}"
         )
     if after.useless:
         return f"{name}: with the best gains found, {after.useless}"
@@ -232,8 +230,8 @@ def _by_ceiling(problem: Problem, after: GainResult) -> str:
     if not ceiling.explains:
         return ""
     return (
-        "; the torque ceiling is the cause: the reference requires more than the actuator gives at the pressure of the "
-        f"supply{_in_draws(problem, ceiling.fraction)}, which no gains can change"
+        "; the torque ceiling is the cause: the reference requires more torque than the actuator gives at the supply "
+        f"pressure{_in_draws(problem, ceiling.fraction)}, which no gains can change"
     )
 
 
@@ -298,14 +296,14 @@ def remarks_of(
     if fractions:
         remarks.append(f"fraction of the variance over the fresh draws that is due to sensor noise: {fractions}")
     broken = [
-        f"{constraint.metric} {constraint.words}, it is {_number(constraint.metric, after.judged[constraint.metric])}"
+        f"{constraint.metric} is {_number(constraint.metric, after.judged[constraint.metric])}, not {constraint.words}"
         for constraint in problem.constraints
         if after.fresh and not constraint.is_kept(after.judged[constraint.metric])
     ]
     printed = after.fresh or after.values
     remarks += [
-        f"the loop still swings in the second half of the hold, and {name} is one instant of that: what counts is "
-        f"{_number(name, judged)}, its RMS error there"
+        f"the loop still oscillates in the second half of the hold, so {name} depends on the instant: the RMS error of "
+        f"that half, {_number(name, judged)}, counts instead"
         for name, judged in after.judged.items()
         if judged > printed[name]
     ]

@@ -327,7 +327,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         goals, limits = [], []
         for goal in parsed.objective:
             if goal.weight == 0.0:
-                raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit it")
+                raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit this objective")
             scale, where = None, f"objective '{goal.metric}': scale = '{goal.scale}'"
             if goal.scale is not None:
                 scale = difference_of(goal.scale, goal.metric, where)
@@ -337,8 +337,10 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         for constraint in parsed.constraints:
             bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
             if len(bounds) != 1:
-                has = "both" if bounds else "none"
-                raise StudyError(f"constraint '{constraint.metric}': give at_most or at_least, it has {has}")
+                has = "both" if bounds else "neither"
+                raise StudyError(
+                    f"constraint '{constraint.metric}': has {has} of at_most and at_least; give one of them"
+                )
             where = f"constraint '{constraint.metric}' = '{bounds[0]}'"
             limit = level_of(bounds[0], constraint.metric, where, atmosphere)
             limits.append(MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0]))
@@ -364,10 +366,10 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
         minimum, maximum = varied.level(gain.minimum), varied.level(gain.maximum)
         before = value_at(gain.path, scenario)
         if before is None:
-            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{gain.path}'; set it with an override")
+            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{gain.path}'; give an override")
     if gain.path == NOISE:
         raise StudyError(
-            f"search '{gain.path}': cannot be searched, because all candidates use the same noise; omit it"
+            f"search '{gain.path}': cannot be searched, because all candidates use the same noise; omit this search"
         )
     if minimum >= maximum:
         raise StudyError(
@@ -398,7 +400,7 @@ def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario:
     both = next((path for path in uncertainty.paths if path in searched), None)
     if both is not None:
         raise StudyError(
-            f"robust: study '{study.name}' draws '{both}', which is also searched; omit it from one of them"
+            f"robust: study '{study.name}' draws '{both}', which is also searched; omit its [[vary]] or [[search]]"
         )
     share = robust.share if robust.measure == "quantile" else None
     return Spread(uncertainty, study.name, robust.draws, study.sample.seed, robust.deviations, share)

@@ -59,7 +59,7 @@ def tune(
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 
     if isinstance(tuning, Problem) and overrides:
-        raise StudyError("overrides: a loaded Problem accepts none; give them to load_tuning")
+        raise StudyError("overrides: not allowed with a loaded Problem; give them to load_tuning")
     problem = tuning if isinstance(tuning, Problem) else load_tuning(tuning, overrides)
     if seed is not None:
         problem = problem.with_seed(seed)

@@ -66,7 +66,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) ->
     """Return two panels of a channel over time: samples with model, and below the residual."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
     measurement = measured_values(measured, name)
-    assert measurement is not None, "a channel that is compared was measured"
+    assert measurement is not None, "a compared channel was measured"
     is_short, is_chamber = measured.duration < _SHORT, name in (PRESSURE_1, PRESSURE_2)
     time, scale = (Kind("Time", "ms"), MILLISECONDS) if is_short else (TIME, 1.0)
     quantity, limit = COMPARED[name], channel.limit * channel.full_range

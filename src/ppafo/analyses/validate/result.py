@@ -84,7 +84,7 @@ def verdict(validation: Validation) -> str:
         is_found = validation.causes.found is not None
         is_free = not is_found and any(agreement.motion == "free" for agreement in validation.recordings)
         motion = argument_text("motion", "leg")
-        moved = f"; of a device on a leg, fixed or driven give {motion}, locked or measured" if is_free else ""
+        moved = f"; if the device was on a leg, locked or driven, give {motion}, locked or measured" if is_free else ""
         return f"{name} does not agree: {failed}; {explanation}{moved}"
     return (
         f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {explanation}"
@@ -102,15 +102,15 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
         # What is beyond a limit is more than usual, of whatever kind it is.
         verdict += ", as on any bench" if causes.found.is_usual and passes else ""
         same = ", ".join(cause.name for cause in causes.found.same)
-        return f"{verdict} (or, the same for these recordings: {same})" if same else verdict
+        return f"{verdict} (indistinguishable with these recordings: {same})" if same else verdict
     if not causes.tried:
         return ""
     nearest = causes.nearest
     explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
     if nearest is None or not explains:
-        return "no single change explains it"
-    residual = _times(nearest.left)
-    return f"no single change explains it; nearest: {in_words(nearest)}, which leaves {residual} times the noise"
+        return "no single change explains the residual"
+    left = _times(nearest.left)
+    return f"no single change explains the residual; nearest: {in_words(nearest)}, which leaves {left} times the noise"
 
 
 def _times(size: float) -> str:

@@ -49,8 +49,8 @@ from ppafo.walking.walk import WalkComparison
 from ppafo.wording import argument_text
 
 _OVER_TIME = (
-    "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "
-    "the foot, pauses or has stopped. A solid line is where there is less help, a dashed one where something fails."
+    "Gas, toe height and gait phase over the whole walk. The strip at the bottom shows when the controller helps, only "
+    "lifts the foot, pauses or has stopped. A solid line marks less help, a dashed line a fault."
 )
 _TORQUE = Kind("", "N m", "torque", ".3g")
 _FAR_ABOVE = 2.0
@@ -76,7 +76,7 @@ def safety_remarks(worn: WalkResult) -> list[str]:
         limit_text = _TORQUE.text(limit)
         # The default limit is the largest torque of the device.
         is_given = "controller.largest_torque" not in scenario.links
-        advice = "raise that too" if is_given else "the actuator gives no more at this supply"
+        advice = "raise this limit too" if is_given else "the actuator cannot give more at this supply pressure"
         remarks.append(
             f"{', '.join(cut)}: the request is limited by controller.largest_torque = {limit_text}; {advice}"
         )
@@ -89,8 +89,8 @@ def safety_remarks(worn: WalkResult) -> list[str]:
         if largest > _FAR_ABOVE * set_pressure:
             reached, supply_text = (quantity_text(value, "pressure") for value in (largest, set_pressure))
             remarks.append(
-                f"the pressure in {words} reaches {reached}, and its supply is set to {supply_text}: "
-                "actuator, valves and tubing must withstand that"
+                f"the pressure in {words} reaches {reached}, at a supply pressure of {supply_text}: "
+                f"actuator, valves and tubing must withstand {reached}"
             )
     if not worn.events:
         return remarks
@@ -152,29 +152,28 @@ _NUMBERS = (
     ),
     ShownNumber(name="push_off_share", title="... of the healthy ankle's positive work", quantity="fraction", digits=1),
     ShownNumber(name="net_push_off_work", title="Net work on the wearer in push-off", quantity="energy", digits=2),
-    ShownNumber(name="torque_error", title="Torque error where one is requested, RMS", quantity="torque", digits=2),
-    ShownNumber(name="requested_torque", title="... requested torque, RMS", quantity="torque", digits=2),
+    ShownNumber(name="torque_error", title="RMS torque error while torque is requested", quantity="torque", digits=2),
+    ShownNumber(name="requested_torque", title="... RMS of the requested torque", quantity="torque", digits=2),
     ShownNumber(name="peak_torque", title="Peak torque", quantity="torque", digits=1),
     ShownNumber(name=LARGEST_TORQUE, title="... limit of the controller", quantity="torque", digits=1),
     ShownNumber(name=REVERSALS_PER_STRIDE, title="Command reversals per stride", quantity="", digits=1),
-    ShownNumber(name="lowest_toes", title="Lowest toes over the ground in mid-swing", quantity="body length", digits=1),
+    ShownNumber(
+        name="lowest_toes", title="Lowest toe height above ground in mid-swing", quantity="body length", digits=1
+    ),
     ShownNumber(name="toe_landing", title="Strides that begin on the toes", quantity="fraction", digits=0),
     ShownNumber(
         name="dorsiflexor_moment", title="Moment of the wearer's dorsiflexors, mean", quantity="torque", digits=2
     ),
-    ShownNumber(
-        name="angle_difference", title="Ankle against healthy, RMS over the stride", quantity="angle", digits=1
-    ),
-    ShownNumber(name="counted_strides", title="Strides with these means", quantity="", digits=0),
+    ShownNumber(name="angle_difference", title="RMS difference to the healthy ankle angle", quantity="angle", digits=1),
+    ShownNumber(name="counted_strides", title="Strides in these means", quantity="", digits=0),
 )
 """Rows of the table of metrics of a walk."""
 _EXPLAINED = (
     "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
-    "'Healthy' is the gait itself. The swing has no ground: of toes that reach it only that they would drag is known. "
-    "The first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "
-    "when the walk ends. The device is on one leg, so a "
-    "stride is one step of that leg. A stride with less help (lifted only, paused or stopped) is not in 'with' but in "
-    "'less help', where there is one."
+    "'Healthy' is the gait itself. Ground contact in the swing is not simulated: toes below the ground would drag. "
+    "The first two strides, in which the controller learns the stride time, and an unfinished last stride are left "
+    "out. The device is on one leg, so a stride is one step of that leg. Strides with less help (lifted only, paused "
+    "or stopped) are not counted under 'with' but under 'less help', if there are any."
 )
 _LEGS = (
     "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground in mid-swing: they "
@@ -268,8 +267,8 @@ def _remarks(comparison: WalkComparison) -> list[str]:
         ended = "" if time is None else f"lasts {duration_text(time)}: "
         bottle = f"bottle {supply.supply.bottle.label}: {ended}{supply.ending.message}"
     elif "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
-        walk_on_it = f"walk on it, {argument_text('bottle', PAPER_BOTTLE)}"
-        bottle = f"how long a bottle lasts: {walk_on_it}; here its supply pressure stays as it is set"
+        with_bottle = argument_text("bottle", PAPER_BOTTLE)
+        bottle = f"the supply pressure is constant here; give {with_bottle} to see how long a bottle lasts"
     remarks = (
         *person_remarks(worn.scenario),
         bottle,

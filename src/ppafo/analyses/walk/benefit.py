@@ -81,7 +81,7 @@ def _remedied(worn: WalkResult, drags: bool) -> str:
     asked, given = _lifting_torques(worn) if drags else (0.0, 0.0)
     if scenario.controller.kind == "off":
         cause, candidates = "its controller is off", list(_LAWS)
-        advice = "another controller alone does not mend it"
+        advice = "another controller alone does not help"
     elif asked < _NEARLY * given and "hold_stiffness" in scenario.controller.settings:
         cause = (
             f"the ankle is not lifted enough, as the controller requests {_TORQUE.text(asked)} at the lowest toes, "
@@ -93,12 +93,12 @@ def _remedied(worn: WalkResult, drags: bool) -> str:
         candidates = [remedy(scenario, each).overrides for each in numbers]
         largest = remedy(scenario, stiffer[-1]).overrides[-1].replace("=", " = ", 1)
         advice = (
-            f"larger settings up to `{largest}`, alone and with more supply pressure, do not mend it in further walks"
+            f"larger settings up to `{largest}`, alone and with more supply pressure, were simulated and do not suffice"
         )
     else:
-        cause = "the ankle is not lifted enough" if drags else "the torque comes against the motion"
+        cause = "the ankle is not lifted enough" if drags else "the torque opposes the motion"
         other = "an actuator with more torque" if drags else "another timing of push-off"
-        advice = f"more supply pressure alone does not mend it; {other} may, which was not tried"
+        advice = f"more supply pressure alone does not suffice; {other} was not tried"
         candidates = [remedy(scenario, levels).overrides for levels in raised]
     for overrides in candidates:
         with contextlib.suppress(PpafoError):
@@ -108,7 +108,7 @@ def _remedied(worn: WalkResult, drags: bool) -> str:
                 changed = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
                 return (
                     f"; {cause}: with {changed}, toes {_HEIGHT.text(lowest)} over the ground and {_WORK.text(work)}, "
-                    "as a further walk shows"
+                    "simulated in another walk"
                 )
     return f"; {cause}, and {advice}"
 

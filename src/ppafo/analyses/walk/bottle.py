@@ -13,16 +13,16 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 
 _CAPTION = (
-    "The supply over the walk. A regulator holds at most its set pressure, and less once the bottle has too little. "
-    "Gas at the device is what comes out of the hose."
+    "Gas supply over the walk. A regulator delivers its set pressure at most, and less as the bottle empties. "
+    "Gas at the device leaves the hose."
 )
 _EXPLAINED = (
     "The vapour of liquid CO2 at 20 degC needs 95 kJ/kg to become gas of 25 degC behind the regulator. It draws "
     "this heat from the regulator's body and the hose, and these from the room. Below the triple point dry ice "
     "stays in the seat and narrows it. The gas in lines and chambers keeps the temperature with which it leaves the "
     "hose; in reality their walls warm it, so its effect is overestimated here.",
-    "A walk ends where the line behind the regulator no longer comes within the given share of the set pressure in two "
-    "strides, or where the fluid in the bottle freezes.",
+    "A walk ends when the line behind the regulator does not reach the given fraction of the set pressure within two "
+    "strides, or when the fluid in the bottle freezes.",
 )
 _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("torque", "gas mass"))
 _SHARE, _WARMTH, _PRESSURE = (Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure"))

@@ -33,21 +33,20 @@ _CAPTION = (
     "The task sequence over time. Grey: every other segment. 'Without' is the same task sequence without a device."
 )
 _EXPLAINED = (
-    "A stride counts for the segment in which its foot strikes; it is helped where the controller neither lifts only "
-    "nor pauses nor has stopped before the next strike. Work is net work on the wearer while the foot rolls over the "
-    "toes. Lowest toes are over the ground, in the middle part of a swing. A push with the heel loaded is torque in "
+    "A stride belongs to the segment of its heel strike; it is helped if the controller does not pause, stop or only "
+    "lift the foot before the next strike. Work is net work on the wearer while the foot rolls over the "
+    "toes. Lowest toes are heights above ground in mid-swing. A push with the heel loaded is torque in "
     "plantarflexion while the heel carries more than a tenth of the body weight.",
-    "Angles go with the length of the stride, which goes with the square root of the speed, as the strides per second "
-    "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
-    "of the stance stay the same at every speed.",
+    "Angles are scaled with the stride length, which grows with the square root of the speed like the strides per "
+    "second (constant walk ratio). Standing is a vertical shank over a flat foot. Ground forces and stance fraction "
+    "are the same at every speed.",
 )
 _SAME_TIME = 0.05
 """Time [s] by which a recording may end before its task sequence, because of its sampling."""
 _SAME_SPEED = 1.0e-9
 """Difference of speeds [m/s] that is due to rounding in unit conversion."""
 _MEAN_CAPTION = (
-    "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "
-    "band."
+    "Mean over all strides at constant speed on level ground, all speeds pooled, with the standard deviation as a band."
 )
 
 
@@ -127,7 +126,7 @@ def trust_remark(configuration: Scenario) -> str:
     try:
         low, high = speed_range(gait)
     except DataError:
-        return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
+        return f"gait '{gait.name}' has no walking speed: the range over which its strides can be scaled is unknown"
     speeds = [segment.values["speed"] for segment in sequence.segments if "speed" in segment.values]
     for segment in sequence.segments:
         if "cadence" in segment.values:
@@ -140,6 +139,6 @@ def trust_remark(configuration: Scenario) -> str:
         return ""
     listed = ", ".join(sorted({f"{speed:.2g}" for speed in outside}))
     return (
-        f"gait '{gait.name}' is scaled to {listed} m/s: beyond {low:.3g} to {high:.3g} m/s, where its angles "
-        "and forces are assumed and not measured"
+        f"gait '{gait.name}' is scaled to {listed} m/s, outside {low:.3g} to {high:.3g} m/s: its angles "
+        "and forces there are assumed, not measured"
     )

@@ -29,8 +29,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 WEARERS_FORMAT = "ppafo wearers"
 WEARERS_SCHEMA_VERSION = 1
 _WEARERS_CAPTION = (
-    "What the wearers get, with quantiles, and how it depends on their properties. Dot: the wearer of the "
-    "configuration."
+    "Metrics of the wearers, with quantiles, over the properties of the wearers. Dot: the wearer of the configuration."
 )
 
 
@@ -48,7 +47,7 @@ def wearers_finding(population: Population) -> Finding[dict[str, Any]]:
         remarks.append(f"safe state: the controllers of {population.vented} wearers vented both chambers permanently")
     if population.paused:
         remarks.append(
-            f"less help: the controllers of {population.paused} wearers lifted the foot only, or paused, for some "
+            f"less help: the controllers of {population.paused} wearers only lifted the foot, or paused, for some "
             "strides"
         )
     if population.diverged:

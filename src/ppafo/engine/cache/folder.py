@@ -50,7 +50,7 @@ def refusal(folder: Path | None) -> str:
         # Whoever can write in any folder above can rename this one and put his own in its place.
         above = [parent.stat() for parent in Path(os.path.realpath(folder)).parents]
     except (OSError, ValueError) as error:
-        return f"{folder} cannot be made: {reason(error)}"
+        return f"{folder} cannot be created: {reason(error)}"
     has_users = hasattr(os, "geteuid")
     if not stat.S_ISDIR(status.st_mode):
         why_not = f"{folder} is {'a link' if stat.S_ISLNK(status.st_mode) else 'not a folder'}"

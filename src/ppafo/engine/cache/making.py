@@ -112,7 +112,7 @@ def make(program: RequestedProgram, folder: Path | None) -> ModuleType:
                 # Another process may have compiled it while this one waited for the lock.
                 return load_kept_module(folder, program) or _compile_and_keep(folder, program)
         except OSError as error:
-            logger.warning("ppafo: the compiled model is not kept in %s: %s", folder.parent, reason(error))
+            logger.warning("ppafo: the compiled model cannot be cached in %s: %s", folder.parent, reason(error))
     with announce("not kept"):
         return program.compile(Path(f"<{program.name}>"))
 

@@ -30,7 +30,7 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
         why_not = refusal(cache)
         folder = None if cache is None or why_not else program.folder_in(cache)
         if folder is None:
-            logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
+            logger.warning("ppafo: compiled models are not cached: %s; change %s", why_not, CACHE_VARIABLE)
         module = None if folder is None else load_kept_module(folder, program)
         if module is not None:
             return module

@@ -16,7 +16,7 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trappi
 """Compiler flags for results bit-identical to the package."""
 HIDDEN = ("-shared", "-fPIC", "-fvisibility=hidden")
 """Compiler flags of a shared library that exports only the functions of FMI."""
-_REMEDY = "install gcc, clang or 'pip install ppafo[native]' anew"
+_REMEDY = "reinstall gcc or clang, or run pip install 'ppafo[native]'"
 """Remedy in messages if a compiler cannot be run."""
 
 

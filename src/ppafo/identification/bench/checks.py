@@ -44,19 +44,19 @@ def check_sources(
                 derived = ', or derive it: direction.of = "pressure_difference", with a threshold and a window'
                 raise IdentificationError(
                     f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
-                    f"the file has {', '.join(recording.names) or 'only time'}; a column map can name it"
+                    f"the file has {', '.join(recording.names) or 'only time'}; a column map can assign it"
                     f"{derived if name == 'direction' else ''}"
                 )
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
             worst = int(np.argmax(np.abs(values)))
             if abs(values[worst]) > _LARGEST_NUMBER:
                 raise IdentificationError(
-                    f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}, more than any "
-                    f"sensor measures: the line is damaged"
+                    f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}, beyond any "
+                    f"sensor's range: the file is damaged there"
                 )
         if len(recording) < fewest:
             raise IdentificationError(
-                f"{source.name}: {procedure} needs at least {fewest} samples, it has {len(recording)}"
+                f"{source.name}: {procedure} needs at least {fewest} samples, not {len(recording)}"
             )
         for name in moving:
             check_moves(source, procedure, name)
@@ -77,7 +77,7 @@ def check_moves(source: RecordingSource, procedure: str, name: str) -> None:
     if values.max() == values.min():
         raise IdentificationError(
             f"{source.name}: {procedure}: channel '{name}' is {source.shown(name, values[0])} throughout; "
-            f"the sensor is stuck, or nothing was done"
+            f"the sensor is stuck, or nothing moved"
         )
 
 
@@ -115,7 +115,7 @@ def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> in
     gap = longest_gap(part.time)
     if gap is not None:
         raise IdentificationError(
-            f"{source.name}: {procedure}: there is a gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s "
-            f"(sample {skipped + gap.index + 1}); give start or end to exclude it"
+            f"{source.name}: {procedure}: gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s "
+            f"(sample {skipped + gap.index + 1}); give start or end to exclude the gap"
         )
     return skipped

@@ -48,13 +48,13 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     if len(part) < MINIMUM_SAMPLES:
         raise IdentificationError(
             f"{source.name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} samples between start and end, "
-            f"there are {len(part)}"
+            f"not {len(part)}"
         )
     swept, noise = float(np.ptp(part[ANGLE])), noise_of(part[ANGLE])
     if swept < _MINIMUM_OVER_NOISE * noise:
         raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: nothing moves: the angle changes by {swept:.3g} rad with a noise of "
-            f"{noise:.3g} rad; push the vane"
+            f"{source.name}: {PROCEDURE}: no motion: the angle changes by only {swept:.3g} rad at a noise of "
+            f"{noise:.3g} rad; push the vane harder"
         )
     skipped = check_no_gap(source, PROCEDURE, part)
     # A start that the user gave is after the push.
@@ -90,8 +90,8 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
         gain = float(deviation @ moved / (deviation @ deviation))
         if abs(gain - 1.0) > _VELOCITY_MAY_DIFFER:
             raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times as fast as 'angle' changes; "
-                f"check unit and sign of both"
+                f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times the derivative of 'angle'; "
+                f"check unit and sign of both channels"
             )
     return FreeDecay(time=time - time[0], angle=angle, sign=sign, velocity=velocity)
 

@@ -36,10 +36,10 @@ The parameter ``flow.linear_ratio`` of a set belongs to the numerics of the engi
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358 [-] in an estimation: start, lowest and highest value."""
 NEXT_LAW: Mapping[Law, str] = {
-    "orifice": "try law = 'both', or for a valve 'iso6358'",
+    "orifice": "try law = 'both', or law = 'iso6358' for a valve",
     "laminar": "try law = 'both'",
     "iso6358": "try law = 'both'",
-    "both": "no orifice, laminar gap or combination of both explains the readings",
+    "both": "neither an orifice nor a laminar gap nor both in parallel explain the readings",
 }
 """Remedy by flow law, for readings that the law does not fit; the law ``both`` contains each of its parts."""
 

@@ -205,7 +205,7 @@ def free_decay(
         float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
         for number, decay in enumerate(decays, start=1)
     )
-    unknown = "" if inertia else "; the inertia is not known, so only ratios to it follow"
+    unknown = "" if inertia else "; the inertia is unknown, so only ratios to the inertia are identified"
     return result_of(
         PROCEDURE,
         sources,
@@ -214,7 +214,7 @@ def free_decay(
         f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {slowing.damping_rate:.4g} 1/s, T_c/I = "
         f"{slowing.deceleration:.4g} rad/s^2{unknown}",
         _panels(decays, model, slowing),
-        "another torque acts, such as gravity, an end stop or a friction of another shape",
+        "another torque acts, such as gravity, an end stop or friction that depends differently on speed",
         remarks,
     )
 

@@ -80,8 +80,8 @@ def open_valve_flow(
     upstream, flow, ratio = readings.upstream, readings.flow, readings.downstream / readings.upstream
     if law == "iso6358" and (np.ptp(ratio) < _SPAN or ratio.max() < _SUBSONIC):
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
-            f"{_SPAN:g} or more and go beyond {_SUBSONIC:g}; these go from {ratio.min():.3g} to {ratio.max():.3g}"
+            f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow: pressure ratios over a range "
+            f"of at least {_SPAN:g} and above {_SUBSONIC:g}, not {ratio.min():.3g} to {ratio.max():.3g}"
         )
     # Beside a laminar gap the critical ratio decides whether the opening is an orifice.
     opening = Opening(gas, law, area or 1.0, critical_ratio if law == "both" else None)
@@ -116,8 +116,8 @@ def open_valve_flow(
     if area is None or coefficient.unit or coefficient.low <= _LARGEST_COEFFICIENT:
         return result
     doubt = (
-        f"Cd = {coefficient.value:.3g} is above 1, which is impossible: mass_flow or a pressure has "
-        f"another unit (a flow per minute is 60 times a flow per second), or the valve is larger than the set's "
+        f"Cd = {coefficient.value:.3g} is impossible, above 1: mass_flow or a pressure has "
+        f"a wrong unit (a flow per minute is 60 times a flow per second), or the valve is larger than the set's "
         f"{area * 1e6:.4g} mm^2; Cd A is {coefficient.value * area * 1e6:.4g} mm^2"
     )
     doubted = replace(coefficient, verdict="holds for this model only")
@@ -151,8 +151,8 @@ def _open_readings(sources: tuple[RecordingSource, ...], gas: GasAt, tolerances:
     is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
     if is_open.sum() < MINIMUM_SAMPLES:
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE} needs {MINIMUM_SAMPLES} readings with the valve fully open, "
-            f"command 1 or -1; there are {int(is_open.sum())}"
+            f"{sources[0].name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} readings with the valve fully "
+            f"open (command 1 or -1), not {int(is_open.sum())}"
         )
     upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
     # A log that begins before the air is on says nothing there, and no column of it is wrong.
@@ -206,6 +206,6 @@ def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:
     if opening.law == "iso6358" or opening.critical_ratio is not None:
         return ReportedNumber(f"{path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
     if area:
-        text = f"Discharge coefficient with the set's area of {area * 1e6:.4g} mm^2; only Cd A sets the flow"
+        text = f"Discharge coefficient with the set's area of {area * 1e6:.4g} mm^2; only Cd A is identified"
         return ReportedNumber(f"{path}.discharge_coefficient", "", text)
     return ReportedNumber("open_valve_flow.effective_area", "m^2", "Effective area Cd A")

@@ -104,7 +104,7 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
         verdict = "at its bound"
         sentence = f"{sentence} The readings favour a value at or beyond {value:.4g}; the interval ends there."
     elif width >= UNKNOWN:
-        verdict, sentence = "not identifiable", f"{sentence} The interval holds zero or twice the value."
+        verdict, sentence = "not identifiable", f"{sentence} The interval includes zero or twice the value."
     elif fitted.conflict is not None:
         verdict = "holds for this model only"
     path, unit, size = reported.path, reported.unit, reported.size

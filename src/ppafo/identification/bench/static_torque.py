@@ -171,7 +171,7 @@ def static_torque(
             readings.pressure,
             residuals,
         ),
-        f"one {unknowns.slope} and a {unknowns.friction} linear in pressure do not describe them",
+        f"a constant {unknowns.slope} and a {unknowns.friction} linear in pressure do not describe the readings",
     )
     return _with_possible_friction(result, unknowns)
 

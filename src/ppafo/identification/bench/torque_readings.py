@@ -75,7 +75,7 @@ def torque_readings(sources: tuple[RecordingSource, ...], zero_of_pressure: floa
         if wrong.size:
             raise IdentificationError(
                 f"{source.name}: {PROCEDURE}: channel 'direction' is {directions[wrong[0]]:g} at sample "
-                f"{wrong[0] + 1}; it is 1 while the pressure rises, -1 while it falls, 0 for neither"
+                f"{wrong[0] + 1}; must be 1 while the pressure rises, -1 while it falls, 0 otherwise"
             )
     pressure, load, direction = (pool(sources, name) for name in ("pressure_difference", channel, "direction"))
     is_used = direction != 0.0
@@ -127,14 +127,14 @@ def _check_separable(
     """Raise IdentificationError for too few readings, a missing branch, or too few different pressures."""
     if pressure.size < _MINIMUM_SAMPLES:
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE} needs at least {_MINIMUM_SAMPLES} readings, there are {pressure.size}"
+            f"{sources[0].name}: {PROCEDURE} needs at least {_MINIMUM_SAMPLES} readings, not {pressure.size}"
         )
     for sign, name in ((1.0, "rising"), (-1.0, "falling")):
         if not (direction == sign).any():
             raise IdentificationError(
                 f"{', '.join(source.name for source in sources)}: {PROCEDURE}: the {name} branch is missing: no "
-                f"reading has direction {sign:+.0f}; without both, friction cannot be separated from "
-                "the zero of the scale"
+                f"reading has direction {sign:+.0f}; friction and the zero of the scale can only be separated "
+                "with both branches"
             )
     if pressure.max() == pressure.min():
         check_moves(sources[0], PROCEDURE, "pressure_difference")
@@ -152,8 +152,8 @@ def _check_separable(
         why = f"{percentage(_SAME_LEVEL, 2)} of the highest" if width > zero_of_pressure else "[bench] zero_of_pressure"
         raise IdentificationError(
             f"{', '.join(source.name for source in sources)}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} "
-            f"different pressures or more, there {'is' if levels == 1 else 'are'} {levels}: pressures closer than "
-            f"{shown:.3g} {unit}, {why}, are one; add recordings at other pressures"
+            f"different pressures or more, not {levels}; pressures closer than {shown:.3g} {unit} ({why}) are one: "
+            "add recordings at other pressures"
         )
 
 

@@ -103,7 +103,7 @@ def valve_map(
         if wrong.size:
             raise IdentificationError(
                 f"{source.name}: {PROCEDURE}: channel 'command' is {requested[wrong[0]]:g} at sample {wrong[0] + 1}; "
-                f"it goes from -1 to 1: scale it in a column map"
+                f"must be from -1 to 1: scale the channel in a column map"
             )
         # The direction of the command, 0 before its first change, is that of the last change unless it was recorded.
         signs = np.sign(np.diff(requested, prepend=requested[0]))
@@ -141,8 +141,8 @@ def valve_map(
     values, residuals = fitted.by_name, sweep.flow - model
     scatter = np.std(residuals) / np.abs(sweep.flow).max()
     is_clear = bool((sweep.command > _CLEAR_COMMAND).any() and (sweep.command < -_CLEAR_COMMAND).any())
-    one_way = "only one direction was recorded: whether the other behaves the same is unknown"
-    no_play = "the command was swept one way only: half the width of any hysteresis is included in the dead band"
+    one_way = "only one direction of flow was recorded: the other direction may behave differently"
+    no_play = "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
     axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
     return result_of(
         PROCEDURE,
@@ -237,11 +237,11 @@ def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> F
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", drivers, np.ones(sweep.flow.size, dtype=bool))
     shape = np.abs(orifice_shape(sweep.upstream, sweep.downstream, gas.heat_capacity_ratio))
     if not shape.any():
-        raise IdentificationError(f"{sources[0].name}: {PROCEDURE}: both pressures are equal throughout")
+        raise IdentificationError(f"{sources[0].name}: {PROCEDURE}: both pressures are equal in all readings")
     areas = np.where(shape > 0.0, sweep.flow / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
     if float(sweep.command @ areas) <= 0.0:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: flow into chamber 1 falls with the command; "
-            f"reverse the sign of one of them"
+            f"reverse the sign of 'mass_flow' or 'command'"
         )
     return np.asarray(areas)

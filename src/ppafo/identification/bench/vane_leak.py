@@ -62,7 +62,7 @@ _START, _RELAXED_BY = "start of {}, decay {}", "relaxation of {}, decay {}"
 """Names of the variables for initial pressure [Pa] and relative error after filling [-], by channel and decay."""
 _RELAXED, _MOST_RELAXED = 5.0, 0.02
 """Usual ratio of recording length to relaxation time [-], and largest relative pressure error from relaxation [-]."""
-_REMEDY = "{}, or give start and end; gas may leak elsewhere, or relax with its walls"
+_REMEDY = "{}, or give start and end; gas may leak elsewhere, or exchange heat with the walls"
 
 
 def vane_leak(
@@ -115,7 +115,7 @@ def vane_leak(
     decays = tuple(closed_chambers(source, start, end, number) for number, source in enumerate(sources, start=1))
     if len({(item.fuller, item.changing) for item in decays}) > 1:
         raise IdentificationError(
-            "chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
+            "chamber 1 empties in some recordings and chamber 2 in others; give each chamber its own [[procedure]]"
         )
     volumes = volume_1, volume_2
     result = _decaying_leak(sources, decays, opening, size, volumes, volume_deviation, tolerances, confidence)
@@ -130,7 +130,7 @@ def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumb
         text = f"Sonic conductance of the leak with the set's b = {opening.critical_ratio:g}"
         return ReportedNumber("actuator.leak.sonic_conductance", "m^3/(s Pa)", text)
     if discharge_coefficient:
-        text = f"Area of the leak with Cd = {discharge_coefficient:g}, of which only the product counts"
+        text = f"Area of the leak with Cd = {discharge_coefficient:g}; only the product Cd A is identified"
         return ReportedNumber("actuator.leak.area", "m^2", text)
     return ReportedNumber("vane_leak.effective_area", "m^2", "Effective area Cd A of the leak")
 

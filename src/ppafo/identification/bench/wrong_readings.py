@@ -163,12 +163,12 @@ def meter_readings(
     against = counted & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if has_sign else 0.0))
     many = _MOST_IMPOSSIBLE * np.count_nonzero(counted)
     if not has_sign and np.count_nonzero(against) > many:
-        remark = f"{procedure}: the flow meter gives no direction; it is taken from the other channels"
+        remark = f"{procedure}: the flow meter gives no direction; the direction is taken from pressures and command"
         return np.where(direction < 0.0, -flow, flow), counted, (remark,)
     wrong = np.flatnonzero(against)
     if wrong.size > many:
         raise IdentificationError(
-            f"{sources[0].name}: {procedure}: the flow runs against the direction that pressures and command give it "
+            f"{sources[0].name}: {procedure}: the flow is opposite to the direction of pressures and command "
             f"in {wrong.size} of {np.count_nonzero(counted)} readings; reverse the sign of 'mass_flow'"
         )
     if not wrong.size:
@@ -200,6 +200,6 @@ def _refuse_outlier(
     """Raise IdentificationError for outliers of a channel: the first one with its value, the others by number."""
     others = f", and so are samples {', '.join(str(sample + 1) for sample in samples[1:4])}" if samples[1:] else ""
     raise IdentificationError(
-        f"{source.name}: {procedure}: '{name}' is {source.shown(name, value)} at sample {samples[0] + 1}, where its "
-        f"neighbours are at {source.shown(name, around)}: a wrong reading{others}; correct it or leave it out"
+        f"{source.name}: {procedure}: '{name}' is {source.shown(name, value)} at sample {samples[0] + 1}, but "
+        f"{source.shown(name, around)} around it: a wrong reading{others}; correct or remove this reading"
     )

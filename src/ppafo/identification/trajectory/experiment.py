@@ -80,7 +80,7 @@ def check_experiment(experiment: FittedExperiment) -> None:
         raise IdentificationError(f"{where}: {recording.label} has only one sample; a fit needs two or more")
     for name in experiment.channels:
         if name not in FITTED_CHANNELS:
-            raise IdentificationError(f"{where}: channel '{name}' cannot be fitted; {', '.join(FITTED_CHANNELS)} can")
+            raise IdentificationError(f"{where}: channel '{name}' cannot be fitted; use {', '.join(FITTED_CHANNELS)}")
     for name in inputs:
         if name not in ALL_INPUTS:
             hint = nearest_name(name, ALL_INPUTS)
@@ -94,20 +94,20 @@ def check_experiment(experiment: FittedExperiment) -> None:
     is_python = scenario.controller.is_outside and COMMAND not in inputs
     refuse_first(
         where,
-        (not experiment.channels, "there is no channel to compare"),
-        (bool(follows), "the angle of the vane is prescribed by the recording, so it cannot be compared"),
+        (not experiment.channels, "has no channel to compare; give channels"),
+        (bool(follows), "the recording prescribes the angle, which cannot be compared; remove it from channels"),
         (
             experiment.channels == (ANGLE,) and motion.profile is not None,
-            "the angle of the vane is prescribed, so it carries no information; add a pressure",
+            "the angle of the vane is prescribed and carries no information; add a pressure to channels",
         ),
-        (is_python, "a Python controller cannot run in a batch; use one of the catalogue"),
+        (is_python, "a Python controller cannot be fitted; use a controller kind of the catalogue"),
         (
             has_torque and motion.profile is not None,
             "a torque has no effect on a vane whose angle is prescribed; remove it from inputs",
         ),
         (
             has_torque and motion.leg is not None,
-            "the leg of the motion prescribes T_ex; remove it from inputs, or let the motion be free",
+            "the leg of the motion prescribes T_ex; remove it from inputs, or set motion.kind = 'free'",
         ),
         *(
             (not 0.0 < deviation < math.inf, f"the noise of '{name}' must be above 0, not {deviation!r}")
@@ -152,8 +152,8 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
     before = recording.time <= experiment.start + _FITS
     if not before.any():
         raise IdentificationError(
-            f"{where}: {recording.label} has no sample up to {experiment.start:g} s to take the initial state "
-            "from; give a later start"
+            f"{where}: {recording.label} has no sample up to {experiment.start:g} s for the initial state; "
+            "give a later start"
         )
     time = recording.time[before]
     rest = {name: value_at_rest(time, recording[name][before], at_end=True) for name in recording.names}

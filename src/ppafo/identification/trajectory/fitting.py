@@ -189,8 +189,8 @@ def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Est
     elif not fitted.has_converged:
         starts = ", ".join(f'start = "{_in_unit(item.value, item)}" of {item.path}' for item in estimates)
         remarks.append(
-            f"the search stopped after {fitted.evaluations} runs before it converged; give the parameters {starts}, "
-            "where it ended"
+            f"the search stopped after {fitted.evaluations} runs before it converged; to continue, give the parameters "
+            f"{starts}"
         )
     return tuple(remarks)
 
@@ -240,8 +240,8 @@ def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
             shown, unit = in_shown_unit(wander, number.unit.removesuffix("_d"))
             most, _ = in_shown_unit(limit, number.unit.removesuffix("_d"))
             return (
-                f"the residual of {channel} drifts by {shown:.2g} {unit}, but its zero by {most:.2g} {unit} at "
-                f"most; the model is incomplete"
+                f"the residual of {channel} drifts by {shown:.2g} {unit}, but the zero of its sensor by at most "
+                f"{most:.2g} {unit}; the model is incomplete"
             )
     return ""
 
@@ -261,7 +261,7 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
     verdict: Verdict = "identified"
     # Of a quantity of either sign, such as the zero of a sensor, the value may be zero.
     size = free.scale if free.low < 0.0 < free.high else None
-    remedy = "fix it, give a prior, or make another recording"
+    remedy = "fix this parameter, give a prior, or make another recording"
     if combination is not None:
         verdict = "not identifiable"
         # So far from where it was linearised the interval of a straight line means nothing.
@@ -270,13 +270,13 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
         text = f"trades off against {' and '.join(others)}; {remedy}"
         if not others:
             # Where the model lacks something, that may be what moves a number so far from its start.
-            text = conflict or f"the recordings are hardly sensitive to it; {remedy}"
+            text = conflict or f"the recordings are hardly sensitive to this parameter; {remedy}"
     elif bound is not None:
         end, unit = in_shown_unit(bound, number.unit)
         verdict, text = "at its bound", f"the recordings favour a value at or beyond {end:.6g} {unit}".rstrip(" -")
     elif relative_half_width(value, low, high, size) >= UNKNOWN:
         verdict = "not identifiable"
-        text = f"{widened_by(fitted, name)}; the interval holds zero or twice the value; {remedy}"
+        text = f"{widened_by(fitted, name)}; the interval includes zero or twice the value; {remedy}"
     elif conflict:
         # Said of every number: which of them the missing physics moves is not known.
         verdict, text = "holds for this model only", conflict

@@ -95,13 +95,13 @@ class TrajectorySection(StrictTable):
 
 
 _REMOVED = {
-    "loss": "the first pass is always robust; omit it",
-    "other_starts": "other starts are tried where the first does not explain the recordings; omit it",
-    "seed": "the fit uses no random numbers; omit it",
-    "directions": "recordings that disagree are found automatically; omit it",
-    "profiles": "the table of the result has the intervals; omit it",
-    "scale": "numbers are scaled automatically; omit it",
-    "held": "is renamed to locked; write locked = '75 deg'",
+    "loss": "the first pass is always robust; omit this key",
+    "other_starts": "other starts are tried if the first does not explain the recordings; omit this key",
+    "seed": "the fit uses no random numbers; omit this key",
+    "directions": "recordings that disagree are found automatically; omit this key",
+    "profiles": "the table of the result has the intervals; omit this key",
+    "scale": "parameters are scaled automatically; omit this key",
+    "held": "was renamed to locked; write locked = '75 deg'",
 }
 
 

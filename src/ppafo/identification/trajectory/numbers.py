@@ -73,7 +73,7 @@ def declaration_of(path: str, scenario: Scenario) -> Quantity:
     full = full_path(path, scenario)
     if full not in known:
         hint = nearest_name(full, known)
-        raise IdentificationError(f"{scenario.name}: no number '{path}' can be fitted{hint}; known: {', '.join(known)}")
+        raise IdentificationError(f"{scenario.name}: '{path}' cannot be fitted{hint}; available: {', '.join(known)}")
     return known[full]
 
 
@@ -179,8 +179,8 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
         channel = EXTERNAL_TORQUE if path == "motion.external_torque" else followed.get(_SUPPLIES.get(path, ""))
         if channel in experiment.inputs:
             raise IdentificationError(
-                f"{parameter.name}: the run of experiment '{experiment.label}' follows the recorded '{channel}', so "
-                "this number has no effect in it; omit one of the two"
+                f"{parameter.name}: the run of experiment '{experiment.label}' uses the recorded '{channel}', so this "
+                "parameter has no effect; omit the parameter or the input"
             )
     start = parameter.start
     if start is None:
@@ -195,9 +195,9 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     refuse_first(
         parameter.name,
         (not math.isfinite(start) or math.isnan(low) or math.isnan(high), "start and bounds must be finite numbers"),
-        (not low < high, f"low, {low:.6g}, must be below high, {high:.6g}"),
-        (not low <= start <= high, f"start {start:.6g} must lie between the bounds {bounds}"),
-        (start == 0.0 and not has_size, "a start at 0 needs bounds, because they define what a small step is"),
+        (not low < high, f"low = {low:.6g} must be below high = {high:.6g}"),
+        (not low <= start <= high, f"start = {start:.6g} must lie between the bounds {bounds}"),
+        (start == 0.0 and not has_size, "start = 0 needs bounds, which define the step size of the search"),
         (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
         (not is_allowed, f"the bounds {bounds} exceed the allowed range, {allowed}"),
     )

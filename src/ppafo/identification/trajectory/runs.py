@@ -95,7 +95,7 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
     if time.size < MINIMUM_SAMPLES:
         raise IdentificationError(
             f"{where}: {recording.label} has {time.size} samples after {experiment.start:g} s, "
-            f"at least {MINIMUM_SAMPLES} are needed"
+            f"but needs at least {MINIMUM_SAMPLES}"
         )
     channels = [
         FitChannel(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
@@ -110,7 +110,7 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
         if is_at_limit(channel.values, clipped) and not (rests or has_noise):
             raise IdentificationError(
                 f"{where}: channel '{channel.name}' is exactly its {clipped.word} value for {clipped.count} of "
-                f"{channel.values.size} samples: its sensor is at its limit; end the recording before it, or give the "
+                f"{channel.values.size} samples: the sensor is at its limit; end the recording earlier, or give the "
                 "standard deviation of the sensor in noise"
             )
     scenario = scenario_of(experiment)

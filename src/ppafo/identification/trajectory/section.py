@@ -195,15 +195,15 @@ def _replay(
     is_locked, is_fixed = entry.locked is not None, entry.volume is not None
     refuse_first(
         where,
-        (entry.initial_state == "scenario", "initial_state = 'scenario', but it has no scenario; omit it"),
+        (entry.initial_state == "scenario", "initial_state = 'scenario' needs a scenario; omit initial_state"),
         (
             (is_locked or is_fixed) and ANGLE in inputs,
-            f"the vane is locked or absent, but inputs has '{ANGLE}': omit one of them",
+            f"'{ANGLE}' cannot be an input with locked or volume; remove '{ANGLE}' from inputs",
         ),
-        (is_locked and is_fixed, "locked and volume: with a fixed volume there is no vane; omit one of them"),
+        (is_locked and is_fixed, "locked and volume exclude each other: a fixed volume has no vane; omit one of them"),
         (
             COMMAND not in recording,
-            f"has no scenario, so its recording needs a channel '{COMMAND}'; it has {', '.join(recording.names)}",
+            f"has no scenario, so its recording needs a channel '{COMMAND}'; available: {', '.join(recording.names)}",
         ),
         (COMMAND not in inputs, f"has no scenario, so inputs must have '{COMMAND}'"),
     )
@@ -265,7 +265,7 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
             ends = [in_shown_unit(number, estimate.unit) for number in numbers]
             low, high, lowest, highest = (f"{end:.4g}" for end, _ in ends)
             remarks.append(
-                f"{estimate.path}: fitted {low} to {high} {ends[0][1]}, from the bench {lowest} to {highest}: one of "
-                "the two models is incomplete"
+                f"{estimate.path}: fitted {low} to {high} {ends[0][1]}, bench procedure {lowest} to {highest}: the "
+                "model of the fit or of the procedure is incomplete"
             )
     return TrajectoryOutcome(fitted, expected, tuple(remarks))

@@ -118,8 +118,8 @@ def problem(settings: _CylinderSettings, stops: Range) -> str:
     if min(between) <= 0.0 or max(between) >= math.pi or min(math.sin(angle) for angle in between) < LEAST_SINE:
         low, high = (math.degrees(angle) for angle in between)
         return (
-            f"lever and base are {low:.4g} to {high:.4g} deg apart between the stops, and must stay "
-            f"{math.degrees(math.asin(LEAST_SINE)):.2g} deg from being in line: change lever_offset or the stops"
+            f"the angle between lever and base is {low:.4g} to {high:.4g} deg and must stay at least "
+            f"{math.degrees(math.asin(LEAST_SINE)):.2g} deg from 0 and 180 deg: change lever_offset or the stops"
         )
     return ""
 

@@ -155,32 +155,32 @@ def effect_problem(effect: Effect) -> str:
 def _problems(effect: Effect) -> Iterator[str]:
     """Yield the faults in the declaration of an effect, each as a clause that follows the effect's name."""
     if not effect.name.isidentifier():
-        yield "its name is the parameter by which laws take its parameters, and must be an identifier"
+        yield "has a name that is not a Python identifier; laws take the parameters of the effect under this name"
     if effect.always and (effect.switch or effect.is_of_device):
-        yield "is always on: it has no switch, and names the section of a parameter set that its settings have"
+        yield "is always on, so it must have no switch and must give section_of_files"
     if not effect.always:
         for item in effect.quantities:
             if item.default is None:
-                yield f"'{item.name}' has no default: a device that says nothing of an effect must be without it"
+                yield f"'{item.name}' has no default; give a default with which the effect is off"
         # A switch below 0 would be on or off by its sign.
         lowest = {item.name: item.minimum for item in effect.quantities}
         if not effect.switch:
             yield "has no switch"
         for name in effect.switch:
             if lowest.get(name) != 0.0:
-                yield f"switch names '{name}', which is no quantity with a minimum of 0"
+                yield f"switch names '{name}', which must be a quantity with minimum 0"
         if effect.is_on(effect.defaults()):
-            yield "its defaults leave it on: a device that says nothing of an effect must be without it"
+            yield "is on with its defaults; give defaults with which the effect is off"
     for name, defaults in effect.of_gas.items():
         # A gas without a default would silently get another gas's number.
         lacking = [species for species in SPECIES if species not in defaults]
         if lacking or all(item.name != name for item in effect.quantities):
-            missing = f"has no default for {', '.join(lacking)}" if lacking else "is no quantity"
+            missing = f"has no default for {', '.join(lacking)}" if lacking else "is not a quantity of the effect"
             yield f"of_gas names '{name}', which {missing}"
     for port, law in effect.laws.items():
         given, taken = _parameters(port), [name for name in _parameters(law) if name not in effect.rows]
         if taken != given:
-            yield f"{law.__name__}({', '.join(taken)}) must take ({', '.join(given)}), as {port.__name__} does"
+            yield f"{law.__name__}({', '.join(taken)}) must take the arguments of {port.__name__}: ({', '.join(given)})"
 
 
 def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:

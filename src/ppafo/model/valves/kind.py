@@ -73,9 +73,9 @@ def valve_problem(valve: ValveModel) -> str:
         ports = f"tuple[{_name(valve.port)}, {_name(valve.port)}]"
         return f"{valve.connect.__name__}(plant, shown) must be annotated with {_name(valve.shown)} and {ports}"
     if hints[1] is not Any and hints[1] is not valve.shown:
-        return f"{valve.connect.__name__} takes a {_name(hints[1])}, and the valve shows a {_name(valve.shown)}"
+        return f"{valve.connect.__name__} takes a {_name(hints[1])}, but the valve shows a {_name(valve.shown)}"
     if hints[2] != tuple[valve.port, valve.port]:  # type: ignore[name-defined]
-        return f"{valve.connect.__name__} makes {_name(hints[2])}, and the valve has ports {_name(valve.port)}"
+        return f"{valve.connect.__name__} returns {_name(hints[2])}, but the valve has ports {_name(valve.port)}"
     return ""
 
 

@@ -231,7 +231,7 @@ def check_can_build() -> None:
     """Raise ProgramError unless ziglang is installed."""
     if importlib.util.find_spec("ziglang") is None:
         raise ProgramError(
-            "this scenario needs functions that no program of the package has, and ziglang to build them: "
+            "this scenario needs a program that is not shipped with ppafo and must be built with ziglang: "
             f"{_HOW_TO_INSTALL}"
         )
 

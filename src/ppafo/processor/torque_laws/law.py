@@ -72,20 +72,20 @@ class Numbers:
         return numbers, (
             (
                 np.asarray(bits % 1.0 != 0.0),
-                lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole",
+                lambda run: f"controller.converter_bits = {at(bits, run):g}: must be a whole number",
             ),
             (
                 np.asarray(size > 1.0),
                 lambda run: (
-                    f"controller: a gain of '{self.name}' is {at(size, run):.3g} times the largest: take more "
-                    f"converter_bits, a smaller converter_range, or a smaller gain"
+                    f"controller: a gain of '{self.name}' is {at(size, run):.3g} times the largest allowed: increase "
+                    f"converter_bits, or reduce converter_range or the gain"
                 ),
             ),
             (
                 np.logical_or(reference[0] < low - _ROUNDING, reference[1] > high + _ROUNDING),
                 lambda run: (
-                    f"reference: from {_span(reference, run)}, and the converter shows "
-                    f"{_span((low, high), run)} only: take a larger controller.converter_range"
+                    f"reference: {_span(reference, run)} exceeds the range of the converter, "
+                    f"{_span((low, high), run)}: increase controller.converter_range"
                 ),
             ),
         )

@@ -67,12 +67,12 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         if path not in declared:
             raise ScenarioError(f"{base.name}: {_why_not(base, typed, path, declared)}")
         if path in values:
-            raise ScenarioError(f"{base.name}: '{typed}' and '{path}' are the same value; give one of them")
+            raise ScenarioError(f"{base.name}: '{typed}' and '{path}' are the same value; give only one of them")
         values[path] = np.ascontiguousarray(column, dtype=np.float64)
     shapes = {path: column.shape for path, column in values.items()}
     if len(set(shapes.values())) != 1 or any(len(shape) != 1 or shape[0] == 0 for shape in shapes.values()):
         raise ScenarioError(
-            f"{base.name}: an ensemble needs columns of one length, one value for each run, not {shapes or 'none'}"
+            f"{base.name}: an ensemble needs columns of equal length with one value per run, not {shapes or 'none'}"
         )
     pair = in_two_forms(values)
     if pair is not None:
@@ -91,7 +91,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     # An adiabatic scenario need not say its area, and runs that take up heat would go on as if they had none.
     gas, heat_varies = base.gas_model, "gas_model.heat_transfer_coefficient" in values
     if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:
-        raise ScenarioError(f"{base.name}: the heat transfer varies, but '{WALL_AREA}' is 0; give the area")
+        raise ScenarioError(f"{base.name}: the heat transfer varies, but '{WALL_AREA}' is 0; give the wall area")
     varied = moving_together(base, absolute(base, values, gauge))
     # A number of a second chamber that the actuator does not have may follow, and nothing declares it.
     in_force = {path: declared[path] for path in varied if path in declared}
@@ -110,10 +110,10 @@ def _why_not(base: Scenario, typed: str, path: str, declared: Mapping[str, Quant
         return f"'{typed}' is a text and cannot vary; run an ensemble for each value"
     if base.controller.is_outside and path.startswith("controller."):
         return (
-            f"'{typed}' cannot vary: a Python object has no declared settings; "
-            "a module with a KIND has them (docs/how-to/extend.md)"
+            f"'{typed}' cannot vary: a Python controller object has no declared settings; "
+            "declare them in a module with a KIND (docs/how-to/extend.md)"
         )
     if path in OF_SECOND_CHAMBER and base.device.actuator.has_one_chamber:
         return f"'{typed}' cannot vary: {WHY_ONE_CHAMBER}"
     hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
-    return f"there is no number '{typed}' that could vary{hint}"
+    return f"'{typed}' is not a number that can vary{hint}"

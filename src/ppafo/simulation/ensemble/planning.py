@@ -106,7 +106,7 @@ def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
         value = values[run]
         written = f"{path} = {value:.9g} {unit}".rstrip()
         if not np.isfinite(value):
-            return f"{written}: is not a finite number"
+            return f"{written}: must be a finite number"
         if path in WHOLE_NUMBERS and value != np.floor(value):
             return f"{written}: must be a whole number"
         return f"{written}: {range_rule(quantity, unit)}"
@@ -180,7 +180,7 @@ def _contradictory_numbers(scenario: Scenario) -> Iterator[Problem]:
             shown_text(at(pressure, run), "Pa_a", atmosphere=at(supply.atmospheric_pressure, run))
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
-        return f"supply.dorsiflexion_pressure = {dorsiflexion}: with [supply_line] at most supply.pressure, {supplied}"
+        return f"supply.dorsiflexion_pressure = {dorsiflexion} must not exceed supply.pressure = {supplied}"
 
     yield np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line_of_regulator
 

@@ -135,7 +135,7 @@ class _MeteredBatch:
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
     """Reason why a metric does not apply to a scenario; "" if it applies."""
     if scenario.device.actuator.has_one_chamber and not OF_SECOND_CHAMBER.isdisjoint(kind.channels):
-        return f"'{scenario.device.name}' has one chamber"
+        return f"'{scenario.device.name}' has only one chamber"
     return scenario.motion.motion_kind.lacks(scenario, kind)
 
 
@@ -160,8 +160,8 @@ def _meter_batch(plain: Batch, members: Members, request: OutputRequest) -> _Met
     # Runs of one batch may have other steps, but traces are rows of one array.
     if request.bands and np.abs(stride * interval - request.every).max() > _SAME_INTERVAL * request.every:
         raise ScenarioError(
-            f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "
-            f"{interval.max():.6g} s; give run.output_interval a value that does"
+            f"traces every {request.every:.6g} s: must be a multiple of run.output_interval in every run, not only of "
+            f"{interval.max():.6g} s; change run.output_interval"
         )
     traced = sorted({*read_from_traces, *request.bands})
     # Bands alone need the samples at which they are shown, metrics of traces every one.

@@ -98,13 +98,13 @@ def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Pro
 def lacks(scenario: Scenario, kind: MetricKind) -> str:
     """Return the reason why a metric does not apply to a vane alone; "" if it applies."""
     if WALK in kind.needs:
-        return "it needs a walk"
+        return "the metric needs a walk"
     leg = vane_motion(scenario).leg
     if LED_SHANK in kind.needs and not (leg is not None and leg.gait):
-        return "it needs a leg whose shank follows a gait"
+        return "the metric needs a leg whose shank follows a gait"
     if not kind.of_reference:
         return ""
     if not scenario.follows_reference:
-        return "its controller follows no reference"
+        return "the controller has no reference"
     controlled = scenario.controlled
     return "" if kind.of_reference == controlled else f"reference.of is '{controlled}', not '{kind.of_reference}'"

@@ -103,9 +103,9 @@ def between_stops(angles: Floats, device: Device, file: str) -> Floats:
         shown, low, high = np.degrees([worst, lowest, highest])
         is_negative = lowest - margin <= float(-angles.max()) and float(-angles.min()) <= highest + margin
         hint = (
-            "; with the other sign all angles would lie between them"
+            "; with the opposite sign all angles would lie between the stops"
             if is_negative
-            else "; if it is counted from another zero, give sign and offset in a column map"
+            else "; if the angle has another zero, give sign and offset in a column map"
         )
         raise DataError(
             f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg{hint}"

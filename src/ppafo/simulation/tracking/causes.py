@@ -67,11 +67,11 @@ def _slow_decisions(case: Case) -> TrackingCause | None:
         return None
     rates = (10.0 / period, 100.0 / period, _USUAL_RATE)
     text = (
-        f"its controller decides every {1.0e3 * period:.3g} ms, {settled / period:.2g} times within the settled "
+        f"the controller decides every {1.0e3 * period:.3g} ms, only {settled / period:.2g} times in the settled "
         f"{settled:.3g} s"
     )
     remedies = (Remedy({}, (f"controller.rate={rate:g} Hz",)) for rate in rates if rate <= _USUAL_RATE)
-    return TrackingCause(text, tuple(remedies), "give it a higher `controller.rate`")
+    return TrackingCause(text, tuple(remedies), "increase `controller.rate`")
 
 
 def _shut_valve(case: Case) -> TrackingCause | None:
@@ -81,7 +81,7 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     # A loop that rests at the edge of the band is a little beyond it now and then.
     typical = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
     if typical <= SHUT and case.failure != "overshoots":
-        return TrackingCause("its law commands nothing: its gains are 0, or its dead zone is wider than the error")
+        return TrackingCause("the command stays 0: the gains are 0, or the dead zone is wider than the error")
     if typical > _EDGE * band or settled.turns or case.failure == "overshoots":
         return None
     known_band = float(scenario.controller.settings.get("dead_band", 0.0))
@@ -95,7 +95,7 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     if torque_asked(scenario, case.law, settled.error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
     relation = "stays within" if known_band < band else "hardly opens the valve beyond"
-    text = f"its command of {typical:.2g} {relation} `valve.dead_band = {band:.2g}`"
+    text = f"the command of {typical:.2g} {relation} `valve.dead_band = {band:.2g}`"
     return TrackingCause(text, tuple(remedies), "give a larger gain")
 
 
@@ -105,7 +105,7 @@ def oscillation(case: Case) -> TrackingCause | None:
     if not (case.oscillates or case.only_switches):
         return None
     if law is None:
-        return TrackingCause("its controller is user-defined", (), "give it smaller gains")
+        return TrackingCause("the controller is user-defined", (), "reduce its gains")
     angle = float(np.mean(case.recording["angle"][case.settled.samples]))
     # Gains are those of where the joint is to be, where that is known.
     is_known = scenario.motion.motion_kind.sees(scenario).places is not anywhere
@@ -119,11 +119,11 @@ def oscillation(case: Case) -> TrackingCause | None:
             return None
         controlled = scenario.controlled if TORQUE in law.controls else TORQUE
         declare = switching_remedy(scenario.controller.kind)
-        asks = f"`{law.name}` asks for openings that on/off valves do not have{declare}: "
+        asks = f"`{law.name}` requests partial openings, which on/off valves do not have{declare}: "
         opens = "" if law.only_switches else asks
         text = (
-            f"{opens}its valves change it by {change_text(controlled, step)} in their dead time of "
-            f"{1.0e3 * dead_time:.3g} ms, {ratio:.2g} times what is wanted"
+            f"{opens}the valves cause a step of {change_text(controlled, step)} in their dead time of "
+            f"{1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested change"
         )
         # Where a valve has gradual openings, a law that uses them for an angle is the better remedy.
         gradual = (CASCADE,) if scenario.controlled == ANGLE else ()
@@ -131,18 +131,18 @@ def oscillation(case: Case) -> TrackingCause | None:
     names = [quantity.name for quantity in speed_settings(scenario, law).values()]
     if not names:
         return TrackingCause(
-            "its law is too fast for the delays of the loop", (), "give its law smaller gains, or a slower one"
+            "the controller is too fast for the delays of the loop", (), "reduce its gains or use a slower controller"
         )
     sensors = scenario.sensors
     reason = "find the source of the delay (sensors, lines)"
     if sensors.angle_noise or sensors.pressure_noise:
         noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
-        reason = f"the noise of its sensors ({noise}) turns the command"
-    slower = TrackingCause(f"`{names[0]}` is this device's: {reason}", slower_loops(scenario, law, (2.0, 4.0)))
+        reason = f"sensor noise ({noise}) reverses the command"
+    slower = TrackingCause(f"`{names[0]}` suits this device: {reason}", slower_loops(scenario, law, (2.0, 4.0)))
     if quicker > _QUICKER:
         text = (
-            f"at {level_text('rad', angle)} the chambers are so small that it changes {quicker:.2g} times "
-            f"quicker than where `{names[0]}` is taken"
+            f"at {level_text('rad', angle)} the chambers are so small that the loop is {quicker:.2g} times "
+            f"faster than at the angle for which `{names[0]}` is computed"
         )
         slower = TrackingCause(text, slower_loops(scenario, law, (quicker, 2.0 * quicker)))
     return gains_of_another_device(case) or slower
@@ -168,15 +168,15 @@ def _static_friction(case: Case) -> TrackingCause | None:
     if requested > holding + lost:
         return None
     holding_text, requested_text = level_text("N m", holding), level_text("N m", requested)
-    band_text = f" and `valve.dead_band` keeps {level_text('N m', lost)} from it" if requested > holding else ""
+    band_text = f" and `valve.dead_band` costs {level_text('N m', lost)}" if requested > holding else ""
     text = (
-        f"static friction holds the joint with {holding_text}{band_text}, and the law asks for {requested_text} at "
-        "this error"
+        f"static friction holds the joint with {holding_text}{band_text}, but the controller requests only "
+        f"{requested_text} at this error"
     )
     remedies = []
     if "static_torque" in settings and known_friction < holding:
         remedies.append(remedy(scenario, {"controller.static_torque": holding}))
-    advice = "a larger `angle_stiffness` moves it"
+    advice = "increase `controller.angle_stiffness`"
     return TrackingCause(text, (*remedies, *stiffer_laws(scenario, holding, settled)), advice)
 
 
@@ -185,8 +185,8 @@ def _fully_open_valve(case: Case) -> TrackingCause | None:
     share = float(np.mean(case.is_fully_open))
     if share <= _MOSTLY:
         return None
-    text = f"its valve is fully open for {100.0 * share:.0f} % of the time: it is too small for this task"
-    return TrackingCause(text, sized_valves(case.scenario, _LARGER_VALVES), "take a larger valve or a slower reference")
+    text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for this task"
+    return TrackingCause(text, sized_valves(case.scenario, _LARGER_VALVES), "use a larger valve or a slower reference")
 
 
 def _opened_away(case: Case) -> TrackingCause | None:
@@ -202,10 +202,10 @@ def _opened_away(case: Case) -> TrackingCause | None:
     if np.mean(is_away) <= (_ALWAYS if case.only_switches else _MOSTLY):
         return None
     text = (
-        f"its valve is fully open for {100.0 * np.mean(is_open):.0f} % of the time, away from the reference for "
-        f"{100.0 * np.mean(is_away):.0f} % of it"
+        f"the valve is fully open for {100.0 * np.mean(is_open):.0f} % of the time, and drives away from the reference "
+        f"for {100.0 * np.mean(is_away):.0f} % of this time"
     )
-    return TrackingCause(text, (), "reverse the sign of its command or of its measurement")
+    return TrackingCause(text, (), "reverse the sign of the command or of the measurement")
 
 
 def _lag(case: Case) -> TrackingCause | None:
@@ -217,13 +217,13 @@ def _lag(case: Case) -> TrackingCause | None:
     if squares == 0.0 or case.settled.rests or case.only_switches:
         return None
     delay = float(np.mean(slope * error)) / squares
-    text = "its reference changes faster than the loop can follow"
+    text = "the reference changes faster than the loop can follow"
     if delay > 0.0 and delay**2 * squares >= _EXPLAINED * case.settled.error**2:
-        text = f"it is {1.0e3 * delay:.3g} ms behind its reference"
+        text = f"it lags its reference by {1.0e3 * delay:.3g} ms"
     remedies = [*stiffened(scenario, (2.0, 4.0)), *larger_gains(scenario, case.law, (2.0, 4.0))]
     frequency = float(scenario.reference.settings.get("frequency", 0.0))
     remedies += [remedy(scenario, {"reference.frequency": share * frequency}) for share in (0.7, 0.4, 0.2) if frequency]
-    return TrackingCause(text, tuple(remedies), "take larger gains, less delay or a slower reference")
+    return TrackingCause(text, tuple(remedies), "use larger gains, less delay or a slower reference")
 
 
 def gains_of_another_device(case: Case) -> TrackingCause | None:
@@ -233,7 +233,7 @@ def gains_of_another_device(case: Case) -> TrackingCause | None:
         return None
     # Without its integral a loop rests beside its reference with any gain.
     others = () if case.oscillates else default_integral_remedy(case.scenario, case.law)
-    return TrackingCause("its gains do not suit this device", (default_gain, *others))
+    return TrackingCause("the gains do not suit this device", (default_gain, *others))
 
 
 def _poor_sensors(case: Case) -> TrackingCause | None:
@@ -245,7 +245,7 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
         return None
     remedies = [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
     told = ", ".join(f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in found.items())
-    return TrackingCause(f"its sensors are too poor for the controlled quantity ({told})", tuple(remedies))
+    return TrackingCause(f"the sensors are not accurate enough for the controlled quantity ({told})", tuple(remedies))
 
 
 def _law_without_torque_loop(case: Case) -> TrackingCause | None:
@@ -255,7 +255,7 @@ def _law_without_torque_loop(case: Case) -> TrackingCause | None:
         return None
     if torque_asked(case.scenario, law, case.settled.error) is not None:
         return None
-    text = f"`{law.name}` acts on the angle without a torque loop inside, and is slow against load and friction"
+    text = f"`{law.name}` controls the angle without an inner torque loop and is slow against load and friction"
     return TrackingCause(text, (CASCADE,))
 
 
@@ -272,19 +272,19 @@ def _not_settled(case: Case) -> TrackingCause:
     settings = case.scenario.controller.settings
     stop = stop_of(case.scenario, case.recording["angle"][case.settled.samples])
     if stop and case.scenario.controlled == ANGLE:
-        return TrackingCause(f"the joint lies on its {stop} stop", (), "check the load that presses it there")
+        return TrackingCause(f"the joint lies on its {stop} stop", (), "check the load that moves it there")
     if _is_settling(case):
         longer = [remedy(case.scenario, {"run.duration": times * case.scenario.run.duration}) for times in (2.0, 4.0)]
         quicker = larger_gains(case.scenario, case.law, (2.0, 4.0))
         text = f"it has not settled by {case.settled.start:.3g} s"
-        return TrackingCause(text, (*longer, *quicker), "give it a longer `run.duration`")
+        return TrackingCause(text, (*longer, *quicker), "increase `run.duration`")
     integral = next((name for name in settings if "integral" in name and settings[name] == 0.0), "")
     if integral:
         remedies = tuple(default_integral_remedy(case.scenario, case.law))
         return TrackingCause(
             "the remaining error needs integral action, whose gain is 0", remedies, f"set `{integral}` above 0"
         )
-    return TrackingCause("torque limit, dead band, friction and valve opening do not explain it", (), "see the figure")
+    return TrackingCause("torque limit, dead band, friction and opening do not explain the error", (), "see the figure")
 
 
 CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (

@@ -39,13 +39,13 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
         return None
     reach, supply = highest if wanted > highest else lowest, supply_that_moves(scenario.device, wanted > highest)
     stop = stop_of(scenario, case.recording["angle"][samples]) if isinstance(scenario.motion, FreeMotion) else ""
-    lies = f"nothing resists the torque but the {stop} stop, on which the joint lies: " if stop else ""
+    lies = f"only the {stop} stop, on which the joint lies, resists the torque: " if stop else ""
     text = (
         f"{lies}at {level_text('rad', wanted_at)} and {level_text('Pa', number_at(scenario, supply))} the "
-        f"actuator gives {level_text('N m', reach)} at most"
+        f"actuator gives at most {level_text('N m', reach)}"
     )
     if lies:
-        return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or give it a load", is_beyond_reach=True)
+        return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or add a load", is_beyond_reach=True)
     remedies = []
     needed = supply_for(scenario.device, wanted_at, 1.05 * wanted)
     if needed is not None:
@@ -76,15 +76,15 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
     rests = f"the joint lies on its {stop} stop: " if stop else ""
     works, gives = (level_text("N m", torque) for torque in (needed_torque, reach))
     against = "" if not is_within else f" to break its static friction of {level_text('N m', holding)}"
-    text = f"{rests}it needs {works} at {level_text('rad', wanted)}{against}, where the actuator gives {gives} at most"
+    text = f"{rests}the load needs {works} at {level_text('rad', wanted)}{against}, the actuator gives at most {gives}"
     needed = supply_for(device, wanted, 1.3 * needed_torque)
     changes: list[dict[str, float]] = [] if needed is None else [{supply: needed}]
     advice = ""
     is_one_way = abs(reach) <= ONE_WAY * max(abs(lowest), abs(highest))
     if is_one_way or (needed is None and not outside):
         # What its material pulls back is too little, and no pressure gives more.
-        text = f"{text}: it pushes one way only" if is_one_way else text
-        advice = "let a spring or a weight pull it back"
+        text = f"{text}: it acts in one direction only" if is_one_way else text
+        advice = "add a spring or a weight that pulls the joint back"
         back = reach + (1.5 if not is_high else -1.5) * holding + _PULLED_BACK * (highest + lowest)
         changes.append({"motion.external_torque": back - (load - outside)})
     elif outside:
@@ -121,13 +121,13 @@ def flung_at_start(case: Case) -> TrackingCause | None:
     atmosphere = float(device.supply.atmospheric_pressure)
     needed = supply_for(device, start, load)
     text = (
-        f"at the start its chambers give {level_text('N m', load - lacking)} for a load of "
-        f"{level_text('N m', load)}: the joint moves {change_text(ANGLE, deviation)} away "
-        "before they are filled"
+        f"at the start the chambers give {level_text('N m', load - lacking)} for a load of "
+        f"{level_text('N m', load)}: the joint moves away by {change_text(ANGLE, deviation)} "
+        "before the chambers are filled"
     )
     pressures = {"initial.pressure_1": atmosphere, "initial.pressure_2": atmosphere}
     if needed is not None:
         is_first = supply_that_moves(device, load > torque_at(start, atmosphere, atmosphere)) == PRESSURE_PATH
         pressures["initial.pressure_1" if is_first else "initial.pressure_2"] = needed
     remedies = [] if needed is None else [remedy(scenario, pressures)]
-    return TrackingCause(text, tuple(remedies), "begin with pressures in [initial] that carry the load")
+    return TrackingCause(text, tuple(remedies), "give pressures in [initial] that carry the load")

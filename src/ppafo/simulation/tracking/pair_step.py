@@ -59,8 +59,8 @@ def unlimited_switching(result: "RecordedResult") -> str:
         return ""
     missing = ", ".join(f"`valve.{name}`" for name in limits)
     return (
-        f"its valves are reversed {without_exponent(often, '.3g')} times a second, and no value of the "
-        f"parameter set limits the rate ({missing} are 0): give the values of the valve, or a lower `controller.rate`"
+        f"the valves are reversed {without_exponent(often, '.3g')} times a second, and no value of the "
+        f"parameter set limits this rate ({missing} are 0): give these values, or a lower `controller.rate`"
     )
 
 
@@ -99,6 +99,6 @@ def coarse_pair(scenario: Scenario) -> str:
     smaller = smaller_pair(scenario, ratio)[0].text
     return (
         f"{subject_text(scenario.name)}: the pair of valves changes the {controlled.words} by {step_text} in its dead "
-        f"time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the {wanted_text} wanted: {smaller}, faster valves or "
-        "larger chambers make that step smaller"
+        f"time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested {wanted_text}: {smaller}, faster valves "
+        "or larger chambers reduce this step"
     )

@@ -94,7 +94,7 @@ class Tracking:
         """Verdict in one line."""
         remedies = " or ".join(remedy.text for remedy in self.remedies[:2])
         if self.accepted:
-            last = f"; on purpose: {self.accepted}"
+            last = f"; intended: {self.accepted}"
         elif self.tried or not remedies:
             last = f"; {self.tried or self.advice}" if self.tried or self.advice else ""
         else:
@@ -105,22 +105,22 @@ class Tracking:
     def _found(self) -> str:
         words = CONTROLLED[self.controlled].words
         error, wanted, moved = (change_text(self.controlled, each) for each in (self.error, self.wanted, self.moved))
-        plain_error, plain_moved = error.partition(" ")[0], moved.partition(" ")[0]
+        plain_moved, rms = moved.partition(" ")[0], f"RMS error {error} (requested {wanted}){time_text(self.since)}"
         if self.kind == "does not move":
-            return f"the {words} loop does not move: {plain_moved} of {wanted} wanted"
+            return f"the {words} loop does not move: {plain_moved} of the requested {wanted}"
         if self.kind == "oscillates":
             if self.span:
                 swing = change_text(self.controlled, self.span)
-                return f"the {words} swings by {swing}, of {wanted} wanted{time_text(self.since)}"
+                return f"the {words} swings by {swing} (requested change {wanted}){time_text(self.since)}"
             often = f"{without_exponent(self.reversals, '.3g')} reversals a {self.per}"
-            return f"the {words} loop oscillates: {often}, RMS {plain_error} of {wanted} wanted{time_text(self.since)}"
+            return f"the {words} loop oscillates: {often}, {rms}"
         if self.kind == "overshoots":
-            return f"the {words} overshoots: {plain_moved} of {wanted} wanted at most"
+            return f"the {words} overshoots: {plain_moved} instead of at most {wanted}"
         if self.rests and self.at_rest:
             missing = change_text(self.controlled, abs(self.missing))
             side = "below" if self.missing < 0.0 else "above"
-            return f"the {words} stays {missing} {side} its reference, of {wanted} wanted"
-        return f"the {words} does not follow its reference: RMS {plain_error} of {wanted} wanted{time_text(self.since)}"
+            return f"the {words} stays {missing} {side} its reference (requested change {wanted})"
+        return f"the {words} does not follow its reference: {rms}"
 
 
 @in_units(lambda result: result.scenario.device.shown)
@@ -190,7 +190,7 @@ def following_text(result: "RecordedResult") -> str:
     if not scenario.follows_reference:
         return begin + judged_text(*rms, LARGEST_SHARE_OF_WAVE * settled.wanted)
     # The limit of on/off valves is several times wider, so the swing is reported beside the error.
-    why = ", as its valves are only open or shut" if case.only_switches else ""
+    why = ", because the valves are either open or shut" if case.only_switches else ""
     limit = float(largest_deviation(settled)) if settled.way > 0.0 and not case.only_switches else None
     deviation = ("swing", settled.span) if settled.rests else ("largest error", settled.worst)
     texts = judged_text(*rms, float(largest_error(settled, case.only_switches)), why), judged_text(*deviation, limit)

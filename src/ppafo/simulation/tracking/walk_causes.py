@@ -38,18 +38,18 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         # Dorsiflexion torque requested from an actuator that pushes in plantarflexion only.
         asked, lowest = float(reference[places].min()), float(reaches[:, 0].min())
         text = (
-            f"its controller requests {level_text('N m', asked)}, where the actuator gives "
-            f"{level_text('N m', lowest)} at most: it pushes one way only"
+            f"the controller requests {level_text('N m', asked)}, but the actuator gives at most "
+            f"{level_text('N m', lowest)}: it acts in one direction only"
         )
         settings = scenario.controller.settings
         unasked = {f"controller.{name}": 0.0 for name in _DORSIFLEXION if settings.get(name, 0.0) > 0.0}
         omission = (remedy(scenario, unasked),) if unasked else ()
-        advice = "request no dorsiflexion, or let a spring lift the foot"
+        advice = "request no dorsiflexion torque, or add a spring that lifts the foot"
         return TrackingCause(text, omission, advice, is_beyond_reach=True)
     lacks_most = int(np.argmax(np.maximum(above, below)))
     given = float(reaches[lacks_most, 1 if above[lacks_most] > 0.0 else 0])
     text = (
-        f"its controller requests more torque than the actuator can give in {100.0 * share:.0f} % of the time, such as "
+        f"for {100.0 * share:.0f} % of the time the controller requests more torque than the actuator gives, such as "
         f"{level_text('N m', float(reference[places][lacks_most]))} where the actuator gives "
         f"{level_text('N m', given)}"
     )
@@ -67,7 +67,7 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         if least > 0.0:
             remedies.append(remedy(scenario, {"controller.largest_torque": least}))
     return TrackingCause(
-        text, tuple(remedies), "take a higher `supply.pressure` or request less torque", is_beyond_reach=True
+        text, tuple(remedies), "increase `supply.pressure` or request less torque", is_beyond_reach=True
     )
 
 
@@ -77,10 +77,10 @@ def _valve_of_walk(case: Case) -> TrackingCause | None:
     if case.oscillates or case.only_switches or fully_open <= _OFTEN:
         return None
     text = (
-        f"its valve is fully open for {100.0 * fully_open:.0f} % of the time: it is too small for how quickly the "
-        "gait turns the joint"
+        f"the valve is fully open for {100.0 * fully_open:.0f} % of the time: it is too small for the joint speed of "
+        "this gait"
     )
-    return TrackingCause(text, sized_valves(case.scenario, (2.0, 4.0, 8.0)), "take a larger valve")
+    return TrackingCause(text, sized_valves(case.scenario, (2.0, 4.0, 8.0)), "use a larger valve")
 
 
 def _speed_of_gait(case: Case) -> TrackingCause:
@@ -94,9 +94,9 @@ def _speed_of_gait(case: Case) -> TrackingCause:
         if min(volumes.values()) > 0.0
     ]
     return TrackingCause(
-        "the gait turns the joint more quickly than its loop follows",
+        "the gait moves the joint faster than the torque loop can follow",
         tuple(remedies),
-        "take larger dead volumes or a quicker valve",
+        "use larger dead volumes or a faster valve",
     )
 
 
@@ -113,8 +113,8 @@ def _dead_band_of_walk(case: Case) -> TrackingCause | None:
     share = float(np.mean((command > SHUT) & (command <= band)))
     if share <= _OFTEN or case.failure == "overshoots":
         return None
-    text = f"its command stays within `valve.dead_band = {band:.2g}` for {100.0 * share:.0f} % of the time"
-    advice = "take a valve without a dead band, or a law that opens beyond it"
+    text = f"the command stays within `valve.dead_band = {band:.2g}` for {100.0 * share:.0f} % of the time"
+    advice = "use a valve without dead band, or a controller that compensates the dead band"
     return TrackingCause(text, tuple(larger_gains(scenario, case.law, (2.0, 4.0, 8.0))), advice)
 
 

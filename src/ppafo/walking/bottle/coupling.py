@@ -137,7 +137,7 @@ class _BottleInUse:
 def _course_of_use(supply: BottleSupply, use: _BottleInUse) -> SupplyCourse:
     """Return the state of a bottle over a walk; without another ending, the supply lasted until the end of the walk."""
     last = use.met[-1]
-    over = f"the walk is over, and {_grams(last.state.mass)} are left in the bottle"
+    over = f"the walk is complete, and {_grams(last.state.mass)} are left in the bottle"
     # In the order of ``UNITS``.
     rows = [
         (
@@ -209,7 +209,7 @@ def _use_bottle(
         # Divergence first: a gas mass that is no number must not reach the supply.
         failed = float(block.states[states["result.failure_time"], 0])
         if failed < NEVER_FAILED or not bool(np.isfinite(block.states).all()):
-            message = f"the walk diverged, and {_grams(meeting.state.mass)} were left in the bottle before"
+            message = f"the walk diverged with {_grams(meeting.state.mass)} left in the bottle"
             use.ending = SupplyEnding(DIVERGED, message, min(time, failed))
             break
         regulated_mass = float(block.states[regulated, 0].sum())
@@ -311,10 +311,10 @@ def _ending(supply: BottleSupply, meeting: _Meeting, reached: float) -> SupplyEn
     # The bottle still has the pressure: the flow is too small, by ice or by the seat itself.
     if now.set_pressure >= bottle.regulator.set_pressure and open_share(bottle.supply, state.ice) < _OPEN:
         kind: EndKind = "iced"
-        why = f"dry ice in the seat leaves {100.0 * open_share(bottle.supply, state.ice):.0f} % of it open"
+        why = f"dry ice leaves {100.0 * open_share(bottle.supply, state.ice):.0f} % of the seat open"
         return SupplyEnding(kind, f"the regulator is iced: {why}, and {short}; {left} are left", time)
     if now.set_pressure >= bottle.regulator.set_pressure:
-        return SupplyEnding("too little flow", f"the regulator passes too little, and {short}; {left} are left", time)
+        return SupplyEnding("too little flow", f"the regulator flow is too small, and {short}; {left} are left", time)
     # The same gas at room temperature tells a cold bottle from an empty one.
     warm = bottle_content(bottle.fluid.table, state.mass, bottle.volume, bottle.room_temperature).pressure
     if warm - bottle.regulator.pressure_margin >= bottle.regulator.set_pressure:

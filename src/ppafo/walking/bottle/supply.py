@@ -38,10 +38,10 @@ BOTTLE_OVERRIDES = {path if path.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{path}
 BOTTLE_NUMBERS = (FILL, TEMPERATURE, LEAST_TORQUE, COUPLING)
 
 _FOLLOWS = {
-    "content": f"set {BOTTLE}.gas_mass higher, or {BOTTLE}.content_heat_transfer lower",
-    "wall": f"set {BOTTLE}.wall_heat_capacity higher",
-    "regulator": f"set {BOTTLE}.regulator.heat_capacity higher",
-    "hose": f"set {BOTTLE}.hose.heat_capacity higher",
+    "content": f"increase {BOTTLE}.gas_mass, or reduce {BOTTLE}.content_heat_transfer",
+    "wall": f"increase {BOTTLE}.wall_heat_capacity",
+    "regulator": f"increase {BOTTLE}.regulator.heat_capacity",
+    "hose": f"increase {BOTTLE}.hose.heat_capacity",
 }
 """Remedies that slow the response of a part of the supply."""
 
@@ -139,13 +139,13 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
         return None
     if not isinstance(section.get("name"), str):
         raise ScenarioError(
-            f"{reading.file}: '{BOTTLE_NAME}' is missing: the name of a bottle, or the path of its file"
+            f"{reading.file}: '{BOTTLE_NAME}' is missing: give the name of a bottle, or the path of its file"
         )
     own = section.get("overrides", ())
     if any(text.partition("=")[0].strip() == _SET_PRESSURE for text in own):
         raise ScenarioError(
-            f"{reading.file}: {BOTTLE}.{_SET_PRESSURE}: must be omitted in a walk, which uses supply.pressure for "
-            "the regulator of the bottle; set supply.pressure"
+            f"{reading.file}: {BOTTLE}.{_SET_PRESSURE}: not allowed in a walk, where supply.pressure sets "
+            "the regulator of the bottle; set supply.pressure instead"
         )
     with refused_as(ParameterError, f"{reading.file}: [{BOTTLE}]", ParameterError):
         name = section["name"]
@@ -160,8 +160,8 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
         room = device.supply.atmospheric_pressure
         raise ScenarioError(
             f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to "
-            f"{shown_text(own_pressure, 'Pa_a', atmosphere=room)}, and supply.pressure is "
-            f"{shown_text(pressure, 'Pa_a', atmosphere=room)}: give both the same"
+            f"{shown_text(own_pressure, 'Pa_a', atmosphere=room)}, but supply.pressure is "
+            f"{shown_text(pressure, 'Pa_a', atmosphere=room)}: make both equal"
         )
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
     entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
@@ -189,15 +189,15 @@ def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle
     numbers = {quantity.name: reading.number(f"{BOTTLE}.{quantity.name}", quantity) for quantity in items}
     nodes = bottle.fluid.table.temperatures
     if not nodes[0] < numbers["temperature"] <= nodes[-1]:
-        known = f"must be above {nodes[0]:g} K and at most {nodes[-1]:g} K, where {bottle.fluid.name} is known"
+        known = f"must be above {nodes[0]:g} K and at most {nodes[-1]:g} K, the data range of {bottle.fluid.name}"
         raise reading.refusal(f"{BOTTLE}.temperature", known)
     mass, table = numbers["fill"] * bottle.mass, bottle.fluid.table
     most = bottle.volume * (liquid_density if has_liquid(table) else densest_gas)(table, numbers["temperature"])
     if mass >= most:
-        fits = f"{GRAMS_PER_KILOGRAM * most:.4g} g fit into it at {numbers['temperature']:g} K"
+        fits = f"only {GRAMS_PER_KILOGRAM * most:.4g} g fit into the bottle at {numbers['temperature']:g} K"
         raise ScenarioError(
-            f"{reading.file}: [{BOTTLE}]: {GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}, and {fits}: set "
-            f"{BOTTLE}.fill or {BOTTLE}.temperature lower, or {BOTTLE}.volume higher"
+            f"{reading.file}: [{BOTTLE}]: {GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}, but {fits}: "
+            f"reduce {BOTTLE}.fill or {BOTTLE}.temperature, or increase {BOTTLE}.volume"
         )
     return numbers
 
@@ -214,13 +214,13 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
     if not is_of_bottle(device.gas.molar_mass, supply.bottle):
         raise reading.refusal(
             BOTTLE_NAME,
-            f"holds {fluid.name}, and the device is fed with {device.gas.species}: set gas.species={fluid.name}, or "
-            f"take a bottle of {device.gas.species}",
+            f"contains {fluid.name}, but the device uses {device.gas.species}: set gas.species={fluid.name}, or "
+            f"choose a bottle of {device.gas.species}",
         )
     if device.supply.relieving:
-        raise ScenarioError(f"{reading.file}: supply.relieving: no gas goes back into a bottle; set it to false")
+        raise ScenarioError(f"{reading.file}: supply.relieving: must be false with a bottle, which takes no gas back")
     if kind_at(reading.document, "gas_model") == THERMAL:
-        raise reading.refusal("gas_model.kind", "assumes supply gas at room temperature; omit it, or the bottle")
+        raise reading.refusal("gas_model.kind", "assumes gas at room temperature; omit gas_model.kind, or the bottle")
     for path in _OWN:
         if value_at(reading.document, path) is not None:
             raise reading.refusal(
@@ -233,8 +233,8 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
     if rates[fastest] > _FASTEST:
         raise reading.refusal(
             BOTTLE_NAME,
-            f"the temperature of its {fastest} follows within {1.0e3 / rates[fastest]:.3g} ms, and a walk follows what "
-            f"takes {1.0e3 / _FASTEST:g} ms or more: {_FOLLOWS[fastest]}",
+            f"the temperature of the {fastest} has a time constant of {1.0e3 / rates[fastest]:.3g} ms, but a walk "
+            f"needs at least {1.0e3 / _FASTEST:g} ms: {_FOLLOWS[fastest]}",
         )
     pressure = supply.offers_first().content.pressure
     if pressure < regulator.set_pressure + regulator.pressure_margin:
@@ -242,4 +242,4 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
             shown_text(each, "Pa_a", atmosphere=device.supply.atmospheric_pressure)
             for each in (pressure, regulator.set_pressure + regulator.pressure_margin)
         )
-        raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, and its regulator needs {needs}")
+        raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, but its regulator needs {needs}")

@@ -41,7 +41,7 @@ def population_figure(population: Population) -> "Figure":
         across=2,
         size=(2.7, 1.9),
         title=f"{population.scenario.name}: {population.count} wearers, {population.minutes:.3g} min each",
-        note="dashed: 5th and 95th percentile; solid: median; dot: the wearer of the configuration",
+        note="dashed: 5th and 95th percentile; solid: median; dot: wearer of the configuration",
     )
 
 

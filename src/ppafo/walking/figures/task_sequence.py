@@ -85,7 +85,7 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
         panels,
         size=(5.4, 1.45),
         title=f"{worn.scenario.name}, task sequence {'' if sequence is None else sequence.name}",
-        note="upright line: the controller helps less" if losses else "",
+        note="vertical line: less help" if losses else "",
         kind=recording.kind,
     )
 

@@ -189,9 +189,7 @@ def test_a_run_on_another_gas_than_the_bottle_holds_is_refused(tmp_path: Path) -
 
 def test_a_walk_on_another_gas_than_the_bottle_holds_is_told_the_command_that_feeds_it_so() -> None:
     walked = ppafo.walk("proportional", minutes=0.1, overrides=["controller.vent_time=0.1 s"])
-    with pytest.raises(
-        DataError, match="its device is fed with CO2, and bottle 'air-48ci-3000psi' holds air"
-    ) as caught:
+    with pytest.raises(DataError, match="the device uses CO2, but bottle 'air-48ci-3000psi' contains air") as caught:
         endurance(walked, bottle="air-48ci-3000psi")
     told = "'ppafo walk proportional --set 'controller.vent_time=0.1 s' --set gas.species=air --out FOLDER'"
     assert told in str(caught.value)
@@ -203,7 +201,7 @@ def test_a_walk_on_another_gas_than_the_bottle_holds_is_told_the_command_that_fe
 
 @pytest.mark.parametrize("typed", ["gas.species", "gas", "gas.value", "bottle.gas"])
 def test_a_gas_set_at_a_bottle_is_told_to_repeat_the_run(typed: str) -> None:
-    with pytest.raises(ParameterError, match=f"a bottle has no value '{typed}'; its file names the gas") as caught:
+    with pytest.raises(ParameterError, match=f"a bottle has no value '{typed}'; its gas is set in") as caught:
         endurance(staircase(1e-3, 1.0, 0.2), overrides=[f"{typed}=air"])
     assert "repeat the run of walk with overrides=['gas.species=air']" in str(caught.value)
     with pytest.raises(ParameterError, match=f"a bottle has no value '{typed}'; choose the gas by the name or file"):

@@ -246,7 +246,7 @@ def test_a_device_that_a_fault_stops_is_asked_about_without_the_fault() -> None:
 
 def test_a_walk_whose_numbers_were_changed_in_python_is_not_taken_for_that_of_its_file() -> None:
     changed = walk(with_numbers(load_walk("solenoid"), {"valve.area": 1.0e-6}), minutes=0.1)
-    with pytest.raises(ScenarioError, match="give the bottle where the walk is loaded"):
+    with pytest.raises(ScenarioError, match="when loading the walk"):
         endurance_of_walk(changed)
 
 

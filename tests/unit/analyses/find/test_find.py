@@ -215,8 +215,8 @@ def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_erro
     assert there > 1.0
     assert found.value is None
     assert found.unsettled > 0
-    assert f"in {found.unsettled} runs the loop still swings in the second half" in " ".join(found.remarks)
-    assert "in these runs the condition must also hold for the RMS error there" in " ".join(found.remarks)
+    assert f"in {found.unsettled} runs the loop still oscillates in the second half" in " ".join(found.remarks)
+    assert "these runs must also meet the condition with the RMS error of that half" in " ".join(found.remarks)
     # What stands under the name of the metric is the metric, and what was asked of stands beside it.
     (tried,) = (each for each in found.tried if each.value == pytest.approx(101325.0 + 84.0 * 6894.757293168361))
     assert tried.metric == pytest.approx(final_error)
@@ -255,9 +255,9 @@ def test_a_run_that_follows_is_a_condition_of_its_own(tmp_path: Path) -> None:
         assert (ppafo.simulate(TASK, [f"supply.pressure={value!r} Pa_a"]).tracking is None) == follows
     answer.save(tmp_path / "out")
     assert json.loads((tmp_path / "out" / "find.json").read_text())["condition"] == "follows"
-    with pytest.raises(StudyError, match="'follows': scenario 'step-response' has no reference to follow"):
+    with pytest.raises(StudyError, match="'follows': scenario 'step-response' has no reference; give a condition"):
         find("step-response", vary="supply.pressure=50..60 psi_g", such_that="follows")
-    with pytest.raises(StudyError, match="nor 'follows', for a run that follows its reference"):
+    with pytest.raises(StudyError, match=r"or 'follows' \(the run follows its reference\)"):
         find(TASK, vary="supply.pressure=50..60 psi_g", such_that="following")
 
 

@@ -177,14 +177,16 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     assert at_stop.sides["ankle"] == "against a stop"
     assert "straight line" in at_stop.sides["source to chamber 1"]
     assert at_stop.edges == (SlopeKink("command", is_above=False),)
-    assert "the column of `command` is valid below 1 only; its slope differs above it" in text_of(finding_of(at_stop))
+    assert "the column of `command` is valid only below 1; the derivative above this value differs" in text_of(
+        finding_of(at_stop)
+    )
     assert at_stop.b[:, 0].any(), "of a valve that is fully open the side is taken on which it closes"
     deaf = linear(TASK, 0.1, ["valve.dead_band=0.5", "controller.dead_band=0"])
-    assert "the command's column is 0" in deaf.sides["valve"]
+    assert "the column of the command is 0" in deaf.sides["valve"]
     assert not deaf.b[:, 0].any()
     assert not finding_of(deaf).figures
     stuck = linear("step-response", 0.0, ["motion.kind=free", "initial.pressure_2=atmosphere", "motion.angle=60 deg"])
-    assert stuck.sides["ankle"] == "sticks: friction holds it"
+    assert stuck.sides["ankle"] == "sticks by static friction"
     assert [item.name for item in stuck.states] == ["pressure_1", "pressure_2"]
     assert linear("step-response", 0.1).sides["ankle"] == "slides in plantarflexion"
 
@@ -239,7 +241,7 @@ def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearMod
     with pytest.raises(ArgumentError, match=r"at=None: must be a number of seconds, a time .* or 'equilibrium'"):
         linear(TASK, None)  # type: ignore[arg-type]
     for answer in (linearise, ppafo.simulate):
-        with pytest.raises(ScenarioError, match="overrides apply to the name or file of a scenario"):
+        with pytest.raises(ScenarioError, match="a loaded scenario accepts no overrides"):
             answer(steady.scenario, overrides=["run.duration=1 s"])
 
 
@@ -352,9 +354,9 @@ def test_margins_and_crossover_are_those_of_loop_shaping() -> None:
     assert math.degrees(margins.phase_margin) == pytest.approx(79.2, abs=0.1)
     assert margins.gain_crossover == pytest.approx(5.107, abs=1e-3)
     assert "phase margin       79.2 deg at 5.11 Hz" in text_of(finding)
-    assert "no margins of the loop: controller 'constant' is no PID" in text_of(linearise("step-response"))
+    assert "no stability margins: controller 'constant' is not a PID" in text_of(linearise("step-response"))
     assert re.search(
-        r"gain margin .* at 500 Hz, half the sample rate: the phase reaches -180 deg there only", text_of(finding)
+        r"gain margin .* at 500 Hz, half the sample rate: the phase reaches -180 deg only there", text_of(finding)
     )
     gain, phase = frequency_panels(finding.found)[:2]
     # The dots stand where the margins are read.

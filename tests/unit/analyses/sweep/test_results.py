@@ -83,7 +83,7 @@ def test_results_do_what_everything_solved_does(small_results: StudyResults, tmp
     page = (tmp_path / "saved" / "report.html").read_text(encoding="utf-8")
     assert "of their normal scores" in page
     assert "Sampled by sobol: 8 draws, seed 3." in page
-    with pytest.raises(ArgumentError, match="a result of 'sweep' has no figure 'pareto': available are figure"):
+    with pytest.raises(ArgumentError, match="a result of 'sweep' has no figure 'pareto'; available: figure"):
         finding.plot("pareto")
 
 

@@ -386,7 +386,7 @@ def test_the_log_has_a_line_for_every_session_and_nothing_else_tells_the_time(sm
 
 
 def test_results_at_an_address_are_refused(small: Any) -> None:
-    with pytest.raises(DataError, match=r"s3://bucket/study: is an address; results of a study go into a folder"):
+    with pytest.raises(DataError, match=r"s3://bucket/study: is an address; give a folder on this computer"):
         sweep(small, out="s3://bucket/study")
 
 
@@ -399,7 +399,9 @@ def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any])
 
 
 def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> None:
-    with pytest.raises(StudyError, match="a loaded Study takes no overrides, draws or seed; give them to load_study"):
+    with pytest.raises(
+        StudyError, match="a loaded Study accepts no overrides, draws or seed; give these to load_study"
+    ):
         sweep(load_study(small), draws=3)
 
 

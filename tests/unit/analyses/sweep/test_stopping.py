@@ -120,7 +120,7 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
     quiet = drawn_until(value, UNCERTAIN, mean_of("N m"), StoppingRule(0.05, False, first=512), 1)
     assert quiet.is_met
     (unseen,) = quiet.remarks
-    assert "fewer than 0.018 % of the runs may be missing" in unseen
+    assert "outcomes with a probability below 0.018 % may be missing" in unseen
     assert "up to 100 standard deviations" in unseen
 
 

@@ -118,7 +118,9 @@ def test_an_interruption_says_that_the_command_goes_on(
 
     monkeypatch.setattr(solve_module, "compute_chunk", interrupted)
     assert swept(study, tmp_path / "out") == 130
-    assert capsys.readouterr().err.endswith("interrupted; nothing was kept yet, and the same command begins anew\n")
+    assert capsys.readouterr().err.endswith(
+        "interrupted before the first chunk was finished; the same command starts the study again\n"
+    )
     monkeypatch.undo()
     assert swept(study, tmp_path / "out") == 0
 

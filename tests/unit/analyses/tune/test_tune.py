@@ -135,7 +135,7 @@ def test_gains_that_follow_in_most_draws_are_said_to_miss_in_the_share_of_the_ot
     assert finding.to_dict()["before"]["share_off"] == before.share_off
     assert f"values changed: {gains[0]}, {gains[1]}" in str(finding)
     beyond = replace(after, off=0.3, share_off=0.25)
-    assert verdict(problem, before, beyond).endswith("limits of tracking are exceeded by 30 % in 25 % of the draws")
+    assert verdict(problem, before, beyond).endswith("tracking limits are exceeded by 30 % in 25 % of the draws")
 
 
 def test_what_only_the_draws_of_the_search_keep_is_not_kept() -> None:
@@ -144,7 +144,7 @@ def test_what_only_the_draws_of_the_search_keep_is_not_kept() -> None:
     assert lucky.is_feasible_in_search
     assert not lucky.is_feasible
     said = verdict(found.problem, found.before, lucky)
-    assert "over the draws of the search, but not over 1,024 fresh ones" in said
+    assert "over the draws of the search, but not over 1,024 fresh draws" in said
 
 
 def test_noise_is_drawn_for_every_candidate_alike_and_judged_on_fresh_draws() -> None:
@@ -192,7 +192,7 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
         ({"objective": [{"metric": "rms_error", "weight": 0.0}]}, "weight = 0 has no effect"),
         ({"objective": [{"metric": "rms_error", "scale": "2 g"}]}, "objective 'rms_error': scale = '2 g'"),
         ({"objective": [{"metric": "rms_error", "scale": "0 N m"}]}, "must be above 0"),
-        ({"constraints": [{"metric": "rms_error"}]}, "give at_most or at_least, it has none"),
+        ({"constraints": [{"metric": "rms_error"}]}, "has neither of at_most and at_least; give one of them"),
         ({"constraints": [{"metric": "rms_error", "at_most": "2 g"}]}, "constraint 'rms_error' = '2 g'"),
         (
             {"robust": {"study": "torque-task-uncertain"}},

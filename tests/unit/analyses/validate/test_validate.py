@@ -157,7 +157,7 @@ def test_the_verb_of_python_takes_what_the_command_takes(
         ([*SET, "step.csv", "--longest-delay", "soon"], "--longest-delay soon"),
         (
             ["validate", "ppafo2011", "step.csv"],
-            "above the supply of ppafo2011, 50 psi_g: record it, or give --set 'supply",
+            "above the supply of ppafo2011, 50 psi_g: record the supply pressure, or give --set 'supply",
         ),
         ([*SET, "step.csv", "broken.csv"], "broken.csv: line 2"),
     ],
@@ -190,7 +190,7 @@ def test_a_recording_given_twice_is_refused_under_another_name_too(
     for second in (copy, bench / "step.csv"):
         assert main([*SET, str(bench / "step.csv"), str(second)]) == 2
         said = capsys.readouterr().err
-        assert said == f"ppafo: {second}: the same recording as {bench / 'step.csv'}; give each once\n"
+        assert said == f"ppafo: {second}: the same recording as {bench / 'step.csv'}; give every recording only once\n"
 
 
 def test_a_small_residual_of_which_no_cause_is_known_is_a_remark_and_a_large_one_is_not(tmp_path: Path) -> None:
@@ -209,8 +209,10 @@ def test_a_small_residual_of_which_no_cause_is_known_is_a_remark_and_a_large_one
         found = ppafo.validate("ppafo2011", [tmp_path / "two.csv"], overrides=SUPPLY[1::2])
         said = str(found.to_dict()["summary"])
         assert found.passed is agrees, said
-        assert "no single change explains it" in said
-        assert agrees is not ("of a device on a leg, fixed or driven give motion='leg', locked or measured" in said)
+        assert "no single change explains the residual" in said
+        assert agrees is not (
+            "if the device was on a leg, locked or driven, give motion='leg', locked or measured" in said
+        )
         assert re.search(r"is off by [\d.]+ times its noise \([\d.]+ % of full range\)", said)
 
 

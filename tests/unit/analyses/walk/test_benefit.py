@@ -56,9 +56,7 @@ def test_toes_that_drag_below_the_reach_of_the_actuator_are_mended_at_the_contro
 def test_a_remedy_that_no_walk_tried_is_said_to_be_untried(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ppafo.analyses.walk.benefit._PRESSURES", (1.01,))
     said = sentence("proportional", "supply.pressure=15 psi_g")
-    assert said.endswith(
-        "more supply pressure alone does not mend it; an actuator with more torque may, which was not tried"
-    )
+    assert said.endswith("more supply pressure alone does not suffice; an actuator with more torque was not tried")
 
 
 def test_strides_without_help_are_the_reason_and_the_first_fault_is_named() -> None:
@@ -71,7 +69,7 @@ def test_a_request_beyond_the_actuator_names_both_torques() -> None:
     tracking = ppafo.walk("proportional", minutes=0.1, overrides=["supply.pressure=15 psi_g"]).tracking
     assert tracking is not None
     assert re.fullmatch(
-        r"its controller requests more torque than the actuator can give in \d+ % of the time, such as -5 N m where "
+        r"for \d+ % of the time the controller requests more torque than the actuator gives, such as -5 N m where "
         r"the actuator gives -1\.\d+ N m",
         tracking.cause,
     )

@@ -20,7 +20,7 @@ def test_a_peak_torque_above_the_limit_of_the_controller_is_said() -> None:
     assert safety_remarks(walk(load_walk("proportional", [peak, "controller.largest_torque=9 N m"]), minutes=0.1)) == []
     law = ["device.valve=proportional", "controller.kind=event_proportional", "controller.vent_time=0.15 s"]
     (said,) = safety_remarks(walk(load_walk("off", [*law, peak]), minutes=0.1))
-    assert said.endswith("largest_torque = 5 N m; the actuator gives no more at this supply")
+    assert said.endswith("largest_torque = 5 N m; the actuator cannot give more at this supply pressure")
 
 
 @pytest.mark.long
@@ -32,4 +32,4 @@ def test_a_pressure_far_above_the_supply_is_said_with_its_chamber() -> None:
     pressed = Channel(np.full(worn.recording.time.size, 80.0e3 + 100.0 * PASCALS_PER_PSI), "Pa")
     channels = {**worn.recording.channels, "pressure_2": pressed}
     (said,) = safety_remarks(replace(worn, recording=replace(worn.recording, channels=channels)))
-    assert said.startswith("the pressure in chamber 2 reaches 100 psi_g, and its supply is set to 30 psi_g: ")
+    assert said.startswith("the pressure in chamber 2 reaches 100 psi_g, at a supply pressure of 30 psi_g: ")

@@ -106,6 +106,6 @@ def test_a_wrong_pressure_is_told_in_the_unit_of_the_file_and_not_of_the_set(
     shown = scale * (-2.1e7 + (101_325.0 if unit.endswith("_g") else 0.0))
     with pytest.raises(
         IdentificationError,
-        match=re.escape(f"'pressure_2' is {shown:.6g} {base} at sample 8, where its neighbours are at "),
+        match=re.escape(f"'pressure_2' is {shown:.6g} {base} at sample 8, but "),
     ):
         ppafo.identify(problem)

@@ -94,7 +94,7 @@ def test_a_direction_that_is_none_is_named_with_its_sample() -> None:
 def test_one_pressure_is_too_few() -> None:
     source = planted.static()
     two = np.where(source.recording["pressure_difference"] > 3e5, 6e5, 1e5)
-    with pytest.raises(IdentificationError, match="3 different pressures or more, there are 2"):
+    with pytest.raises(IdentificationError, match="3 different pressures or more, not 2"):
         static_torque((changed(source, "pressure_difference", two),))
 
 
@@ -102,7 +102,7 @@ def test_the_jitter_of_one_commanded_pressure_is_no_range_of_pressures() -> None
     source = planted.static()
     pressure = source.recording["pressure_difference"]
     jitter = 5.0e5 + 1.2e4 * (pressure / pressure.max())
-    with pytest.raises(IdentificationError, match=r"there is 1: pressures closer than 7\.4.* psi, 10 %.*are one"):
+    with pytest.raises(IdentificationError, match=r"not 1; pressures closer than 7\.4.* psi \(10 %.*are one"):
         static_torque((changed(source, "pressure_difference", jitter),))
 
 
@@ -111,7 +111,7 @@ def test_jitter_about_no_pressure_is_no_range_of_pressures(amplitude: float) -> 
     source = planted.static()
     pressure = source.recording["pressure_difference"]
     jitter = amplitude * (2.0 * pressure / pressure.max() - 1.0)
-    with pytest.raises(IdentificationError, match=r"there is 1: pressures closer than 0\.3 psi, \[bench\] zero_of_pre"):
+    with pytest.raises(IdentificationError, match=r"not 1; pressures closer than 0\.3 psi \(\[bench\] zero_of_pre"):
         static_torque((changed(source, "pressure_difference", jitter),))
 
 
@@ -121,7 +121,7 @@ def test_jitter_of_the_second_pressure_is_no_third_one(higher: float) -> None:
     pressure = source.recording["pressure_difference"]
     jitter = 0.04 * higher * (pressure / pressure.max())
     two = np.where(np.arange(pressure.size) % 2 == 0, 1.0e5 + 0.1 * jitter, higher + jitter)
-    with pytest.raises(IdentificationError, match="3 different pressures or more, there are 2"):
+    with pytest.raises(IdentificationError, match="3 different pressures or more, not 2"):
         static_torque((changed(source, "pressure_difference", two),))
 
 

@@ -120,7 +120,10 @@ def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: 
     apart = dataclasses.replace(experiment, scenario=with_numbers(experiment.scenario, start))
     found = fitted(apart, INERTIA, FreeParameter("supply.dorsiflexion_pressure"))
     assert found.estimate("supply.dorsiflexion_pressure").verdict == "not identifiable"
-    said = "the recordings are hardly sensitive to it; fix it, give a prior, or make another recording"
+    said = (
+        "the recordings are hardly sensitive to this parameter; fix this parameter, give a prior, or make another "
+        "recording"
+    )
     assert found.estimate("supply.dorsiflexion_pressure").explanation == said
     assert found.estimate("foot_plate.inertia").verdict == "identified"
 

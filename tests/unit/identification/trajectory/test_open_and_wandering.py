@@ -67,7 +67,7 @@ def test_what_wanders_by_more_than_the_zero_of_its_sensor_may_be_off_holds_for_t
     found = wandering_by(experiment, 6000.0)
 
     assert "the residual of pressure_1 drifts by" in found.conflict
-    assert "its zero by 0.3 psi at most; the model is incomplete" in found.conflict
+    assert "the zero of its sensor by at most 0.3 psi; the model is incomplete" in found.conflict
     assert found.estimates[0].verdict == "holds for this model only"
 
 

@@ -41,11 +41,11 @@ def test_bounds_and_scale_follow_from_the_declaration(experiment: FittedExperime
     [
         (FreeParameter("foot_plate.inertia", low=1.0, high=2.0), "must lie between the bounds"),
         (FreeParameter("foot_plate.inertia", high=5.0e3), "exceed the allowed range"),
-        (FreeParameter("actuator.torque_constant", start=0.0, low=0.0), "a start at 0 needs bounds"),
+        (FreeParameter("actuator.torque_constant", start=0.0, low=0.0), "start = 0 needs bounds"),
         (FreeParameter("foot_plate.inertia", start=float("nan")), "must be finite"),
         (FreeParameter("foot_plate.inertia", deviation=0.0), "standard deviation of a prior"),
         (FreeParameter("foot_plate.inertia", recordings=("stop",)), "did you mean 'step'"),
-        (FreeParameter("foot_plate.weight"), "no number 'foot_plate.weight'"),
+        (FreeParameter("foot_plate.weight"), "'foot_plate.weight' cannot be fitted"),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_refused(
@@ -185,7 +185,7 @@ def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: Fitted
     clipped = np.minimum(values + 300.0 * random.standard_normal(values.size), level)
     recording = experiment.recording.with_channel("pressure_1", clipped, "Pa")
     without = dataclasses.replace(experiment, recording=recording, noise={"angle": 1e-3, "pressure_2": 500.0})
-    with pytest.raises(IdentificationError, match=r"exactly its largest value for .* its sensor is at its limit"):
+    with pytest.raises(IdentificationError, match=r"exactly its largest value for .* the sensor is at its limit"):
         prepare(without, {})
 
 
@@ -196,5 +196,5 @@ def test_a_channel_that_is_at_its_limit_from_the_third_sample_on_is_not_one_with
     values[2:] = values.max() + 1e5
     recording = experiment.recording.with_channel("pressure_1", values, "Pa")
     without = dataclasses.replace(experiment, recording=recording, noise={"angle": 1e-3, "pressure_2": 500.0})
-    with pytest.raises(IdentificationError, match=r"exactly its largest value for .* its sensor is at its limit"):
+    with pytest.raises(IdentificationError, match=r"exactly its largest value for .* the sensor is at its limit"):
         prepare(without, {})

@@ -112,7 +112,7 @@ def test_along_a_recorded_angle_a_wrong_inertia_does_not_matter(
     path = "valves.proportional.discharge_coefficient"
     assert fit(TrajectoryProblem((FLOW,), (led,))).values[path] == pytest.approx(0.113, rel=5e-3)
     assert abs(fit(TrajectoryProblem((FLOW,), (free,))).values[path] / 0.113 - 1.0) > 0.03
-    with pytest.raises(IdentificationError, match="is prescribed by the recording, so it cannot be compared"):
+    with pytest.raises(IdentificationError, match="the recording prescribes the angle, which cannot be compared"):
         TrajectoryProblem((FLOW,), (dataclasses.replace(free, inputs=("angle",)),))
 
 
@@ -132,7 +132,7 @@ def test_the_same_recording_in_two_experiments_is_refused_and_two_parts_of_it_ar
 
 def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: FittedExperiment) -> None:
     followed = with_input(experiment, "supply_pressure", np.full(len(experiment.recording), 4.0e5), "Pa")
-    with pytest.raises(IdentificationError, match="follows the recorded 'supply_pressure'"):
+    with pytest.raises(IdentificationError, match="uses the recorded 'supply_pressure'"):
         TrajectoryProblem((FreeParameter("supply.pressure"),), (followed,))
 
 

@@ -73,4 +73,7 @@ def test_default_of_a_gas_must_be_there_for_every_gas() -> None:
         effect_problem(replace(EFFECT, of_gas=of_two)) == "of_gas names 'coefficient', which has no default for N2, He"
     )
     of_none = {"viscosity": SECOND_VIRIAL}
-    assert effect_problem(replace(EFFECT, of_gas=of_none)) == "of_gas names 'viscosity', which is no quantity"
+    assert (
+        effect_problem(replace(EFFECT, of_gas=of_none))
+        == "of_gas names 'viscosity', which is not a quantity of the effect"
+    )

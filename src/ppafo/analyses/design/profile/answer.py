@@ -56,16 +56,16 @@ _ORIGINS = {
     "synthetic": "synthetic, not measured",
 }
 _CAPTION = (
-    "Every valve over supply pressure, each dot with the gains that use least gas within the limit; rings are the "
-    "chosen pressures."
+    "Every valve over supply pressure; each dot has the gains that use least gas within the error limit. Rings mark "
+    "the chosen pressures."
 )
 _READING = (
-    "The pressure is the one with the lightest bottle, of these the lowest; the lowest pressure that keeps the "
-    "error limit stands beside it.",
-    "Error margin: how much smaller the RMS error is than its limit. Torque margin: how much more torque the "
-    "pressure can hold than the profile requires; below 0 the peak is cut off, as far as the error limit allows. "
-    "Flow margin: how much smaller the opening might be if the gauge pressure were a tenth higher. Gas margin: how "
-    "much more the bottle has than is used, the reserve included.",
+    "The chosen pressure is the lowest with which the lightest bottle suffices; the table also has the lowest pressure "
+    "that keeps the error limit.",
+    "Error margin: RMS error below its limit. Torque margin: torque at this pressure above the largest torque of the "
+    "profile; below 0 the peak is cut off, as far as the error limit allows. "
+    "Flow margin: possible reduction of the opening at a gauge pressure 10 % higher. Gas margin: usable gas in the "
+    "bottle above the gas used, reserve included.",
 )
 
 
@@ -297,8 +297,8 @@ def _remarks(sizing: Sizing) -> tuple[str, ...]:
     failed = sum(sizing.failures.values())
     failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
     noisy = (
-        f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; its error is the "
-        "largest of them, its gas the mean"
+        f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; the error is the "
+        "largest over the streams, the gas the mean"
     )
     return (
         suggestion_sentence(sizing),
@@ -358,7 +358,7 @@ def suggestion_sentence(sizing: Sizing) -> str:
     choice = sizing.choice
     if choice is None:
         if any(sized.works for sized in sizing.valves):
-            return "no suggestion: valves keep the limit, but no bottle is large enough for the use"
+            return "no suggestion: valves keep the error limit, but no bottle holds enough gas for the requested use"
         return "no suggestion: no valve keeps the error limit at any of the pressures"
     bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
     cut = 0.0 if choice.margins is None else -choice.margins.torque

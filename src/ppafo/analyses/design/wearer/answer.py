@@ -35,12 +35,12 @@ _HEAD = (
 )
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _READING = (
-    "Every pair of valve and actuator of the catalogue walks a few strides at the pressure. Those whose mean stride "
-    "reaches the torque (95 % of it at least) with the toes above the ground walk on bottles, lightest first, until "
-    "one lasts; that walk is shown. Dead volumes, friction and sensors are the walk's; dorsiflexion has nine tenths of "
-    "the gauge pressure.",
-    "Power of the valve is what its coils, or its spool in proportion to the stroke, take over the walk; drivers lose "
-    "nothing. A shut-off valve is open as long as the device helps.",
+    "Every pair of valve and actuator in the catalogue is simulated for a few strides at this pressure. Pairs with at "
+    "least 95 % of the torque in the mean stride and the toes above the ground are simulated on bottles, lightest "
+    "first, until a bottle lasts; that walk is shown. Dead volumes, friction and sensors come from the walk file; the "
+    "dorsiflexion chamber is supplied with 90 % of the gauge pressure.",
+    "Valve power is the mean power of the coils, or of the spool in proportion to its stroke; driver losses are "
+    "neglected. A shut-off valve is open as long as the device helps.",
 )
 
 
@@ -71,7 +71,12 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
             f"the lowest height of the toes in the healthy gait itself is {CLEARANCE.text(sizing.healthy_toes)}"
         )
     sections = (
-        (finding.Section(remarks=("No device in the catalogue can do this. Alternatives:", *sizing.instead)), table)
+        (
+            finding.Section(
+                remarks=("No device in the catalogue meets these requirements. Alternatives:", *sizing.instead)
+            ),
+            table,
+        )
         if device is None
         else (*_sections(requirements, device), table, part_titles(sizing.parts))
     )

@@ -87,15 +87,15 @@ def size_for_wearer(
         alternative.text(requirements) for alternative in alternatives_to(requirements, tried, shelf, report)
     )
     if not tried:
-        instead = ("no pair of valve and actuator is rated for this pressure, or none assists: give another pressure",)
+        instead = ("no pair of valve and actuator is rated for this pressure and assists; change the pressure",)
     elif not instead:
         torque = requirements.torque
         nearest = max(tried, key=lambda pair: (min(pair.torque, REACHED * torque), pair.toes))
         instead = (
             f"none: of the pairs tried {nearest.valve.name} with {nearest.actuator.name} comes nearest, with "
-            f"{TORQUE.text(nearest.torque)} and toes {CLEARANCE.text(nearest.toes)} over the ground; give "
-            f"{argument_text('catalogue')} "
-            "with an actuator of more torque per pressure, from 'ppafo new parts my-parts --from parts'",
+            f"{TORQUE.text(nearest.torque)} and toes {CLEARANCE.text(nearest.toes)} over the ground; copy the parts "
+            "with 'ppafo new parts my-parts --from parts', add an actuator of more torque per pressure and give "
+            f"{argument_text('catalogue')}",
         )
     return replace(sized, instead=instead)
 
@@ -105,7 +105,7 @@ def _device(
 ) -> SizedDevice:
     """Assemble the device of a pair and a bottle, with regulators, shut-off valve, processor and battery."""
     life = endurance_of_walk(walked)
-    assert life is not None, "a walk on a bottle that has a torque took gas"
+    assert life is not None, "a walk with torque has used gas of its bottle"
     processor, cell = shelf.part("processors", _PROCESSOR), shelf.part("batteries", _CELL)
     electrical = electrical_of(
         walked.recording, pair.valve, SHUT_OFF_PARTS["power"], processor, cell, requirements.seconds

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.analyses.design.wearer import alternatives
 from ppafo.analyses.design.wearer import available_parts as shelves
 from ppafo.analyses.design.wearer import solve as solving
 from ppafo.analyses.design.wearer.alternatives import alternatives_to
@@ -36,26 +37,26 @@ PSI = 6894.757
 
 @cache
 def few() -> Catalogue:
-    """Two valves and the paper's actuator, with a small and a large bottle, so that the search is short.
+    """Two valves and the paper's actuator, with two bottles that are soon empty, so that the search is short.
 
     The pair is lighter, and drags the toes.
     """
     whole = load_catalogue()
-    kept = {
-        "valves": ("festo-vovg-5v-pair", "festo-mpye-5-1-8-lf-010-b"),
-        "actuators": ("smc-crb2bw40-90d",),
-        "bottles": ("co2-3_5oz", "pipeline-jacpac-9oz"),
-    }
+    kept = {"valves": ("festo-vovg-5v-pair", "festo-mpye-5-1-8-lf-010-b"), "actuators": ("smc-crb2bw40-90d",)}
     groups = {
         group: {name: part for name, part in parts.items() if group not in kept or name in kept[group]}
         for group, parts in whole.groups.items()
     }
+    groups["bottles"] = {name: bottle_part(name)[0] for name in ("co2-16g", "co2-25g")}
     return Catalogue(whole.file, whole.name, whole.title, whole.notes, groups)
 
 
 @pytest.fixture
 def little(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few parts, and few pressures for alternatives."""
     monkeypatch.setattr(shelves, "load_catalogue", lambda _catalogue="parts": few())
+    monkeypatch.setattr(alternatives, "_LESS_PRESSURE", (0.9, 0.8, 0.7))
+    monkeypatch.setattr(alternatives, "_MORE_PRESSURE", (1.25, 1.8))
 
 
 def sized(torque: float, minutes: float, pressure: float = 50.0, toes: float | None = None) -> WearerSizing:
@@ -69,12 +70,12 @@ def sized(torque: float, minutes: float, pressure: float = 50.0, toes: float | N
 def test_what_is_suggested_is_the_walk_that_is_shown_and_its_toes_clear_the_ground(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = sized(2.5, 1.0)
+    found = sized(2.5, 0.15)
     device = found.device
     assert device is not None
     assert device.torque >= 0.9 * 2.5
-    assert device.life.discharge.walking_time >= 60.0
-    assert device.bottle.name == "co2-3_5oz", "the lightest bottle that lasts"
+    assert device.life.discharge.walking_time >= 9.0
+    assert device.bottle.name == "co2-16g", "the lightest bottle that lasts"
     assert device.tried.valve.name == "festo-mpye-5-1-8-lf-010-b", "the lighter pair drags the toes"
     assert [one.toes < 0.0 for one in found.tried if one.valve.name == "festo-vovg-5v-pair"] == [True]
     assert device.toes >= found.requirements.clearance == pytest.approx(found.healthy_toes, abs=1e-4)
@@ -104,7 +105,7 @@ def test_toes_may_be_asked_to_drag_no_more_than_the_ground_and_no_device_lifts_t
     high = sized(2.5, 0.2, toes=0.05)
     assert high.device is None
     said = text_of(finding_of(high))
-    assert "No device in the catalogue can do this. Alternatives:" in said
+    assert "No device in the catalogue meets these requirements. Alternatives:" in said
     (lower,) = (line for line in high.instead if line.startswith("lower toes: "))
     offered = float(re.search(r"toes (\S+) mm", lower)[1])  # type: ignore[index]
     again = sized(2.5, 0.2, toes=1e-3 * offered).device
@@ -117,7 +118,7 @@ OFFER = r": (\S+) N m at (\S+) psi_g for (\S+) min, toes (\S+) mm over the groun
 
 @pytest.mark.usefixtures("little")
 def test_where_nothing_does_it_what_is_offered_is_granted_when_it_is_asked_for() -> None:
-    too_strong, too_long = sized(5.0, 8.0), sized(2.5, 30.0)
+    too_strong, too_long = sized(5.0, 0.6), sized(2.5, 2.0)
     for found in (too_strong, too_long):
         assert found.device is None
         assert not finding_of(found).passed
@@ -136,12 +137,14 @@ def test_where_nothing_does_it_what_is_offered_is_granted_when_it_is_asked_for()
     assert again.life.discharge.walking_time >= minutes * 60.0
 
 
-def test_a_pressure_that_wastes_gas_is_answered_with_less_pressure_and_that_is_granted() -> None:
+def test_a_pressure_that_wastes_gas_is_answered_with_less_pressure_and_that_is_granted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(alternatives, "_LESS_PRESSURE", (0.7, 0.5))
     whole = shelf_of("parts")
     valve, actuator = whole.groups["valves"]["enfield-ls-v05s"], whole.groups["actuators"]["smc-crb2bw40-90d"]
-    bottles = {"co2-3_5oz": whole.groups["bottles"]["co2-3_5oz"]}
-    shelf = replace(whole, groups={**whole.groups, "bottles": bottles})
-    requirements = DesignRequirements(72.5, 1.75, 1.2, 101325.0 + 80.0 * PSI, 144.0, 0.001)
+    shelf = replace(whole, groups={**whole.groups, "bottles": {"co2-25g": bottle_part("co2-25g")[0]}})
+    requirements = DesignRequirements(72.5, 1.75, 1.2, 101325.0 + 80.0 * PSI, 36.0, 0.001)
     tried = few_strides(requirements, valve, actuator)
     assert tried[0].has(requirements)
     assert lightest_on_bottle(requirements, tried, shelf, report_nothing) is None
@@ -235,7 +238,7 @@ def test_a_device_for_a_child_is_found_once_the_stature_that_is_asked_for_is_giv
     finding = ppafo.design(**wanted, stature=stature)
     assert isinstance(finding.found, WearerSizing)
     assert finding.found.device is not None
-    assert ("extrapolated here: set measured segments" in text_of(finding)) == (stature < 1.45)
+    assert ("extrapolated here: give the measured segments" in text_of(finding)) == (stature < 1.45)
 
 
 @pytest.mark.usefixtures("little")
@@ -244,7 +247,7 @@ def test_a_gait_of_the_wearer_is_walked_on_and_part_of_the_command_to_paste(tmp_
     gait = tmp_path / "child's gait.toml"
     gait.write_text(text.replace('name = "falisse2019-subject1"', 'name = "child"'))
     found = ppafo.design(
-        mass=62.0, stature=1.7, torque=2.5, pressure=4.5e5, minutes=0.2, bottle="paper-co2-9oz", gait=gait
+        mass=62.0, stature=1.7, torque=2.5, pressure=4.5e5, minutes=0.2, bottle="co2-25g", gait=gait
     ).found
     assert isinstance(found, WearerSizing)
     assert found.device is not None
@@ -264,7 +267,7 @@ def test_without_any_alternative_the_nearest_pair_and_what_to_do_are_said(
     finding = ppafo.design(**wanted, catalogue=file)
     assert not finding.passed
     assert "none: of the pairs tried mine with " in text_of(finding)
-    assert "give catalogue with an actuator of more torque per pressure" in text_of(finding)
+    assert "add an actuator of more torque per pressure and give catalogue" in text_of(finding)
 
 
 PARTS = """
@@ -296,7 +299,7 @@ source = "scales"
 maker = "me"
 model = "cartridge"
 [bottles.small.content]
-value = 120.0
+value = 50.0
 unit = "g"
 origin = "measured"
 source = "scales"
@@ -332,7 +335,7 @@ def test_a_device_of_parts_of_one_s_own_walks_on_a_bottle_of_one_s_own(
     assert "--bottle mine.toml/small " in device.command
     supplied = walk_of(device.walked.scenario).bottle
     assert supplied is not None
-    assert supplied.bottle.mass == pytest.approx(0.12)
+    assert supplied.bottle.mass == pytest.approx(0.05)
     assert "without the valve, whose power the catalogue does not state" in text_of(finding_of(found))
 
 
