@@ -110,7 +110,7 @@ def _overrides_of(table: Mapping[Any, Any], section: str) -> Iterator[str]:
             # A pair of number and unit is to be written as one text.
             is_pair = isinstance(scalar, list | tuple) and len(scalar) == 2 and isinstance(scalar[1], str)
             example = f"'{scalar[0]} {scalar[1]}'" if is_pair else "'12.6 mm^2'"
-            requirement = f"must be a finite number in SI units, a flag or a text such as {example}"
+            requirement = f"must be a finite number in SI units, True, False or a text such as {example}"
             raise ArgumentError(f"{path} = {one_line(repr(value))}: {requirement}")
 
 

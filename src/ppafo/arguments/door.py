@@ -74,7 +74,7 @@ def _values(
     for name, value in by_name.items():
         if name not in parameters:
             other = _ANSWERED_BY.get((function, name))
-            hint = f": ppafo.{other} has it" if other else nearest_name(name, parameters)
+            hint = f"; use ppafo.{other}" if other else nearest_name(name, parameters)
             raise ArgumentError(f"{function}() has no argument '{name}'{hint}; available: {', '.join(parameters)}")
         if name in values:
             raise ArgumentError(f"{function}(): {name} is given twice, by position and by name")

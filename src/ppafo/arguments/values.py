@@ -173,7 +173,7 @@ def accepted_values(annotation: Any) -> AcceptedValues:
 def _of_class(kind: type, inner: tuple[Any, ...]) -> AcceptedValues:
     if issubclass(kind, Mapping):
         if inner[1] is Any:
-            return _single("a dictionary with texts as its keys", taken_document)
+            return _single("a dictionary with strings as keys", taken_document)
         return _mapping(accepted_values(inner[1]))
     if inner and _is_iterable(kind):
         return _several(accepted_values(inner[0]))
@@ -263,7 +263,7 @@ def _either(kinds: list[AcceptedValues], allows_none: bool) -> AcceptedValues:
 def _at_hand(what: str, value: Any) -> str:
     """Return a hint to pass an attribute of the value, such as ``result.recording``; empty if none is accepted."""
     names = [name for name in ("recording", "scenario") if f"a {name.capitalize()}" in what and hasattr(value, name)]
-    return f"; its '.{names[0]}' is one" if names else ""
+    return f"; pass its attribute '{names[0]}'" if names else ""
 
 
 def _in_words(kinds: list[str]) -> str:

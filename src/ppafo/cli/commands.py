@@ -186,7 +186,7 @@ def check_words(words: list[str]) -> None:
     if isinstance(command, CommandGroup) and "-h" not in words and "--help" not in words:
         actions, action = list(command.actions), named[1] if len(named) > 1 else None
         if action is None and "--list" in words and "list" in actions:
-            raise UsageError(f"{word}: there is no option '--list'; 'ppafo {word} list' shows what there is")
+            raise UsageError(f"{word}: there is no option '--list'; use 'ppafo {word} list'")
         if action is None:
             raise UsageError(f"{word}: give one of {', '.join(actions)}; see 'ppafo {word} --help'")
         if action not in actions:

@@ -76,7 +76,7 @@ def doctor(
         others = [name for name in is_equal if not is_equal[name]]
         compiler = compilers_to_try()[0].name
         lines = [f"bits: {len(is_equal) - len(others)} of {len(is_equal)} runs have the recorded bits ({compiler})"]
-        lines += [f"  {name}: other bits; give its scenario, this computer and compiler in a report" for name in others]
+        lines += [f"  {name}: different bits; please report scenario, computer and compiler" for name in others]
         code = EXIT_CHECK_FAILED if others else EXIT_GOOD
         return CommandOutput("\n".join(lines), {"compiler": compiler, "same_bits": is_equal}, "bits", code)
     folder = cache_folder()

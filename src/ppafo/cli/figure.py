@@ -49,7 +49,7 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
         # Not every command is a function of the package, which no module imports.
         if stems and hasattr(sys.modules["ppafo"], command):
             call = f"ppafo.{command}(...).plot({stems[0]!r}, width='84 mm').savefig('{stems[0]}.pdf')"
-            again = f"; for another form or width, in Python with the arguments of the command: {call}"
+            again = f"; for another format or width, use Python with the arguments of the command: {call}"
         if out is not None or width is not None:
             given = f"--width {1e3 * width:g} mm" if out is None and width is not None else f"--out {out}"
             raise DataError(

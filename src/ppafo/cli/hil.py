@@ -67,9 +67,9 @@ def hil(
             plant, decided = plant_of(chosen, rate), chosen.controller.period
             if plant.period > decided * (1.0 + _SAME_PERIOD):
                 remark = (
-                    f"--rate {rate}: a sample every {plant.period * 1.0e3:.4g} ms, for a controller of the scenario "
-                    f"that decides every {decided * 1.0e3:.4g} ms; it has the wrong gains unless it was exported for "
-                    f"this rate: give --set controller.rate={rate}Hz here and to 'ppafo export controller'"
+                    f"--rate {rate}: the sample period of {plant.period * 1.0e3:.4g} ms exceeds the controller period "
+                    f"of {decided * 1.0e3:.4g} ms in the scenario, so the gains are wrong unless the controller was "
+                    f"exported for this rate: give --set controller.rate={rate}Hz here and to 'ppafo export controller'"
                 )
                 print(f"ppafo: {remark}", file=sys.stderr, flush=True)
             output.tell(f"calling the controller at {port}")

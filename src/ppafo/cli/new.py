@@ -100,7 +100,7 @@ def new(
     if kind == EXAMPLE:
         if source is not None or (name is None and out is not None):
             raise DataError(
-                "--from: an example has no base file; remove it"
+                "--from is not allowed for an example; remove --from"
                 if source
                 else "--out: needs the NAME of the example to write"
             )

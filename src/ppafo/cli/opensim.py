@@ -50,8 +50,8 @@ def export_opensim(
     of_walk = {"--gait": gait, "--minutes": minutes, "--strikes": strikes, "--set": overrides or None}
     for option, value in (of_walk if is_recording else {"--body-mass": body_mass}).items():
         if value is not None:
-            other = "a walk, not a recording" if is_recording else "a recording; a walk knows its wearer"
-            raise DataError(f"{option}: is for {other}")
+            other = "a walk, not for a recording" if is_recording else "a recording; a walk states the body mass"
+            raise DataError(f"{option} is allowed only for {other}")
     from ppafo.exports.opensim import files_of_walk
     from ppafo.storage.opensim import opensim_bytes
     from ppafo.storage.opensim_names import opensim_recording
@@ -69,7 +69,11 @@ def export_opensim(
 
     def following(_: Sequence[str]) -> str:
         file = shlex.quote(str(out / ("recording.sto" if is_recording else "device_torque.sto")))
-        left_out = f"\nleft out: {', '.join(missing)}, which are per body mass: give --body-mass" if missing else ""
+        left_out = (
+            f"\nleft out: {', '.join(missing)}, which are per body mass; to export them, give --body-mass"
+            if missing
+            else ""
+        )
         return f"load {file} in OpenSim; its header says units and signs{left_out}"
 
     return output.export(out, COMMAND, make, following)

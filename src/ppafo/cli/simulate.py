@@ -178,7 +178,7 @@ def finding_of(report: _RunReport) -> "Finding[None]":
             Section(
                 "Over time",
                 name="figure",
-                caption="What the device does over time. Pressures count from the atmosphere.",
+                caption="Channels of the device over time; pressures are gauge pressures.",
                 draw=result.plot,
             ),
             Section() if check is None else Section("Repeatability", code=repr(check)),

@@ -19,7 +19,7 @@ QUANTITY = r"^\s*[+-]?(\d|\.\d)"
 """Pattern of the beginning of a number with unit."""
 _TEXT_RULES = {
     NAME: "must consist of lower-case letters, digits, '-' and '_'",
-    LABEL: "must be a line of text without spaces around it",
+    LABEL: "must be one line of text without leading or trailing spaces",
     QUANTITY: "does not start with a number; write for example '1.3 m/s'",
 }
 """Message endings for a text that does not match a pattern, by pattern."""

@@ -169,9 +169,7 @@ class Channel:
         object.__setattr__(self, "values", _read_only(self.values))
         if self.between is not None and self.between not in BETWEEN:
             hint = nearest_name(str(self.between), BETWEEN)
-            raise DataError(
-                f"between = {self.between!r}: a channel is {' or '.join(BETWEEN)} between its samples{hint}"
-            )
+            raise DataError(f"between = {self.between!r} must be {' or '.join(map(repr, BETWEEN))}{hint}")
 
     def __eq__(self, other: object) -> bool:
         return (
@@ -208,7 +206,7 @@ class Recording:
         object.__setattr__(self, "time", _read_only(self.time))
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
         if not self.label or not self.label.isprintable():
-            raise DataError(f"the label of a recording is one line of text, not {self.label!r}")
+            raise DataError(f"the label of a recording must be one line of text, not {self.label!r}")
         recording_kind(self.kind)
         for name, channel in self.channels.items():
             if not isinstance(channel, Channel):
@@ -329,7 +327,7 @@ class Recording:
         wanted = np.asarray(times, dtype=np.float64)
         if wanted.size and (wanted.min() < self.time[0] or wanted.max() > self.time[-1]):
             raise DataError(
-                f"{self.label}: nothing is known from {wanted.min():g} s to {wanted.max():g} s; {_span(self)}"
+                f"{self.label}: cannot be resampled from {wanted.min():g} s to {wanted.max():g} s; {_span(self)}"
             )
         moved = {
             name: Channel(between_samples(self, name, wanted), channel.unit, channel.between, channel.stated)
@@ -361,7 +359,7 @@ class Recording:
         from matplotlib.figure import Figure
 
         if not self.channels:
-            raise DataError(f"{self.label}: has no channel to draw")
+            raise DataError(f"{self.label}: has no channels to draw")
         table = self.to_dataframe(units)
         figure = Figure((5.4, 1.2 + 1.2 * len(self.names)), layout="constrained")
         panels = figure.subplots(len(self.names), sharex=True, squeeze=False)[:, 0]
@@ -414,7 +412,7 @@ def _check_channel(recording: Recording, name: str) -> None:
     # Functions of a recording take its numbers as they are: a known name says the unit as well.
     if name in CHANNELS and channel.unit != CHANNELS[name].unit:
         raise DataError(
-            f"{recording.label}: channel '{name}' is in '{channel.unit}', it is always kept in '{CHANNELS[name].unit}'"
+            f"{recording.label}: channel '{name}' must be in '{CHANNELS[name].unit}', not in '{channel.unit}'"
         )
 
 
@@ -429,16 +427,16 @@ def _read_only(values: ArrayLike) -> Floats:
     given = np.ma.asanyarray(values) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
     # NumPy makes numbers of times and texts, and of complex ones their real part.
     if given.dtype.kind not in "biufO":
-        raise DataError(f"a channel is a plain list of numbers, not an array of {given.dtype}")
+        raise DataError(f"a channel must be a plain list of numbers, not an array of {given.dtype}")
     try:
         copy = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise DataError(f"a channel is a plain list of numbers: {error}") from error
+        raise DataError(f"a channel must be a plain list of numbers: {error}") from error
     if isinstance(given, np.ma.MaskedArray):
         # A masked value is none, whatever number stands behind the mask.
         copy[np.ma.getmaskarray(given)] = np.nan
     if copy.ndim != 1:
-        raise DataError(f"a channel is a plain list of numbers, not an array of {copy.ndim} dimensions")
+        raise DataError(f"a channel must be a plain list of numbers, not an array of {copy.ndim} dimensions")
     copy.setflags(write=False)
     return copy
 

@@ -76,7 +76,7 @@ DECIMALS = decimal.Context(
 """Decimal context of unit arithmetic, independent of the settings of a host program."""
 PRESSURE = {"[mass]": 1, "[length]": -1, "[time]": -2}
 KINDS = {"g": "gauge pressure", "a": "absolute pressure", "d": "pressure difference"}
-_KIND_BELONGS = "_g, _a and _d belong to a unit of pressure that stands alone, such as psi_g"
+_KIND_BELONGS = "_g, _a and _d are allowed only for a single unit of pressure, such as psi_g"
 
 
 class ParsedUnit(NamedTuple):

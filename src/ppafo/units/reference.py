@@ -111,8 +111,8 @@ def read_unit(unit: str) -> tuple[ParsedUnit, str]:
     if len(gases) != 1:
         example = with_condition(unit, "", "air") if not gases else "L/min (ANR, air)"
         raise UnitError(
-            f"'{unit}' {'does not say the gas' if not gases else 'says two gases'}: write '{example}', or with another "
-            f"of the gases {', '.join(MOLAR_MASSES)}, or a molar mass in kg/mol"
+            f"'{unit}' {'states no gas' if not gases else 'states two gases'}: write '{example}', or use another "
+            f"gas ({', '.join(MOLAR_MASSES)}) or a molar mass in kg/mol"
         )
     word = gases[0]
     molar_mass = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}.get(word.lower())
@@ -130,9 +130,9 @@ def without_condition(unit: str) -> str:
     """Return the message on a volume flow without reference condition and gas, given for a mass flow."""
     named, normal, own = (with_condition(unit, at, "air") for at in ("ANR", "DIN 1343", _EXAMPLE))
     return (
-        f"'{unit}' is a volume flow without its reference condition, by which it is a mass flow: write '{named}' "
-        f"(20 degC, 1 bar), '{normal}' (0 degC, 1.01325 bar) or '{own}', as the data sheet of the meter says, with the "
-        "gas; in a column map at = 'ANR' and gas = 'air'"
+        f"'{unit}' is a volume flow, which is a mass flow only with a reference condition and a gas: write '{named}' "
+        f"(20 degC, 1 bar), '{normal}' (0 degC, 1.01325 bar) or '{own}', as in the data sheet of the meter; in a "
+        "column map give at = 'ANR' and gas = 'air'"
     )
 
 

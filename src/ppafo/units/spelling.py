@@ -142,7 +142,7 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
     if normal and (len(normal) > LONGEST_UNIT or _EXPRESSION.fullmatch(normal) is None):
         below = re.sub(rf"/({FACTOR}(?: {FACTOR})+)", r"/(\1)", normal)
         is_clear = len(normal) <= LONGEST_UNIT and _EXPRESSION.fullmatch(below) is not None
-        example = f"'{below}'" if is_clear else "it like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'"
+        example = f"'{below}'" if is_clear else "a unit like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'"
         raise UnitError(f"{quote(unit)} is not a unit; write {example}")
     spaced = re.sub(r"[A-Za-zµ]+(?![A-Za-zµ]|_[gad])", lambda word: as_product(word[0]) or word[0], normal)
     normal = re.sub(rf"/({FACTOR}(?: {FACTOR})+)", r"/(\1)", spaced) if spaced != normal else normal

@@ -143,9 +143,10 @@ def test_what_is_taken_is_said_once_and_what_is_at_hand_with_it() -> None:
     with pytest.raises(ArgumentError) as refused:
         ppafo.bottle(run)  # type: ignore[arg-type]
     assert str(refused.value) == (
-        "recordings=<Result>: must be a name, a path, a Recording or a WalkResult, or several; its '.recording' is one"
+        "recordings=<Result>: must be a name, a path, a Recording or a WalkResult, or several; "
+        "pass its attribute 'recording'"
     )
-    with pytest.raises(ArgumentError, match=r"; its '\.recording' is one$"):
+    with pytest.raises(ArgumentError, match=r"; pass its attribute 'recording'$"):
         ppafo.evaluate(run)  # type: ignore[arg-type]
 
 

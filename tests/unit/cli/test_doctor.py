@@ -79,7 +79,7 @@ def test_bits_are_compared_with_the_golden_ones_and_another_is_named(
     assert main(["doctor", "--bits"]) == 1
     said = capsys.readouterr().out
     assert "1 of 2 runs" in said
-    assert "swing-foot: other bits" in said
+    assert "swing-foot: different bits" in said
 
 
 @pytest.mark.parametrize("name", doctor.FORMATS)

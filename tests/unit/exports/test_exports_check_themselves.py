@@ -85,5 +85,5 @@ def test_a_unit_for_a_computer_that_cannot_run_here_is_said_to_be_not_compared(
     document = json.loads(capsys.readouterr().out)
     assert tried == [2, 2] * len(compared)
     assert (document["compared"], document["not_run"]) == (compared, not_run)
-    told = f"not run here, and so not compared with Python: the library for {', '.join(not_run)}"
+    told = f"not compared with Python, since they cannot run on this computer: libraries for {', '.join(not_run)}"
     assert said[1:] == ([told] if not_run else [])

@@ -73,8 +73,8 @@ def test_a_recording_is_written_with_what_it_has(tmp_path: Path, capsys: pytest.
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["RECORDING", "--minutes", "1"], "--minutes: is for a walk, not a recording"),
-        (["RECORDING", "--set", "wearer.keeps_gait=1"], "--set: is for a walk, not a recording"),
+        (["RECORDING", "--minutes", "1"], "--minutes is allowed only for a walk, not for a recording"),
+        (["RECORDING", "--set", "wearer.keeps_gait=1"], "--set is allowed only for a walk, not for a recording"),
         (["RECORDING", "--body-mass", "62"], "--body-mass 62: a mass needs a unit: '62 g' or '62 kg'"),
     ],
 )

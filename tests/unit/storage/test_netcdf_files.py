@@ -99,7 +99,7 @@ def test_an_unknown_kind_is_refused_by_file_with_the_nearest(tmp_path: Path) -> 
 
 
 def test_a_wrong_unit_is_refused_by_file_and_channel(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"bench\.nc: .*channel 'angle' is in 'deg', it is always kept in 'rad'"):
+    with pytest.raises(DataError, match=r"bench\.nc: .*channel 'angle' must be in 'rad', not in 'deg'"):
         read_netcdf(changed(tmp_path / "bench.nc", "angle", "deg"))
     with pytest.raises(DataError, match=r"'time' must be in 's', not in 'ms'"):
         read_netcdf(changed(tmp_path / "bench.nc", "time", "ms"))

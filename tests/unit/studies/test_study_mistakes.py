@@ -230,7 +230,7 @@ def test_a_configuration_has_any_name_that_people_read(name: str, small: Any) ->
 @pytest.mark.parametrize("name", ["", " a", "a ", "a\nb", "a\x07"])
 def test_the_name_of_a_configuration_is_a_line_of_text(name: str, small: Any) -> None:
     small["configurations"][1]["name"] = name
-    assert "must be a line of text without spaces around it" in refused(small)
+    assert "must be one line of text without leading or trailing spaces" in refused(small)
 
 
 def test_configurations_have_names_of_their_own(small: Any) -> None:

@@ -89,8 +89,10 @@ def export_fmu(
     not_run = [name for name in chosen if name not in compared]
     lines = [said.text]
     if not_run:
-        lines.append(f"not run here, and so not compared with Python: the library for {', '.join(not_run)}")
+        lines.append(
+            f"not compared with Python, since they cannot run on this computer: libraries for {', '.join(not_run)}"
+        )
     elif not compared:
-        lines.append("not run here, and so not compared with Python: a unit of sources alone")
+        lines.append("not compared with Python, since an FMU of sources only cannot run")
     document = {**said.document, "compared": compared, "not_run": not_run}
     return replace(said, text="\n".join(lines), document=document)

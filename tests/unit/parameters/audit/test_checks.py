@@ -323,5 +323,5 @@ def test_the_stroke_of_a_cylinder_between_its_stops_is_compared_with_a_data_shee
     for apart, degrees in zip(ends, (20.0, 130.0), strict=True):
         between = math.acos((0.025**2 + 0.2**2 - apart**2) / (2.0 * 0.025 * 0.2))
         assert math.degrees(between) - degrees == pytest.approx(15.0)
-    assert f"runs {1e3 * (ends[1] - ends[0]):.4g} mm" in found.title
+    assert f"between the stops is {1e3 * (ends[1] - ends[0]):.4g} mm" in found.title
     assert "stroke" not in findings()
