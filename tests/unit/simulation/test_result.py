@@ -132,11 +132,13 @@ def test_a_metric_that_is_not_there_is_answered_with_the_nearest(name: str, near
 def test_a_run_that_is_useless_says_so_where_it_is_printed() -> None:
     good = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5})
     assert good.warnings == ()
-    assert str(good).splitlines()[:3] == ["torque-task-proportional: completed", good.following, ""]
+    changed = "values changed: run.duration=0.5 s"
+    assert str(good).splitlines()[:4] == ["torque-task-proportional: completed", good.following, changed, ""]
     wild = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5, "controller.proportional_gain": 40.0})
     (warning,) = wild.warnings
     assert "the torque loop oscillates" in warning
-    assert str(wild).splitlines()[:3] == ["torque-task-proportional: completed", warning, ""]
+    changed += ", controller.proportional_gain=40 1/(N m)"
+    assert str(wild).splitlines()[:4] == ["torque-task-proportional: completed", warning, changed, ""]
 
 
 def test_a_run_that_follows_its_reference_says_so_in_its_second_line() -> None:
