@@ -78,7 +78,7 @@ def test_a_set_with_one_chamber_refuses_the_numbers_of_another(tmp_path: Path) -
 
 def test_a_second_chamber_takes_no_pressure_at_the_start() -> None:
     for text in ("20 psi_g", "supply"):
-        with pytest.raises(ScenarioError, match=r"one chamber.*leave it out"):
+        with pytest.raises(ScenarioError, match=r"one chamber.*omit this key"):
             ppafo.load_scenario("torque-task-proportional", [f"device.set={BLADDER}", f"initial.pressure_2={text}"])
 
 

@@ -77,7 +77,7 @@ def test_an_angle_slightly_beyond_a_stop_is_the_stop_and_one_far_beyond_is_refus
     device = load_device("ppafo2011")
     lowest = device.actuator.angle_min
     assert between_stops(np.array([lowest - 0.01]), device, "bench.csv").tolist() == [lowest]
-    with pytest.raises(DataError, match=r"bench\.csv: 'angle' is .* beyond the stops of ppafo2011.* from another zero"):
+    with pytest.raises(DataError, match=r"bench\.csv: 'angle' is .* beyond the stops of ppafo2011.* another zero"):
         between_stops(np.array([device.actuator.angle_max + 1.0]), device, "bench.csv")
 
 

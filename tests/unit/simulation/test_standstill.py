@@ -42,7 +42,7 @@ def test_loops_that_move_and_those_that_want_nothing_are_left_alone() -> None:
 @pytest.mark.parametrize(
     ("overrides", "said"),
     [
-        (("controller.proportional_gain=0 1/Pa", "controller.integral_gain=0 1/(Pa s)"), "commands nothing"),
+        (("controller.proportional_gain=0 1/Pa", "controller.integral_gain=0 1/(Pa s)"), "the command stays 0"),
         (
             (
                 "controller.proportional_gain=1e-8 1/Pa",

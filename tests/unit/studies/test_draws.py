@@ -98,7 +98,7 @@ def test_a_grid_has_no_probability() -> None:
 
 
 def test_a_study_that_is_loaded_takes_no_overrides() -> None:
-    with pytest.raises(StudyError, match="takes no overrides"):
+    with pytest.raises(StudyError, match="accepts no overrides"):
         study_of(load_study(study()), ["valve.area=11 mm^2"])
 
 

@@ -158,7 +158,7 @@ def test_a_valve_that_is_open_at_command_zero_is_told() -> None:
 def test_a_command_in_percent_is_told() -> None:
     source = planted.sweep()
     percent = changed(source, "command", 100.0 * source.recording["command"])
-    with pytest.raises(IdentificationError, match="it goes from -1 to 1"):
+    with pytest.raises(IdentificationError, match="must be from -1 to 1"):
         valve_map((percent,), planted.CO2)
 
 

@@ -66,7 +66,7 @@ def test_several_impulses_share_one_damping() -> None:
 def test_an_unknown_inertia_leaves_only_ratios_and_says_so() -> None:
     result = free_decay((planted.decay(),), rise=0.0)
     assert [item.path.partition(".")[0] for item in result.estimates] == ["free_decay", "free_decay"]
-    assert "inertia is not known" in result.summary
+    assert "inertia is unknown" in result.summary
 
 
 def test_an_uncertain_inertia_widens_what_depends_on_it() -> None:
