@@ -62,7 +62,9 @@ def exchanges(
     """
     atmosphere = device.supply.atmospheric_pressure
     quantities = (ANGLE, "rad"), (EXTERNAL_TORQUE, "N m")
-    measured = [((name,), f"{name} seems", unit, 0.0) for name, unit in quantities if name in names]
+    measured: list[tuple[tuple[str, ...], str, str, float]] = [
+        ((name,), f"{name} seems", unit, 0.0) for name, unit in quantities if name in names
+    ]
     for channels, group, verb in _groups(names):
         measured.append((channels, f"{group} {verb}", "Pa", atmosphere))
         for kind, zero in (("gauge read as absolute", -atmosphere), ("absolute read as gauge", atmosphere)):
@@ -198,7 +200,7 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
         factors = tuple(factor for factor in _FACTORS if quantity.minimum <= factor * value <= quantity.maximum)
         if value > 0.0 and len(factors) > 2:
             words = f"{path} seems to be {{:.3g}} times the model's value"
-            change = partial(lambda path, value, factor: ModelChange(numbers={path: factor * value}), path, value)
+            change = partial(_scaled, path, value)
             usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
             yield CandidateCause(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
@@ -223,6 +225,10 @@ def _unit_of_pressure(device: Device) -> tuple[str, float]:
         return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
+def _scaled(path: str, value: float, factor: float) -> ModelChange:
+    return ModelChange(numbers={path: factor * value})
+
+
 class _UnknownEffect(NamedTuple):
     """Effect that is off in the model and may be present in the device, with one magnitude to fit.
 
@@ -238,29 +244,45 @@ class _UnknownEffect(NamedTuple):
     constant: Mapping[str, float] = MappingProxyType({})
 
 
-_OPENING, _STRIBECK = MappingProxyType({"rise": 0.3}), MappingProxyType({"share": 0.9})
-_VIRIAL = MappingProxyType({"coefficient": SECOND_VIRIAL["CO2"]})
 _EFFECTS = (
-    _UnknownEffect("leak_opening", "the leak seems to open at {:.3g} Pa", ("pressure",), 1e3, 2e5, _OPENING),
     _UnknownEffect(
-        "stribeck", "friction seems to be higher up to {:.2g} rad/s (Stribeck)", ("velocity",), 0.02, 6.0, _STRIBECK
+        name="leak_opening",
+        words="the leak seems to open at {:.3g} Pa",
+        scaled=("pressure",),
+        lowest=1e3,
+        highest=2e5,
+        constant={"rise": 0.3},
     ),
     _UnknownEffect(
-        "seal_friction",
-        "friction seems to grow with pressure by {:.2g} N m/Pa",
-        ("static_per_pressure", "dynamic_per_pressure"),
-        1e-8,
-        5e-6,
+        name="stribeck",
+        words="friction seems to be higher up to {:.2g} rad/s (Stribeck)",
+        scaled=("velocity",),
+        lowest=0.02,
+        highest=6.0,
+        constant={"share": 0.9},
     ),
     _UnknownEffect(
-        "second_virial",
-        "the gas seems to have {:.2g} times the virial coefficient of CO2",
-        ("share",),
-        0.05,
-        8.0,
-        _VIRIAL,
+        name="seal_friction",
+        words="friction seems to grow with pressure by {:.2g} N m/Pa",
+        scaled=("static_per_pressure", "dynamic_per_pressure"),
+        lowest=1e-8,
+        highest=5e-6,
     ),
-    _UnknownEffect("spool_play", "the spool seems to have a play of {:.2g} of full command", ("width",), 0.005, 0.4),
+    _UnknownEffect(
+        name="second_virial",
+        words="the gas seems to have {:.2g} times the virial coefficient of CO2",
+        scaled=("share",),
+        lowest=0.05,
+        highest=8.0,
+        constant={"coefficient": SECOND_VIRIAL["CO2"]},
+    ),
+    _UnknownEffect(
+        name="spool_play",
+        words="the spool seems to have a play of {:.2g} of full command",
+        scaled=("width",),
+        lowest=0.005,
+        highest=0.4,
+    ),
 )
 _SIZES_OF_AN_EFFECT = 5
 """Number of trial magnitudes of an effect, in geometric progression."""
