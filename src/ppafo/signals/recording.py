@@ -427,16 +427,16 @@ def _read_only(values: ArrayLike) -> Floats:
     given = np.ma.asanyarray(values) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
     # NumPy makes numbers of times and texts, and of complex ones their real part.
     if given.dtype.kind not in "biufO":
-        raise DataError(f"a channel must be a plain list of numbers, not an array of {given.dtype}")
+        raise DataError(f"the values of a channel must be numbers, not {given.dtype}")
     try:
         copy = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise DataError(f"a channel must be a plain list of numbers: {error}") from error
+        raise DataError(f"the values of a channel must be numbers: {error}") from error
     if isinstance(given, np.ma.MaskedArray):
         # A masked value is none, whatever number stands behind the mask.
         copy[np.ma.getmaskarray(given)] = np.nan
     if copy.ndim != 1:
-        raise DataError(f"a channel must be a plain list of numbers, not an array of {copy.ndim} dimensions")
+        raise DataError(f"the values of a channel must be one-dimensional, not an array of {copy.ndim} dimensions")
     copy.setflags(write=False)
     return copy
 

@@ -62,8 +62,8 @@ def read_netcdf(path: str | Path) -> Recording:
             required = sum(chunks) + sum(_BYTES_OF_A_FLOAT * item.size for item in variables.values())
             if required > max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * len(content)):
                 raise DataError(
-                    f"requires {required / 1e6:,.0f} MB of memory, but the file has {len(content) / 1e6:.2g} MB; "
-                    f"at most {_MAXIMUM_GROWTH} times the file size is allowed"
+                    f"requires {required / 1e6:,.0f} MB of memory, more than {_MAXIMUM_GROWTH} times the size of the "
+                    f"file, {len(content) / 1e6:.2g} MB; it is probably damaged: write the file again"
                 )
             for name, variable in variables.items():
                 _check_is_whole(name, variable)

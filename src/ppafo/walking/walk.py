@@ -199,8 +199,8 @@ def compare_walks(
     ending = None if worn.supply is None or worn.supply.ending.kind == WALKED else worn.supply.ending
     if ending is not None and ending.time < shortest:
         raise SimulationError(
-            f"{worn.scenario.name} on its bottle: {ending.message}, after {ending.time:.3g} s, which is less than "
-            f"{SHORTEST_STRIDES} strides; use a fuller, larger or warmer bottle"
+            f"{worn.scenario.name}: the walk on its bottle ends after {ending.time:.3g} s, in its first "
+            f"{SHORTEST_STRIDES} strides ({ending.message}); use a fuller, larger or warmer bottle"
         )
     # Without the device for the same time, which a bottle may have shortened.
     duration = minutes if ending is None else float(worn.recording.time[-1]) / 60.0

@@ -119,7 +119,7 @@ def test_the_ankle_moment_that_the_torque_is_a_share_of_is_that_of_the_gait() ->
         (("at_least = 8.5\nat_most = 9.5", ""), "give at_least, at_most or both"),
         (
             ("published = 9.0\n", ""),
-            "give the published result: 'published' with 'unit', 'words', or 'own' for a calculation",
+            "give one published result: 'published' with its 'unit', or 'words', or 'own' (a calculation)",
         ),
         (("at_most = 9.5", 'direction = "less"'), "direction = 'less' also needs at_most"),
         (("at_least = 8.5", 'not_testable = "no"'), "give either computation, or not_testable"),

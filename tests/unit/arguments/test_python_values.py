@@ -142,7 +142,7 @@ def test_a_masked_value_of_a_channel_is_none() -> None:
     with pytest.raises(DataError, match="channel 'angle' is nan at sample 1"):
         ppafo.Recording("x", np.array([0.0, 1.0]), {"angle": Channel(MASKED, "rad")})
     for values in (np.array([1, 2], dtype="m8[s]"), np.array([1j, 2.0]), np.array(["1", "2"]), (x for x in [1.0])):
-        with pytest.raises(DataError, match="a channel must be a plain list of numbers"):
+        with pytest.raises(DataError, match="the values of a channel must be "):
             Channel(values, "rad")  # type: ignore[arg-type]
 
 

@@ -154,7 +154,7 @@ def test_no_more_gas_is_drawn_than_the_bottle_has(share: float) -> None:
     supply = walk_of(load_walk("solenoid-regulators", ["bottle.fill=0.02"], bottle="paper-co2-9oz")).bottle
     assert supply is not None
     state, content = supply.start(), supply.offers_first().content
-    with pytest.raises(SimulationError, match=r"5.1 g: set bottle\.coupling shorter"):
+    with pytest.raises(SimulationError, match=r"5.1 g: reduce bottle\.coupling"):
         advance_supply(TABLE, supply.line, supply.bottle.supply, state, content, share * state.mass, 0.1)
     after = advance_supply(TABLE, supply.line, supply.bottle.supply, state, content, 0.5 * state.mass, 0.1)
     assert after.mass == pytest.approx(0.5 * state.mass)

@@ -62,9 +62,9 @@ def test_fewer_bits_cost_more_and_can_be_a_column() -> None:
 @pytest.mark.parametrize(
     ("overrides", "said"),
     [
-        (("controller.converter_bits=9.5",), r"controller.converter_bits = 9.5: must be whole"),
+        (("controller.converter_bits=9.5",), r"controller.converter_bits = 9.5: must be a whole number"),
         (("controller.converter_bits=15",), "must be at least 8 and at most 14"),
-        (("controller.converter_range=0.4 MPa_a",), "reference: from 0 N m to 6 N m, and the converter shows"),
+        (("controller.converter_range=0.4 MPa_a",), "reference: 0 N m to 6 N m exceeds the range of the converter"),
         (("controller.derivative_gain=20",), "a gain of 'pid_fixed_point' is .* times the largest"),
     ],
 )

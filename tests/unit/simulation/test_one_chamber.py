@@ -46,7 +46,7 @@ def test_many_runs_of_a_single_chamber_find_what_one_finds(bladder: Scenario) ->
     many = run_ensemble(bladder, columns, ("largest_pressure", "gas_leaked"))
     assert many.metrics["largest_pressure"].tolist() == [alone]
     assert np.isnan(many.metrics["gas_leaked"]).all()
-    with pytest.raises(ScenarioError, match="no 'pressure_2' to trace: measured-bladder has one chamber"):
+    with pytest.raises(ScenarioError, match="'pressure_2' cannot be traced: measured-bladder has only one chamber"):
         run_ensemble(bladder, columns, (), ("pressure_2",))
 
 

@@ -149,7 +149,7 @@ def test_what_is_missing_is_named(line: str, missing: str) -> None:
         (
             '"atmosphere"',
             '"atmosphre"',
-            "nor one of supply, dorsiflexion_supply, atmosphere, did you mean 'atmosphere'?",
+            "or one of supply, dorsiflexion_supply, atmosphere, did you mean 'atmosphere'?",
         ),
         ('"6 N m"', '"6 deg"', "a unit like 'N m' is needed"),
         ('"6 N m"', '"1e9 N m"', "must be at least -10000 N m and at most 10000 N m ("),

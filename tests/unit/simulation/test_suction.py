@@ -226,8 +226,8 @@ def test_the_reach_of_a_suction_device_is_the_one_of_a_pressure_device_turned_ro
             "both supplies must be on the same side of the atmosphere",
         ),
         ((*SUCTION, "supply.relieving=false"), "set supply.relieving to true or omit the key"),
-        ((*SUCTION, "controller.kind=pid_feedforward"), "take one of on_off, on_off_dead_zone, pid,"),
-        ((*SUCTION, "controller.kind=pid_fixed_point"), "take one of on_off, on_off_dead_zone, pid,"),
+        ((*SUCTION, "controller.kind=pid_feedforward"), "set controller.kind to one of on_off, on_off_dead_zone, pid,"),
+        ((*SUCTION, "controller.kind=pid_fixed_point"), "set controller.kind to one of on_off, on_off_dead_zone, pid,"),
         ((*SUCTION, "supply_line.plantarflexion.volume=20 mL"), "with its regulators needs a supply above"),
     ],
 )

@@ -93,7 +93,7 @@ def test_a_grid_has_no_probability() -> None:
     document = study(correlations=[], sample=None)
     document["vary"] = [{"path": "valve.area", "kind": "list", "values": ["10 mm^2", "11 mm^2"]}]
     del document["sample"]
-    with pytest.raises(StudyError, match=r"'valve.area' is varied over a grid or list, which has no probability"):
+    with pytest.raises(StudyError, match=r"'valve.area' is varied over a grid or list, which has no probabilities"):
         uncertainty_of(load_study(document))
 
 

@@ -110,7 +110,7 @@ def test_a_study_that_keeps_nothing_is_no_sweep_but_a_study(outputs: Any, small:
     small["outputs"] = outputs
     document = {key: value for key, value in small.items() if value is not None}
     study = load_study(document)
-    with pytest.raises(StudyError, match=r"study 'small': \[outputs\] requests nothing"):
+    with pytest.raises(StudyError, match=r"study 'small': \[outputs\] is empty: give metrics"):
         check_can_be_swept(study)
 
 

@@ -47,17 +47,17 @@ def written(folder: Path, *lines: str) -> Path:
     [
         ([HEADER.replace("pressure_1 [psi_g]", "pressure_1 [psi]"), *ROWS], ["pressure_1 [psi]", "psi_g"]),
         ([HEADER.replace("angle [deg]", "angle [s]"), *ROWS], ["angle [s]", "an angle is needed"]),
-        ([HEADER.replace("angle [deg]", "angel [deg]"), *ROWS], ["'angel' is not known", "did you mean 'angle'"]),
+        ([HEADER.replace("angle [deg]", "angel [deg]"), *ROWS], ["'angel' is unknown", "did you mean 'angle'"]),
         (
             [HEADER.replace("command [-]", "valve [-]"), *ROWS],
             ["no channel 'command'", "available: valve, angle", 'command = { constant = "1" }'],
         ),
         (
             [HEADER, *ROWS[:5], ROWS[5].replace(",1,", ",nan,"), *ROWS[6:]],
-            ["line 7, column 'command [-]': 'nan' is not a number"],
+            ["line 7, column 'command [-]': 'nan' is not a finite number"],
         ),
         ([HEADER, *ROWS[:5], ROWS[4], *ROWS[6:]], ["line 7, column 'time': the clock stands still"]),
-        ([HEADER, *ROWS[:5], "0.0045,1,,3,4", *ROWS[6:]], ["line 7", "not a number"]),
+        ([HEADER, *ROWS[:5], "0.0045,1,,3,4", *ROWS[6:]], ["line 7", "not a finite number"]),
         ([HEADER, ROWS[0]], ["has 1 sample;"]),
         ([HEADER], ["no samples"]),
         ([HEADER, *ROWS[:20], *(f"9{row}" for row in ROWS[20:])], ["gap of 90 s after 0.019 s (sample 20)"]),
@@ -156,7 +156,7 @@ def test_kilopascals_read_as_psi_in_one_channel_are_named_as_that(step: Step) ->
 def test_a_prescribed_vane_needs_its_angle(step: Step, agree: Callable[..., Any]) -> None:
     device, recording = step
     blind = renamed(recording, "angle", "knee_flexion")
-    with pytest.raises(DataError, match=r"no channel 'angle' to prescribe"):
+    with pytest.raises(DataError, match=r"needs a channel 'angle'"):
         agree(blind, device, motion="measured")
 
 

@@ -55,8 +55,8 @@ ON_A_PROPORTIONAL_VALVE = {
 PROFILE = {
     "controller.peak_time=0.9; controller.fall_time=0.2": "the torque would end after the stride",
     "controller.peak_time=0.95": "must be at least 0.1 and at most 0.9 .phase of the peak",
-    "controller.rise_time=0.6": "the torque would rise before the heel strike: controller.peak_time is 0.53",
-    "controller.peak_time=0.3": "the peak would be over before the push-off: controller.push_off_start is 0.4",
+    "controller.rise_time=0.6": "the torque would rise before the heel strike: controller.peak_time = 0.53",
+    "controller.peak_time=0.3": "the peak would be over before the push-off: controller.push_off_start = 0.4",
 }
 
 
@@ -161,7 +161,7 @@ def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("minutes", [0.05, 61.0])
 def test_a_walk_too_short_or_too_long_is_refused(minutes: float) -> None:
-    with pytest.raises(ScenarioError, match=r"must be 0\.087 min \(5 strides\) or more, and at most 60 min"):
+    with pytest.raises(ScenarioError, match=r"must be at least 0\.087 min \(5 strides\) and at most 60 min"):
         walk("solenoid", minutes=minutes)
 
 

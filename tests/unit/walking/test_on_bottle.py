@@ -160,7 +160,7 @@ def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
     assert walk_of(chosen).bottle is not None
     _, course = coupling.run_on_bottle(run, chosen.device, walk_of(chosen).bottle, 1.1, lambda *_: None)
     assert course.ending.kind == "diverged"
-    assert "diverged, and 255 g were left" in course.ending.message
+    assert "diverged with 255 g left" in course.ending.message
     assert course.ending.time == pytest.approx(min(0.25, 0.1 * (good + 1)) if "failure" in wrong else 0.1 * (good + 1))
     assert course.regulated == pytest.approx(1.0e-5 * good)
     assert course.balance.left_bottle == pytest.approx(course.regulated, abs=1e-12)
@@ -262,5 +262,5 @@ def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_ti
     ending = small.supply.ending._replace(kind="empty", time=3.1, message="the bottle is empty")
     ended = replace(small, supply=replace(small.supply, ending=ending))
     monkeypatch.setitem(unwrap(compare_walks).__globals__, "walk", lambda *_, **__: ended)
-    with pytest.raises(SimulationError, match=r"the bottle is empty, after 3\.1 s: fewer than 5 strides"):
+    with pytest.raises(SimulationError, match=r"ends after 3\.1 s, in its first 5 strides \(the bottle is empty\)"):
         compare_walks(small.scenario)

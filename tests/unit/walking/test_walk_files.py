@@ -74,7 +74,7 @@ def test_an_override_means_the_same_under_either_path() -> None:
     one, other = (load_scenario(NAME, [f"{path}=stairs"]) for path in ("task_sequence", "motion.task_sequence"))
     assert walk_of(one).task_sequence == walk_of(other).task_sequence
     with pytest.raises(
-        ScenarioError, match=r"override 'motion\.task_sequence=stairs': the motion is given as 'rise' already"
+        ScenarioError, match=r"override 'motion\.task_sequence=stairs': the motion is already given as 'rise'"
     ):
         load_walk(NAME, ["motion.task_sequence=stairs"], task_sequence="rise")
 
@@ -171,7 +171,9 @@ def test_another_kind_drops_the_settings_of_the_old_one_as_in_every_scenario() -
     thermal = load_scenario(NAME, [f"gas_model.{text}" for text in warm])
     assert thermal.gas_model is not None
     assert reloaded(thermal, ["gas_model.kind=isothermal"]).gas_model is None
-    with pytest.raises(ScenarioError, match=r"'controller.peak_torque=5 N m' and 'controller.kind=event_on_off'"):
+    with pytest.raises(
+        ScenarioError, match=r"'controller.peak_torque=5 N m': with override 'controller.kind=event_on_off'"
+    ):
         load_scenario(NAME, ["controller.peak_torque=5 N m", "controller.kind=event_on_off"])
 
 
@@ -277,7 +279,7 @@ def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others()
 
 
 def test_a_duration_is_given_once_in_python_too() -> None:
-    with pytest.raises(ScenarioError, match=r"overrides run\.duration: the same as minutes"):
+    with pytest.raises(ScenarioError, match=r"overrides run\.duration and minutes are the same value"):
         walk_with_and_without(NAME, minutes=0.2, overrides=["run.duration = 30 s"])
 
 

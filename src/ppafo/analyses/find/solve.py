@@ -67,7 +67,8 @@ def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
         errors = [name for name in tracked if name in METRICS and not lacking(base, METRICS[name])]
         if base.controller.is_open_loop or not errors:
             raise StudyError(
-                f"{quoted}: scenario '{base.name}' has no reference; give a condition such as 'METRIC <= LIMIT'"
+                f"{quoted} needs a reference, which scenario '{base.name}' lacks; give a condition such as "
+                "'METRIC <= LIMIT'"
             )
         return MetricLimit(errors[0], math.inf, True, FOLLOWS)
     parts = _CONDITION.fullmatch(text)

@@ -25,6 +25,7 @@ from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.numbers import links_that_hold
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
+from ppafo.wording import argument_text
 
 _FLAWS = (
     *("sensors_angle_noise", "sensors_pressure_noise", "sensors_angle_resolution", "sensors_pressure_resolution"),
@@ -130,8 +131,8 @@ def library_of(scenario: Scenario) -> Library:
     """Return the library of a scenario or a walk; ProgramError for a controller that is a Python object."""
     if scenario.controller.is_outside:
         raise ProgramError(
-            f"{scenario.name}: a Python object cannot be exported as a controller; export the plant only, or "
-            "write the law as a controller kind"
+            f"{scenario.name}: a controller that is a Python object cannot be exported; export the plant only "
+            f"({argument_text('interface', 'plant')}), or declare the control law as a controller kind of a plugin"
         )
     library = _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
     return replace(library, joint=scenario.device.joint, actuator=scenario.device.actuator.kind)

@@ -205,8 +205,8 @@ def _straight_line(readings: TorqueReadings, files: str) -> tuple[float, float, 
     slope, zero, friction = solution.tolist()
     if slope <= 0.0:
         raise IdentificationError(
-            f"{files}: {PROCEDURE}: the {readings.channel} falls with the pressure difference; reverse the sign of "
-            "one channel"
+            f"{files}: {PROCEDURE}: the {readings.channel} decreases while the pressure difference increases; reverse "
+            "the sign of one of them"
         )
     deviation = float(np.std(readings.load - design @ solution))
     # Where friction is small its sign is the noise's, and no reason to refuse.

@@ -124,4 +124,4 @@ def _value(node: ast.expr, k: float) -> float:
             return k
         case ast.Constant(int() | float() as number) if not isinstance(number, bool):
             return float(number)
-    raise ValueError("not plain arithmetic in k")
+    raise ValueError("a formula may contain only numbers, the heat capacity ratio k and arithmetic")

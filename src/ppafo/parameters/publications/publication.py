@@ -76,7 +76,7 @@ def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
         where = f"{file}: claims.{entry.id}"
         if entry.published is None and not entry.words and not entry.own:
             raise ScenarioError(
-                f"{where}: give the published result: 'published' with 'unit', 'words', or 'own' for a calculation"
+                f"{where}: give one published result: 'published' with its 'unit', or 'words', or 'own' (a calculation)"
             )
         limit = {"maximum": entry.at_most, "less": entry.at_most, "more": entry.at_least}.get(entry.direction, 0.0)
         if limit is None and not entry.not_testable:

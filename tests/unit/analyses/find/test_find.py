@@ -94,7 +94,7 @@ def test_a_condition_that_is_always_met_ends_where_the_range_does(
     answer = of_curve(lambda p: 0.0 * p, highest=highest)
     assert answer.found.value == pytest.approx(end * BAR)
     assert answer.found.not_met_at is None
-    said = f"the end of the range: final_error is 0 N m there; a wider range may have a {word} one"
+    said = f"the end of the range: final_error is 0 N m there; a wider range may have a {word} value"
     assert said in answer.said[0]
     assert "the condition is met everywhere" in answer.found.remarks[0]
 
@@ -255,7 +255,9 @@ def test_a_run_that_follows_is_a_condition_of_its_own(tmp_path: Path) -> None:
         assert (ppafo.simulate(TASK, [f"supply.pressure={value!r} Pa_a"]).tracking is None) == follows
     answer.save(tmp_path / "out")
     assert json.loads((tmp_path / "out" / "find.json").read_text())["condition"] == "follows"
-    with pytest.raises(StudyError, match="'follows': scenario 'step-response' has no reference; give a condition"):
+    with pytest.raises(
+        StudyError, match="'follows' needs a reference, which scenario 'step-response' lacks; give a condition"
+    ):
         find("step-response", vary="supply.pressure=50..60 psi_g", such_that="follows")
     with pytest.raises(StudyError, match=r"or 'follows' \(the run follows its reference\)"):
         find(TASK, vary="supply.pressure=50..60 psi_g", such_that="following")

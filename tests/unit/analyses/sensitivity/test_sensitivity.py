@@ -335,7 +335,7 @@ def test_mistakes_are_one_line() -> None:
         sensitivity(STUDY)
     with pytest.raises(StudyError, match=r"method='shapley'.*with independent"):
         sensitivity(STUDY, method="sobol", configuration="solenoid", samples=64)
-    with pytest.raises(StudyError, match="has no 'gas': it needs a walk"):
+    with pytest.raises(StudyError, match="has no 'gas': the metric needs a walk"):
         sensitivity(STUDY, metrics=["gas"], configuration="solenoid")
 
 

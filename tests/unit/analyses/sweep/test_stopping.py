@@ -145,7 +145,7 @@ def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> N
     many = drawn_until(outcomes(0.0), rare, mean_of("N m"), rule, 1)
     assert many.is_met
     (unseen,) = many.remarks
-    assert "would shift the mean by up to 0.00018 times its distance" in unseen
+    assert "would shift the mean by up to 0.00018 d" in unseen
 
 
 def test_a_mean_is_not_met_before_a_rare_jump_could_have_come() -> None:

@@ -99,7 +99,7 @@ def test_noise_is_estimated_from_a_signal_that_moves() -> None:
 
 
 def test_too_few_samples_after_the_start_are_refused(experiment: FittedExperiment) -> None:
-    with pytest.raises(IdentificationError, match="at least 10 are needed"):
+    with pytest.raises(IdentificationError, match="needs at least 10"):
         fit(problem(dataclasses.replace(experiment, start=0.345), INERTIA))
 
 
