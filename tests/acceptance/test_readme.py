@@ -144,8 +144,9 @@ def test_a_torque_that_a_joint_cannot_give_is_said_as_printed_and_what_is_said_t
     mended = ["--set", "device.set=./elbow.toml", "--set", "reference.level=9 N m", *shlex.split(pasted)]
     assert main(["simulate", "hold.toml", *mended, "--check"]) == 0
     # How it follows its reference stands between how it ended and the numbers.
-    ended, verdict, blank = capsys.readouterr().out.splitlines()[:3]
+    ended, verdict, changed, blank = capsys.readouterr().out.splitlines()[:4]
     assert (ended, blank) == ("hold: completed", "")
+    assert changed.startswith("values changed: device.set=./elbow.toml, reference.level=9 N m, ")
     assert verdict.startswith("the torque follows its reference; from 2 s on: RMS ")
 
 

@@ -288,6 +288,6 @@ def test_the_page_says_that_its_live_part_begins_with_a_shorter_walk() -> None:
     scenario = load_walk("solenoid")
     found, same = live_part([scenario]), live_part([replace(scenario, run=replace(scenario.run, duration=6.0))])
     assert found is not None
-    assert found.remark.startswith("It begins with 6 s of the 60 s above")
+    assert found.remark.startswith("The workbench begins with 6 s of the 60 s above")
     assert same is not None
     assert same.remark == ""

@@ -276,7 +276,7 @@ def test_what_is_no_number_is_cut_off_at_the_lowest() -> None:
         (TORQUE, {"actions": "onoff"}, "'continuous' or 'on_off', did you mean 'on_off'?"),
         (TORQUE, {"vary": {"valve.aera": ("1 mm^2", "2 mm^2")}}, "did you mean 'valve.area'?"),
         (TORQUE, {"vary": {"valve.area": ("2 mm^2", "1 mm^2")}}, "the first value must be below the second"),
-        (TORQUE, {"vary": {"valve.area": (1.0, 2.0)}}, "without a unit"),
+        (TORQUE, {"vary": {"valve.area": (1.0, 2.0)}}, "has no unit"),
         (TORQUE, {"overrides": ["run.output_interval=1.5 ms"]}, "must be a whole number of run.step"),
         (WALK, {"vary": {"valve.area": ("1 mm^2", "2 mm^2")}}, "a walk varies only wearer and gait"),
         (WALK, {"scenario": "off"}, "has no torque profile"),

@@ -136,7 +136,7 @@ def test_a_gap_in_a_decay_is_refused_with_its_sample(
     source, solve = bench[kind]
     time = source.recording.time.copy()
     time[200:] += 3.0
-    assert "there is a gap of 3.0" in refusal(solve, retimed(source, time))
+    assert "gap of 3.0" in refusal(solve, retimed(source, time))
     assert "(sample 200)" in refusal(solve, retimed(source, time))
 
 
@@ -163,7 +163,7 @@ def test_a_saturated_flow_meter_is_told_and_a_valve_that_is_open_is_not(
 def test_noise_alone_is_no_decay(bench: dict[str, tuple[RecordingSource, Solve]]) -> None:
     source, solve = bench["free-decay"]
     noise = np.random.default_rng(3).normal(0.0, 2e-3, len(source.recording))
-    assert "nothing moves" in refusal(solve, changed(source, "angle", noise))
+    assert "no motion" in refusal(solve, changed(source, "angle", noise))
 
 
 def test_a_vane_that_runs_into_a_stop_is_not_taken_for_one_that_comes_to_rest(

@@ -491,7 +491,7 @@ def test_an_interval_that_holds_zero_or_twice_the_value_does_not_identify_it() -
 
 
 def test_an_unknown_verdict_is_refused() -> None:
-    with pytest.raises(IdentificationError, match="'fine' is not a verdict"):
+    with pytest.raises(IdentificationError, match="verdict 'fine' is unknown"):
         estimate(2.0, 1.0, 3.0, "fine")
 
 

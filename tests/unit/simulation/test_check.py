@@ -168,7 +168,7 @@ def test_a_decision_by_a_hair_of_the_start_is_found(torque_task: Callable[[str],
     check = simulate(slow.controlled_by(controller)).check()
     lost = next(row for row in check.metrics if row.name == "rms_error")
     assert lost.changed_by == {MOVED_START}
-    assert "a start moved by 1e-07 of its range" in check.sentence
+    assert "moving a start by 1e-07 of its range" in check.sentence
     assert "finer steps" not in check.sentence
 
 
@@ -180,7 +180,7 @@ def test_a_decision_by_a_hair_of_a_reading_is_found_where_the_start_does_not_mat
     check = simulate(scenario.controlled_by(controller)).check()
     lost = next(row for row in check.metrics if row.name == "rms_error")
     assert lost.changed_by == {MOVED_MEASUREMENT}
-    assert "a measurement moved by 1e-07 of its range" in check.sentence
+    assert "moving a measurement by 1e-07 of its range" in check.sentence
 
 
 def test_a_controller_that_gives_another_run_each_time_is_refused(torque_task: Callable[[str], Scenario]) -> None:

@@ -143,8 +143,8 @@ def test_a_run_that_is_useless_says_so_where_it_is_printed() -> None:
 
 def test_a_run_that_follows_its_reference_says_so_in_its_second_line() -> None:
     result = ppafo.simulate("torque-task-proportional", {"reference.level": 4.0})
-    verdict, blank = str(result).splitlines()[1:3]
-    assert (verdict, blank) == (result.following, "")
+    verdict, changed, blank = str(result).splitlines()[1:4]
+    assert (verdict, changed, blank) == (result.following, "values changed: reference.level=4 N m", "")
     words = r"the torque follows its reference; from [\d.]+ s on: RMS error [\d.]+ N m \(0.2 N m allowed\), swing "
     assert re.fullmatch(rf"{words}[\d.]+ N m", verdict)
     # The metric of the same name covers another interval, and says so in its line.

@@ -162,7 +162,7 @@ def test_a_python_controller_whose_methods_take_other_arguments_is_told_which_th
         with pytest.raises(SimulationError) as refused:
             simulate(torque_task("proportional").controlled_by(controller))  # type: ignore[arg-type]
         assert str(refused.value).startswith(f"{type(controller).__name__}: ")
-        assert str(refused.value).endswith("; write reset(self) and update(self, time, reference, measurement)")
+        assert str(refused.value).endswith("; define reset(self) and update(self, time, reference, measurement)")
 
 
 def test_commands_of_a_python_controller_are_clipped(torque_task: Callable[[str], Scenario]) -> None:

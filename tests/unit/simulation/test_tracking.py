@@ -66,7 +66,7 @@ def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> No
     assert "in their dead time of 95 ms" in pair.tracking.sentence
     pushed = simulate("cylinder-servo", ["motion.external_torque=14 N m"]).tracking
     assert pushed is not None
-    assert "the joint lies on its lower stop: it needs 14 N m at" in pushed.sentence
+    assert "the joint lies on its lower stop: the load needs 14 N m at" in pushed.sentence
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_a_search_and_a_walk_with_a_torque_controller_tell_of_a_pair_too_coarse_
     assert caplog.text.count("the pair of valves changes the torque by 2.19 N m") == 1
     # The walk's own controller holds one state of the pair for each phase: it tracks no torque.
     assert coarse_pair(load_scenario("solenoid")) == ""
-    assert "0.32 times the 5 N m wanted" in coarse_pair(load_scenario("solenoid", ["controller.kind=on_off"]))
+    assert "0.32 times the requested 5 N m" in coarse_pair(load_scenario("solenoid", ["controller.kind=on_off"]))
 
 
 def test_a_walk_whose_pair_takes_the_torque_beyond_its_limit_is_told_with_a_valve_that_keeps_to_it() -> None:
@@ -242,7 +242,7 @@ def test_static_friction_is_named_only_where_it_exceeds_what_the_law_asks_for() 
         named = (
             None
             if verdict is None
-            else re.search(r"holds the joint with (\S+) N m.* asks for (\S+) N m", verdict.cause)
+            else re.search(r"holds the joint with (\S+) N m.* requests only (\S+) N m", verdict.cause)
         )
         assert named is None or float(named[2]) <= float(named[1]), stiffness
         assert stiffness > 5.0 or named is not None
@@ -322,7 +322,7 @@ def test_a_law_that_rests_within_the_dead_band_is_given_what_it_lacks(law: tuple
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     assert re.search(
-        r"its command of 0\.\d+ (stays within|hardly opens the valve beyond) `valve\.dead_band = 0\.3`",
+        r"the command of 0\.\d+ (stays within|hardly opens the valve beyond) `valve\.dead_band = 0\.3`",
         verdict.sentence,
     )
     assert any(re.fullmatch(rf"controller\.{given}", text) for text in verdict.mended)
@@ -337,7 +337,7 @@ def test_a_sine_that_is_too_quick_for_the_loop_is_told_with_one_that_it_follows(
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     assert verdict.kind == "does not follow", "an error that turns with its reference is no oscillation"
-    assert "its reference" in verdict.cause
+    assert "the reference changes faster than the loop" in verdict.cause
     changed = [text.partition("=")[0] for text in verdict.mended]
     kept = [text for text in LATE_SINE if text.partition("=")[0] not in changed]
     assert simulate("cylinder-servo", [*kept, *verdict.mended]).tracking is None

@@ -118,8 +118,11 @@ def in_seconds(one: Recording) -> Recording:
         (reversed_command, "command seems to have the wrong sign"),
         (read_with_gain, "pressure_1 seems to be read 1.04 times too large"),
         (fast_clock, "the clock of the recording seems to run 1.05 times as fast"),
-        (in_milliseconds, "times seem to be milliseconds read as seconds (write time [ms] in the header, or unit = "),
-        (in_seconds, "times seem to be seconds read as milliseconds (write time [s] in the header, or unit = "),
+        (
+            in_milliseconds,
+            "times seem to be in milliseconds read as seconds (write time [ms] in the header, or unit = ",
+        ),
+        (in_seconds, "times seem to be in seconds read as milliseconds (write time [s] in the header, or unit = "),
     ],
     ids=lambda one: getattr(one, "__name__", None),
 )

@@ -193,7 +193,7 @@ def test_a_remedy_for_one_configuration_is_addressed_to_it_and_taken_by_the_comm
         tasks = {"whole": [], "short": ["run.duration=2.5 s"]}
         return compare(study=UNKNOWN_GAINS, draws=32, tasks=tasks, overrides=overrides).found.remarks
 
-    (gains,) = (text for text in said([]) if "computed anew" in text)
+    (gains,) = (text for text in said([]) if "recomputed from" in text)
     (pair,) = (text for text in said([]) if "the pair of valves changes" in text)
     assert gains.startswith("PD, own: ")
     assert pair.startswith("solenoid: ")

@@ -263,7 +263,7 @@ def test_any_number_that_was_changed_in_python_is_noticed_and_another_length_is_
 ) -> None:
     whole = load_walk(name)
     assert walk_of(on_bottle(with_duration(whole, 12.0), PAPER_BOTTLE)).bottle is not None
-    with pytest.raises(ScenarioError, match="changed after it was loaded"):
+    with pytest.raises(ScenarioError, match="changed after loading"):
         on_bottle(with_numbers(whole, numbers), PAPER_BOTTLE)
 
 

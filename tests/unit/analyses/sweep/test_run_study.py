@@ -406,7 +406,7 @@ def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> N
 
 
 def test_a_statistic_in_python_is_asked_of_estimate() -> None:
-    with pytest.raises(ArgumentError, match=r"sweep\(\) has no argument 'statistic': ppafo\.estimate has it"):
+    with pytest.raises(ArgumentError, match=r"sweep\(\) has no argument 'statistic'; use ppafo\.estimate"):
         sweep("torque-task-uncertainty", statistic="mean")  # type: ignore[call-arg]
     with pytest.raises(StudyError, match="for example statistic='mean' metric='rms_error'"):
         sweep_into_folder("torque-task-uncertainty", metric="rms_error")
