@@ -15,6 +15,10 @@ _POINTS = 20_000
 """Number of frequencies at which a loop is computed, equally spaced on a logarithmic scale."""
 _BELOW_POLES = 1.0e-3
 """Lowest frequency of a loop, relative to the frequency of the slowest pole or corner that is no integrator [-]."""
+_LEAST_START = 1.0e3
+"""Least magnitude [-] at the lowest frequency of a loop with an integrator: there the integrator decides."""
+_POINTS_BELOW = 2_000
+"""Number of frequencies added below, where the magnitude at the lowest frequency is less."""
 _INTEGRATOR = 1.0e-9
 """Magnitude [1/s] up to which a pole counts as an integrator."""
 _ROUNDING = 1.0e-9
@@ -38,18 +42,27 @@ def open_loop(model: LinearModel) -> tuple[Floats, NDArray[np.complex128]] | Non
     rates = [1.0 / period, *np.abs(model.poles).tolist(), gains["integral_gain"] / (gains["proportional_gain"] or 1.0)]
     slowest = min(rate for rate in rates if rate > _INTEGRATOR) / (2.0 * np.pi)
     frequencies = np.geomspace(_BELOW_POLES * slowest, 0.5 / period, _POINTS)
-    z = np.exp(2.0j * np.pi * frequencies * period)
-    row = sum(weight * model.c[outputs.index(name)] for name, weight in weights.items())
-    plant = _sampled_plant(model, np.asarray(row), z)
+    row = np.asarray(sum(weight * model.c[outputs.index(name)] for name, weight in weights.items()))
     # The law skips the dead band that it assumes, within a narrow range of openings.
     band = gains.get("dead_band", 0.0)
     opened = 1.0 - band + (band / SHARPNESS if command < band + (1.0 - band) * SHARPNESS else 0.0)
-    change = 1.0 - 1.0 / z
-    law = gains["proportional_gain"] + gains["integral_gain"] * period / change
-    law += gains["derivative_gain"] * change / (period + gains["derivative_filter"] * change)
     steered = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(opened)
-    loop = steered * law * plant
-    return (frequencies, loop) if loop.all() else None
+
+    def response(frequencies: Floats) -> NDArray[np.complex128]:
+        z = np.exp(2.0j * np.pi * frequencies * period)
+        change = 1.0 - 1.0 / z
+        law = gains["proportional_gain"] + gains["integral_gain"] * period / change
+        law += gains["derivative_gain"] * change / (period + gains["derivative_filter"] * change)
+        return np.asarray(steered * law * _sampled_plant(model, row, z))
+
+    loop = response(frequencies)
+    if not loop.all():
+        return None
+    start = float(np.abs(loop[0]))
+    if _integrators(frequencies, loop) > 0 and start < _LEAST_START:
+        below = np.geomspace(frequencies[0] * start / _LEAST_START, frequencies[0], _POINTS_BELOW)[:-1]
+        frequencies, loop = np.concatenate([below, frequencies]), np.concatenate([response(below), loop])
+    return frequencies, loop
 
 
 def loop_margins(model: LinearModel) -> LoopMargins | None:
@@ -62,9 +75,7 @@ def loop_margins(model: LinearModel) -> LoopMargins | None:
     # Nyquist: of a stable closed loop, 1 + L turns by a quarter for each integrator, by a half for each unstable pole.
     turned = np.unwrap(np.angle(1.0 + loop))
     log_gain, closed = np.log(np.abs(loop)), np.abs(loop * sensitivity)
-    # Of two integrators of one command, as two sealed chambers are, the loop has one: its slope at the start counts.
-    integrators = round(float((log_gain[0] - log_gain[1]) / np.log(frequencies[1] / frequencies[0])))
-    quarters = integrators + 2 * np.count_nonzero(model.poles.real > _INTEGRATOR)
+    quarters = _integrators(frequencies, loop) + 2 * np.count_nonzero(model.poles.real > _INTEGRATOR)
     at_gain = _crossings(log_gain, frequencies, np.angle(-loop))
     # At half the sample rate, where the curve ends, the loop is real.
     at_phase = _crossings(np.where(loop.real < 0.0, loop.imag, np.nan)[:-1], frequencies, log_gain)
@@ -81,6 +92,14 @@ def loop_margins(model: LinearModel) -> LoopMargins | None:
         bandwidth=falls[0][0] if falls else None,
         peak_sensitivity=float(np.max(np.abs(sensitivity))),
     )
+
+
+def _integrators(frequencies: Floats, loop: NDArray[np.complex128]) -> int:
+    """Return the number of integrators of a loop, by its slope at the lowest frequency.
+
+    Two sealed chambers are two integrators of one command, of which the loop has one.
+    """
+    return round(float(np.log(np.abs(loop[0] / loop[1])) / np.log(frequencies[1] / frequencies[0])))
 
 
 def _sampled_plant(model: LinearModel, row: Floats, z: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -344,6 +344,19 @@ def test_gains_above_the_gain_margin_oscillate_in_the_simulation_and_gains_below
     assert swings[1] > 5.0 * swings[0]
 
 
+def test_a_loop_whose_gain_is_low_is_stable_and_has_the_bandwidth_of_its_integral_action() -> None:
+    # At the largest torque of the device the flow hardly depends on the command.
+    model = linear(TASK, overrides=["reference.level=5 N m"])
+    assert model.margins is not None
+    assert model.margins.is_stable
+    torque = [signal.name for signal in model.outputs].index("torque")
+    at_rest = float((model.c @ np.linalg.solve(-model.a, model.b))[torque, 0])
+    expected = model.scenario.controller.settings["integral_gain"] * at_rest / math.tau
+    assert expected < 2e-4
+    assert model.margins.gain_crossover == pytest.approx(expected, rel=0.01)
+    assert model.margins.bandwidth == pytest.approx(expected, rel=0.01)
+
+
 def test_margins_and_crossover_are_those_of_loop_shaping() -> None:
     """The page on linear models finds 79 deg at 5.1 Hz for these gains with python-control, of a continuous loop."""
     gains = ("controller.proportional_gain=0.445", "controller.integral_gain=2.80", "controller.derivative_gain=0")
