@@ -151,7 +151,7 @@ def test_a_task_sequence_writes_its_segments_and_its_figure(tmp_path: Path, caps
     out = capsys.readouterr().out
     assert "stairs, 0.6 m/s" in out
     assert "as far as walked" in out, "0.3 min are a part of the task sequence"
-    assert "is scaled to 0.6, 0.8 m/s: beyond 1.06 to 1.6 m/s" in out
+    assert "is scaled to 0.6, 0.8 m/s, outside 1.06 to 1.6 m/s" in out
     assert {"task-sequence.png", "task-sequence.svg", "segments.csv", "segments-off.csv"} <= set(names(folder))
     assert "legs.png" not in names(folder)
     document = json.loads((folder / "walk.json").read_text())

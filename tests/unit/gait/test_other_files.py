@@ -101,7 +101,7 @@ def test_a_doubled_marker_that_is_needed_is_named_by_its_number(tmp_path: Path) 
     )
     found = import_gait([path], ImportSettings(MASS, columns=load_map(map_file)))
     # The axes that the map does not say are found in the markers.
-    assert not [remark for remark in found.remarks if "gait map does not say" in remark]
+    assert not [remark for remark in found.remarks if "gait map does not give" in remark]
     turned = tmp_path / "turned.toml"
     turned.write_text(map_file.read_text().replace(', forward = "x"', "").replace("forward", ""))
     again = import_gait([path], ImportSettings(MASS, columns=load_map(turned)))
