@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-import ppafo
 from ppafo.cli.main import main
 from ppafo.parameters.loading import load_device, load_parameter_set
 from tests.page_code import assert_shows
@@ -87,19 +86,3 @@ def test_the_output_on_the_page_is_that_of_the_command(folder: Path) -> None:
         return "\n".join(" ".join(re.sub(r"[-+]?\d[\d.e+-]*\d", "0", line).split()) for line in text.splitlines())
 
     assert_shows(without_digits(shown), without_digits(printed))
-
-
-@pytest.mark.short
-def test_the_interval_of_the_static_friction_does_not_depend_on_its_start(
-    folder: Path, document: dict[str, Any]
-) -> None:
-    """Break-aways make steps in the squares: before the profile was scanned the lower ends lay 5 % apart."""
-    problem = (folder / "problem.toml").read_text()
-    path = 'path = "friction.static_torque"'
-    assert path in problem
-    (folder / "other.toml").write_text(problem.replace(path, f'{path}\nstart = "0.8 N m"'))
-    other = ppafo.identify(folder / "other.toml").found.trajectory
-    assert other is not None
-    (first,) = [item for item in document["estimates"] if item["path"] == "friction.static_torque"]
-    second = other.fit.estimate("friction.static_torque")
-    assert (second.low, second.high) == pytest.approx((first["low"], first["high"]), rel=0.02)

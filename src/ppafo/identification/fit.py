@@ -94,8 +94,6 @@ _AT_BOUND = 1.0e-6
 """Largest distance of a variable from its bound [-] that counts as at the bound, relative above 1."""
 _SHOWN = 0.01
 """Least share of the variance [-] for a tolerance to be listed."""
-_CONTINUED = 3
-"""Largest number of times that the search continues from a better point of a profile."""
 _OTHER_STARTS = 32
 """Number of additional start points tried if the first fit is inconsistent or has not converged."""
 
@@ -152,18 +150,13 @@ def fit(
 def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     """Return the fit, with intervals and consistency tests, found by a search from a scaled start point."""
     point, outliers = _search(runs, start)
-    for continued in range(_CONTINUED + 1):
-        end = _settle(runs, point, outliers)
-        point, linear = end.point, end.linear
-        sensors, jacobian, errors = linear.sensors, linear.rows[:, 1:], linear.rows[:, 0]
-        covariance = linear.root @ linear.root.T
-        # Samples less what the numbers took: a tolerance that the readings do not move takes none.
-        freedom = max(len(errors) - float(np.sum(jacobian * (jacobian @ covariance))), 1.0)
-        times, is_last = float(student.ppf(0.5 + 0.5 * confidence, freedom)), continued == _CONTINUED
-        low, high, better = interval_ends(runs, point, linear, times, is_last=is_last)
-        if better is None:
-            break
-        point = better
+    end = _settle(runs, point, outliers)
+    point, linear = end.point, end.linear
+    sensors, jacobian, errors = linear.sensors, linear.rows[:, 1:], linear.rows[:, 0]
+    covariance = linear.root @ linear.root.T
+    # Samples less what the numbers took: a tolerance that the readings do not move takes none.
+    freedom = max(len(errors) - float(np.sum(jacobian * (jacobian @ covariance))), 1.0)
+    low, high = interval_ends(runs, point, linear, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
     # At a bound that the squares would leave a number is no longer free, and no group can move it there.
     gradient = errors @ jacobian + np.square(runs.prior) * (point - runs.start)
     near = _AT_BOUND * np.maximum(1.0, np.abs(point))

@@ -15,7 +15,7 @@ from ppafo.identification.residuals import FitRuns
 from ppafo.identification.whitened import Linear, cost_of, squares_of, whitened_errors
 from ppafo.signals.recording import Floats
 
-_TRIES, _CORRECTIONS, _LINEARISATIONS = 8, 3, 4
+_TRIES, _CORRECTIONS, _LINEARISATIONS = 6, 3, 4
 """Largest numbers of trial points per limit, of steps with the fixed Jacobian, and of steps with a new Jacobian."""
 
 _SHARES = 0.5 ** np.arange(4.0)[:, None]
@@ -27,17 +27,8 @@ _STILL = 0.3
 _FURTHER = 1.3
 """Least factor by which a trial limit is moved outwards while the recordings are still explained [-]."""
 
-_REACHED = 0.01
-"""Largest relative difference between the profile at a limit and Student's factor [-]."""
-
-_LEAST_PART = 0.1
-"""Least distance of a trial limit from the ends of its bracket, as a fraction of the bracket [-]."""
-
-_SCANNED = (0.25, 0.5, 0.75)
-"""Distances from the estimate at which a bent profile is scanned, as fractions of the linear limit [-]."""
-
-_LOWER = 0.1
-"""Decrease of the squares [-] from which another point is a better estimate."""
+_NARROW = 0.1
+"""Relative width of the bracket of a limit [-] below which the limit is interpolated linearly."""
 
 _BENT = 1.1
 """Least ratio of profile to linear distance [-] above which the limit follows the profile likelihood."""
@@ -48,15 +39,10 @@ _UNKNOWN = 0.5
 """Standard error of a combination of relative variables [-] above which it is not identifiable."""
 
 
-def interval_ends(
-    runs: FitRuns, point: Floats, linear: Linear, times: float, *, is_last: bool
-) -> tuple[Floats, Floats, Floats | None]:
+def interval_ends(runs: FitRuns, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
     """Return scaled lower and upper confidence limits: ``times`` standard errors, or wider for nonlinear laws.
 
-    Only intervals of unknowns without a prior are widened. A limit that the samples do not determine is the bound. A
-    law with events, such as a break-away, has steps in its squares, between which a search may end anywhere, so that
-    limits would depend on its start: unless the search ``is_last``, bent profiles are scanned, and if one has a point
-    with fewer squares, this point is the third value, and the limits are those of the linear law.
+    Only intervals of unknowns without a prior are widened. A limit that the samples do not determine is the bound.
     """
     covariance = linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))
@@ -66,30 +52,13 @@ def interval_ends(
     fixed = [number for number, _ in sides]
     offsets = np.array([ends[number] - point[number] for number, ends in sides])
     straight = point[:, None] + covariance[:, fixed] / covariance[fixed, fixed] * offsets
-    all_squares, points = _least_beside(runs, straight, fixed, linear)
-    wider = list[tuple[int, Floats, float, Floats]]()
-    for side in np.flatnonzero(offsets).tolist():
-        (number, ends), squares, reached = sides[side], float(all_squares[side]), points[:, side]
-        if squares - least > (_BENT * times) ** 2:
-            squares, reached = _least_along(runs, points[:, [side]], number, linear)
-        if squares - least < (times / _BENT) ** 2:
-            wider.append((number, ends, squares, reached))
-        else:
-            ends[number] = reached[number]
-    lowest, better = least - _LOWER, None
-    scanned = dict.fromkeys(number for number, *_ in wider)
-    for number, ends in ((number, ends) for number in scanned if not is_last for ends in (low, high)):
-        reached = point
-        for share in _SCANNED:
-            moved = reached.copy()
-            moved[number] = point[number] + share * (ends[number] - point[number])
-            squares, reached = _least_along(runs, moved[:, None], number, linear)
-            if squares < lowest:
-                lowest, better = squares, reached
-    for number, ends, squares, reached in wider if better is None else ():
+    squares, points = _least_beside(runs, straight, fixed, linear)
+    for side, (number, ends) in enumerate(sides):
         bound = float((runs.low if ends is low else runs.high)[number])
-        ends[number] = _end(runs, point, least, linear, number, bound, (squares, reached), times)
-    return low, high, better
+        if offsets[side] != 0.0:
+            at_limit = float(squares[side]), points[:, side]
+            ends[number] = _end(runs, point, least, linear, number, bound, at_limit, times)
+    return low, high
 
 
 def _end(
@@ -99,40 +68,36 @@ def _end(
     linear: Linear,
     number: int,
     bound: float,
-    at_limit: tuple[float, Floats],
+    straight: tuple[float, Floats],
     times: float,
 ) -> float:
     """Return one confidence limit of a variable by profile likelihood, searched from the linear limit to the bound.
 
-    ``least`` is the sum of squares at the estimate; ``at_limit`` is the sum of squares near the linear limit, and the
-    point at which it is reached. Each trial limit starts from the best of the nearest points inside and outside, so
-    that no event lies between it and all its starts.
+    ``least`` is the sum of squares at the estimate; ``straight`` is the sum of squares near the linear limit, and the
+    point at which it is reached.
     """
-    squares, reached = at_limit
     inner, near = point, 0.0
-    outer, far = point, math.inf
+    outer: Floats | None = None
+    far, (squares, reached) = math.inf, straight
+    if math.sqrt(max(squares - least, 0.0)) > _BENT * times:
+        squares, reached = _least_along(runs, reached, number, linear)
     for _ in range(_TRIES):
         # By how many standard errors priors and samples tell this point from the estimate.
         parted = math.sqrt(max(squares - least, 0.0))
-        if abs(parted - times) < _REACHED * times:
-            return float(reached[number])
-        if parted < times:
+        if parted * (_BENT if inner is point else 1.0) < times:
             inner, near = reached, parted
             if float(inner[number]) == bound:
                 return bound
+        elif inner is point:
+            return float(reached[number])
         else:
             outer, far = reached, parted
-        if outer is point:
-            further = min(max(times / max(near, 0.1), _FURTHER), 2.0)
-            starts = (point + further * (inner - point))[:, None]
-        else:
-            # Beyond which no run succeeds the profile says nothing, and the bracket is halved.
-            share = (times - near) / (far - near) if math.isfinite(far) else 0.5
-            middle = inner + min(max(share, _LEAST_PART), 1.0 - _LEAST_PART) * (outer - inner)
-            starts = np.stack([middle, inner, outer], axis=1)
-            starts[number] = middle[number]
-        squares, reached = _least_along(runs, np.clip(starts.T, runs.low, runs.high).T, number, linear)
-    if outer is point:
+        if outer is not None and abs(outer[number] - inner[number]) < _NARROW * abs(inner[number] - point[number]):
+            break
+        further = min(max(times / max(near, 0.1), _FURTHER), 2.0)
+        tried = point + further * (inner - point) if outer is None else 0.5 * (inner + outer)
+        squares, reached = _least_along(runs, np.clip(tried, runs.low, runs.high), number, linear)
+    if outer is None:
         return bound
     share = (times - near) / (far - near)
     return float(inner[number] + share * (outer[number] - inner[number]))
@@ -165,17 +130,14 @@ def _least_beside(runs: FitRuns, points: Floats, fixed: list[int], linear: Linea
     return least, best
 
 
-def _least_along(runs: FitRuns, starts: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
-    """Return the least sum of squares [-] with one variable fixed, and the scaled point that reaches it.
+def _least_along(runs: FitRuns, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
+    """Return the least sum of squares [-] with one variable of a scaled point fixed, and the point that reaches it.
 
-    The search begins at the best of the scaled points ``starts`` (numbers, points). The other variables take
-    Gauss-Newton steps within their bounds, each with a new Jacobian, because far from the estimate its Jacobian leads
-    out of a curved valley. The minimum is infinite if no run succeeds.
+    The other variables take Gauss-Newton steps within their bounds, each with a new Jacobian, because far from the
+    estimate its Jacobian leads out of a curved valley. The minimum is infinite if no run succeeds.
     """
-    all_errors = whitened_errors(runs, runs.residuals_at_points(starts), linear)
-    all_squares = squares_of(runs, all_errors, starts)
-    best = int(np.argmin(np.where(np.isfinite(all_squares), all_squares, np.inf)))
-    point, errors, squares = starts[:, best], all_errors[:, [best]], float(all_squares[best])
+    errors = whitened_errors(runs, runs.residuals_at_points(point[:, None]), linear)
+    squares = float(squares_of(runs, errors, point[:, None])[0])
     if not math.isfinite(squares):
         return math.inf, point
     others = np.delete(np.arange(len(point)), number)
