@@ -11,7 +11,7 @@ import re
 import site
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -143,14 +143,17 @@ def nearest_kind(name: str, allowed: Iterable[str], kind_type: type = object) ->
     """Return a hint as ``nearest_name`` does, also of components in modules that the user named: ``module:OBJECT``."""
     words = list(allowed)
     for plugin in named_plugins():
-        # A broken module is refused where one of its objects is named.
-        with suppress(Exception):
-            for key, item in vars(_imported(plugin.module, plugin.folder)).items():
-                own_name = getattr(item, "name", None) if type(item).__module__.startswith("ppafo.") else None
-                if isinstance(own_name, str) and isinstance(item, kind_type):
-                    words.append(f"{plugin.module}:{key}")
-                    if own_name == name:
-                        return f", did you mean '{words[-1]}'?"
+        try:
+            module = _imported(plugin.module, plugin.folder)
+        except Exception:  # a broken module, whatever it raises, is refused where one of its objects is named
+            continue
+        for key, item in vars(module).items():
+            own_name = getattr(item, "name", None) if type(item).__module__.startswith("ppafo.") else None
+            if not isinstance(own_name, str) or not isinstance(item, kind_type):
+                continue
+            words.append(f"{plugin.module}:{key}")
+            if own_name == name:
+                return f", did you mean '{words[-1]}'?"
     return nearest_name(name, words)
 
 

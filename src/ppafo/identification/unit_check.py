@@ -22,25 +22,30 @@ def with_wrong_units(
     A mistake explains them if every value far from the one ``known`` of the set depends on the unit, and every value
     that depends on the unit is off by nearly its factor: a larger device, or one worn part, is no mistake.
     """
+    usable = [estimate for estimate in estimates if estimate.is_usable]
     ratios = {
         estimate.path: abs(math.log(estimate.value / reference))
-        for estimate in estimates
-        if estimate.is_usable and estimate.value > 0.0 and (reference := known.get(estimate.path) or 0.0) > 0.0
+        for estimate in usable
+        if estimate.value > 0.0 and (reference := known.get(estimate.path) or 0.0) > 0.0
     }
     far = {path for path, ratio in ratios.items() if ratio > math.log(FAR_FROM_SET)}
     channels = {name: channel for recording in recordings for name, channel in recording.channels.items()}
+    # Beside a measured torque or force a pressure scales no torque; in a motion it drives everything with mass.
+    has_load = bool({"torque", "force"} & channels.keys())
+    dependent: dict[str, set[str]] = {"Pa": set(), "N m": set(), "rad": set()}
+    for path, unit in ((estimate.path, estimate.unit) for estimate in usable):
+        has_mass = "N" in unit or "kg" in unit
+        # A torque constant, in N m/Pa, is stated in m^3.
+        if "Pa" in unit or unit == "m^3" or "mass_flow" in channels or (has_mass and not has_load):
+            dependent["Pa"].add(path)
+        if has_mass or "torque" in channels:
+            dependent["N m"].add(path)
+        if unit == "N m":
+            dependent["rad"].add(path)
     nearest, explained = math.log(_NEAR), estimates
     for si_unit in dict.fromkeys(channel.unit.removesuffix("_d") for channel in channels.values()) if far else ():
         names = [name for name, channel in channels.items() if channel.unit.removesuffix("_d") == si_unit]
-        # Beside a measured torque or force a pressure scales no torque; in a motion it drives everything with mass.
-        has_load = bool({"torque", "force"} & channels.keys())
-        acted_on = set[str]()
-        for path, unit in ((item.path, item.unit) for item in estimates if item.is_usable):
-            has_mass = "N" in unit or "kg" in unit
-            # A torque constant, in N m/Pa, is stated in m^3.
-            per_pressure = "Pa" in unit or unit == "m^3" or "mass_flow" in channels or (has_mass and not has_load)
-            depends = {"Pa": per_pressure, "N m": has_mass or "torque" in channels, "rad": unit == "N m"}
-            acted_on |= {path} if depends.get(si_unit) else set()
+        acted_on = dependent.get(si_unit, set())
         mistakes = misread_units(si_unit, [channels[name].stated for name in names]) if far <= acted_on else []
         for mistake, factor in mistakes:
             size = abs(math.log(factor))

@@ -89,11 +89,13 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
             trajectory = solve_section(problem.trajectory, section, progress)
             fit = trajectory.fit
             # A start near to the value says that the person expects it, whatever the set has.
-            starts = {number.free.name: number.free.start * FAR_FROM_SET for number in fit.numbers}
-            known = {
-                path: value if value < starts[path] < value * FAR_FROM_SET**2 else number_in_si(current, path)
+            starts = {number.free.name: number.free.start for number in fit.numbers}
+            near = {
+                path
                 for path, value in fit.values.items()
+                if value > 0.0 and 1.0 / FAR_FROM_SET < starts[path] / value < FAR_FROM_SET
             }
+            known = {path: value if path in near else number_in_si(current, path) for path, value in fit.values.items()}
             recordings = [experiment.recording for experiment in fit.problem.experiments]
             estimates_of_fit = with_wrong_units(fit.estimates, known, recordings)
             trajectory = replace(trajectory, fit=replace(fit, estimates=estimates_of_fit))

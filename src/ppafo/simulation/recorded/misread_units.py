@@ -19,7 +19,7 @@ def misread_units(si_unit: str, stated: Iterable[str]) -> list[tuple[str, float]
     A channel without a stated unit, or in Pa, may have been converted before, from any unit.
     """
     units = {split_pressure_kind(unit)[0] for unit in stated} - {"", "Pa"}
-    scales = _MISTAKEN.get(si_unit.removesuffix("_d"), {})
+    scales = _MISTAKEN.get(si_unit, {})
     return [
         (f"{true} read as {read}", scales[read] / scales[true])
         for true in scales
