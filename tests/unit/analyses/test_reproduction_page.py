@@ -225,8 +225,8 @@ def test_figure_8_shows_the_synthetic_experiment_with_both_valves(reproduction: 
         assert "synthetic experiment" in {line.get_label() for line in axes.lines}
 
 
-@pytest.mark.parametrize("width", ["84 mm", "145 mm"])
-def test_no_text_of_figure_8_is_cut(reproduction: Reproduction, width: str) -> None:
+@pytest.mark.parametrize("width", [None, "84 mm", "145 mm"])
+def test_no_text_of_figure_8_is_cut(reproduction: Reproduction, width: str | None) -> None:
     evidence = reproduction.synthetic
     assert isinstance(evidence, SyntheticEvidence)
     runs = (reproduction.solenoid.recording, reproduction.proportional.recording)

@@ -198,7 +198,7 @@ def torque_task_figure(
 def _torque_marks(recording: Recording, style: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:
     """Return marks of reference, torque and largest torque, over the broad line of a synthetic experiment."""
     time, dashed = recording.time, {"linestyle": REFERENCE.line, "linewidth": 1.3}
-    ceiling_label = f"largest torque at this pressure: {ceiling:.1f} N m"
+    ceiling_label = f"maximum at this pressure: {ceiling:.1f} N m"
     marks = [
         Mark("line", time, recording["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
         Mark("level", y=ceiling, label=ceiling_label, colour=GREY, style=_LEVEL),
