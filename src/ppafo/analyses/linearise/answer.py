@@ -337,7 +337,7 @@ def _open_loop_panels(model: LinearModel, scales: Mapping[str, Any]) -> list[Pan
             Mark("line", frequencies[[0, -1]], np.full(2, nearest), (), "", GREY, _DASHED),
         ]
         for at, name, colour, marker in crossovers:
-            if at is not None:
+            if at is not None and at >= scales["xlim"][0]:
                 place = np.array([np.interp(at, frequencies, curve)])
                 dot = {"linestyle": "", "marker": marker, "markersize": 5}
                 marks.append(Mark("line", np.array([at]), place, (), f"{name} at {at:.3g} Hz", colour, dot))

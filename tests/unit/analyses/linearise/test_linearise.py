@@ -355,6 +355,9 @@ def test_a_loop_whose_gain_is_low_is_stable_and_has_the_bandwidth_of_its_integra
     assert expected < 2e-4
     assert model.margins.gain_crossover == pytest.approx(expected, rel=0.01)
     assert model.margins.bandwidth == pytest.approx(expected, rel=0.01)
+    # The crossover is not among the frequencies that are drawn.
+    (gain, *_) = frequency_panels(model)
+    assert [mark.label for mark in gain.marks if mark.label] == ["gain margin at 500 Hz"]
 
 
 def test_margins_and_crossover_are_those_of_loop_shaping() -> None:
