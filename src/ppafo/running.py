@@ -91,7 +91,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     if not causes:
         return verdict
     from ppafo.simulation.tracking.remedies import change_text
-    from ppafo.simulation.tracking.verdict import time_text
+    from ppafo.simulation.tracking.verdict import is_undecided, time_text
 
     # What was changed in Python would be lost with overrides.
     is_of_file = replace(reloaded(scenario, ()), run=scenario.run) == scenario
@@ -107,7 +107,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     best: tuple[Remedy, float] | None = None
     for (cause, remedy, _), result in zip(candidates, results, strict=True):
         left = result.tracking
-        if not result.status.is_completed:
+        if not result.status.is_completed or is_undecided(result):
             continue
         if left is None:
             told = f"with {remedy.text} it follows, as a further run shows"

@@ -135,10 +135,10 @@ def test_a_walk_with_an_actuator_that_pushes_one_way_is_told_to_ask_for_no_dorsi
 def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
     assert simulate(TASK, ["run.duration=0.3 s"]).tracking is None
     assert simulate(TASK, ["reference.level=4 N m"]).tracking is None
-    # Nor where what lies beyond reach is asked for after the end only.
+    # Nor where what lies beyond reach is asked for after the end only: runs without a recording have no verdict either.
     base = load_scenario(TASK, ["run.duration=0.3 s"])
     columns = {"supply.pressure": np.array([3.0e5, 4.0e5])}
-    assert (excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns).follows == 1.0).all()
+    assert np.isnan(excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns).follows).all()
 
 
 SMALL_SINE = [
@@ -343,6 +343,59 @@ def test_a_sine_that_is_too_quick_for_the_loop_is_told_with_one_that_it_follows(
     assert simulate("cylinder-servo", [*kept, *verdict.mended]).tracking is None
 
 
+WAVE = ["reference.kind=sine", "reference.level=0 N m", "motion.kind=locked", "motion.angle=90 deg"]
+LOCKED_LEVER = ["controller.kind=pid", "reference.of=torque", *WAVE]
+"""Cylinder on a lever that is locked at 90 deg, whose torque follows a sine."""
+
+
+@pytest.mark.parametrize("frequency", [0.5, 1.0, 4.0])
+def test_a_wave_cut_by_both_supplies_is_no_oscillation_and_is_given_both_pressures(frequency: float) -> None:
+    changes = [*LOCKED_LEVER, "reference.amplitude=10 N m", f"reference.frequency={frequency} Hz"]
+    scenario = load_scenario("cylinder-servo", changes)
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert verdict.kind == "does not follow"
+    gauge = float(scenario.device.supply.pressure - scenario.device.supply.atmospheric_pressure)
+    # Bore of 32 mm and rod of 12 mm on an arm of 15 mm at 90 deg: the torque is in proportion to the gauge pressure.
+    lowest, highest = torque_reach(scenario.device, math.pi / 2.0)
+    needed = [1.05 * 10.0 / reach * gauge / 1.0e5 for reach in (highest, -lowest)]
+    given = {path: value for path, _, value in (text.partition("=") for text in verdict.mended)}
+    assert list(given) == ["supply.pressure", "supply.dorsiflexion_pressure"]
+    assert [float(value.removesuffix(" bar_g")) for value in given.values()] == pytest.approx(needed, rel=5e-3)
+
+
+def test_a_judged_part_without_a_peak_gives_no_verdict_and_a_slower_trial_is_long_enough_for_one() -> None:
+    changes = [
+        "reference.kind=sine",
+        "reference.level=0 N m",
+        "reference.amplitude=4 N m",
+        "reference.frequency=0.1 Hz",
+    ]
+    short = simulate(TASK, changes)
+    assert short.tracking is None
+    assert "the judged half of the run holds 0.15 periods of the reference" in short.following
+    longer = simulate(TASK, [*changes, "run.duration=40 s"])
+    assert longer.tracking is None
+    assert longer.following.startswith("the torque follows its reference")
+    # Metered runs have no verdict either.
+    columns = {"reference.amplitude": np.array([4.0, 9.0])}
+    base = load_scenario(TASK, changes)
+    judged = excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns).follows
+    assert np.isnan(judged[0])
+    assert judged[1] == 0.0
+    late = load_scenario("cylinder-servo", LATE_SINE)
+    verdict = tried(late, simulate(late).tracking)
+    assert verdict is not None
+    given = dict(text.split("=") for text in verdict.mended)
+    assert float(given["run.duration"].split()[0]) * float(given["reference.frequency"].split()[0]) >= 1.99
+
+
+def test_a_smooth_wave_of_a_torque_has_a_limit_on_its_largest_error() -> None:
+    wave = sampled(np.where(np.arange(200) % 50 < 3, 17.0, 0.0), "torque")._replace(rests=False, wave=28.0)
+    assert failure_of_task(wave, 0.0, False) is None
+    assert failure_of_task(wave._replace(is_smooth=True), 0.0, False) == "does not follow"
+
+
 def sampled(error: np.ndarray, controlled: str) -> SettledPart:
     """Settled part of a loop that wants 40 deg, or N m, with an error in the same."""
     unit = math.radians(1.0) if controlled == "angle" else 1.0
@@ -514,9 +567,9 @@ LEVEL = "reference.level=3 N m"
             "controller.rate=20 Hz",
         ),
         ("pressure-loop", ["controller.rate=2 Hz"], "the controller decides every 500 ms", "controller.rate=200 Hz"),
-        (TASK, [LEVEL, "sensors.delay=200 ms"], "(`sensors.delay = 0.2 s`)", "sensors.delay=0.02 s"),
+        (TASK, [LEVEL, "sensors.delay=200 ms"], "(`sensors.delay = 0.2 s`)", "sensors.delay=20 ms"),
         (TASK, [LEVEL, "sensors.pressure_noise=5 bar_d"], "`sensors.pressure_noise", "sensors.pressure_noise"),
-        ("cylinder-servo", ["sensors.delay=2 s"], "`sensors.delay = 2 s`", "sensors.delay=0.002 s"),
+        ("cylinder-servo", ["sensors.delay=2 s"], "`sensors.delay = 2 s`", "sensors.delay=2 ms"),
         (
             "cylinder-servo",
             ["sensors.angle_resolution=10 deg"],

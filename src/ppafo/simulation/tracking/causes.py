@@ -44,6 +44,8 @@ _EDGE = 1.05
 """Command divided by the dead band, up to which the command counts as within the band [-]."""
 _EXPLAINED = 0.6
 """Smallest fraction of the squared error explained by a lag for which the lag is reported [-]."""
+_SLOWER = (0.7, 0.4, 0.2, 0.1, 0.05)
+"""Frequencies of a reference in trials, divided by its own frequency [-]."""
 _SLOW, _FEW_DECISIONS = 0.01, 20.0
 """Period of a controller [s], and decisions in the settled part below which that period makes the loop fail [-]."""
 _SENSOR_FLAWS = tuple(
@@ -222,7 +224,12 @@ def _lag(case: Case) -> TrackingCause | None:
         text = f"it lags its reference by {1.0e3 * delay:.3g} ms"
     remedies = [*stiffened(scenario, (2.0, 4.0)), *larger_gains(scenario, case.law, (2.0, 4.0))]
     frequency = float(scenario.reference.settings.get("frequency", 0.0))
-    remedies += [remedy(scenario, {"reference.frequency": share * frequency}) for share in (0.7, 0.4, 0.2) if frequency]
+    for share in _SLOWER if frequency else ():
+        slower = {"reference.frequency": share * frequency}
+        # The judged half of a run shows a period of the slower reference.
+        if share * case.settled.periods < 1.0:
+            slower["run.duration"] = 2.0 / (share * frequency)
+        remedies.append(remedy(scenario, slower))
     return TrackingCause(text, tuple(remedies), "use larger gains, less delay or a slower reference")
 
 

@@ -1,17 +1,27 @@
 """Causes outside the loop: torque or load beyond reach, and initial pressures that do not carry the load."""
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
+from ppafo.control.catalog import PROFILES
 from ppafo.metrics.metric import Floats, followed
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
 from ppafo.parameters.graph import PRESSURE_PATH
 from ppafo.parameters.reach import static_torque, supply_for, supply_that_moves, torque_reach
 from ppafo.simulation.numbers import number_at
+from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.remedies import Remedy, change_text, level_text, remedy, stiffer_laws, torque_asked
+from ppafo.simulation.tracking.rule import FEWEST_PERIODS, LARGEST_SHARE
 
+_MARGINS = (1.05, 1.5)
+"""Static torque at an increased supply pressure divided by the wanted torque; the second for a fast wave [-]."""
+_WITHIN = 0.95
+"""Reduced reference divided by the actuator's reach [-]."""
 LOCKED = Remedy({}, ("motion.kind=locked",))
 """Remedy for a free joint that nothing resists."""
 _ON_STOP = 1.0e-3
@@ -26,33 +36,81 @@ _FLUNG = 0.5
 """Initial deviation from the reference, divided by the wanted change, from which a joint counts as thrown off [-]."""
 
 
+class TorqueReach(NamedTuple):
+    """Wanted torque at an angle, and the reach of the actuator in its direction there.
+
+    ``wanted`` and ``reach`` [N m], ``angle`` [rad]; ``upwards`` is true for a torque above the reach, false for one
+    below.
+    """
+
+    wanted: float
+    reach: float
+    angle: float
+    upwards: bool
+
+    @property
+    def lacking(self) -> float:
+        """Torque beyond reach [N m], 0 or less within reach."""
+        return self.wanted - self.reach if self.upwards else self.reach - self.wanted
+
+
+def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
+    """Highest and lowest wanted torque with the reach there; a reference with a period counts with its own peaks."""
+    scenario, has_period = case.scenario, math.isfinite(case.settled.periods)
+    samples = slice(None) if has_period else case.settled.samples
+    reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
+    lowest, highest = profile_bounds(scenario.reference) if has_period else (reference.min(), reference.max())
+    top, bottom = float(angle[int(np.argmax(reference))]), float(angle[int(np.argmin(reference))])
+    return (
+        TorqueReach(float(highest), torque_reach(scenario.device, top)[1], top, upwards=True),
+        TorqueReach(float(lowest), torque_reach(scenario.device, bottom)[0], bottom, upwards=False),
+    )
+
+
+def cuts_wave(case: Case) -> bool:
+    """True if a moving reference of a torque goes so far beyond the actuator's reach that it cannot follow."""
+    settled = case.settled
+    if case.scenario.controlled != TORQUE or settled.rests or settled.ends_on_ramp:
+        return False
+    return max(peak.lacking for peak in torque_peaks(case)) > LARGEST_SHARE * settled.wanted
+
+
 def torque_beyond_reach(case: Case) -> TrackingCause | None:
     """Cause: the wanted torque exceeds the actuator's torque from its supplies at that angle."""
-    scenario, samples = case.scenario, case.settled.samples
+    scenario, device, settled = case.scenario, case.scenario.device, case.settled
     if scenario.controlled != TORQUE or case.oscillates:
         return None
-    reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
-    worst = int(np.argmax(np.abs(reference)))
-    wanted, wanted_at = float(reference[worst]), float(angle[worst])
-    lowest, highest = torque_reach(scenario.device, wanted_at)
-    if lowest <= wanted <= highest:
+    peaks = torque_peaks(case)
+    worst = max(peaks, key=lambda peak: peak.lacking)
+    if worst.lacking <= 0.0:
         return None
-    reach, supply = highest if wanted > highest else lowest, supply_that_moves(scenario.device, wanted > highest)
-    stop = stop_of(scenario, case.recording["angle"][samples]) if isinstance(scenario.motion, FreeMotion) else ""
+    supply = supply_that_moves(device, worst.upwards)
+    is_free = isinstance(scenario.motion, FreeMotion)
+    stop = stop_of(scenario, case.recording["angle"][settled.samples]) if is_free else ""
     lies = f"only the {stop} stop, on which the joint lies, resists the torque: " if stop else ""
     text = (
-        f"{lies}at {level_text('rad', wanted_at)} and {level_text('Pa', number_at(scenario, supply))} the "
-        f"actuator gives at most {level_text('N m', reach)}"
+        f"{lies}at {level_text('rad', worst.angle)} and {level_text('Pa', number_at(scenario, supply))} the "
+        f"actuator gives at most {level_text('N m', worst.reach)}"
     )
     if lies:
         return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or add a load", is_beyond_reach=True)
-    remedies = []
-    needed = supply_for(scenario.device, wanted_at, 1.05 * wanted)
-    if needed is not None:
-        remedies.append(remedy(scenario, {supply: needed}))
-    if "level" in scenario.reference.settings and not scenario.reference.kind.startswith("sine"):
-        remedies.append(remedy(scenario, {"reference.level": 0.95 * reach}))
-    return TrackingCause(text, tuple(remedies), is_beyond_reach=True)
+    lacking = [peak for peak in peaks if peak.lacking > 0.0]
+    changes: list[dict[str, float]] = []
+    for margin in _MARGINS:
+        needed = [supply_for(device, peak.angle, margin * peak.wanted) for peak in lacking]
+        given = [pressure for pressure in needed if pressure is not None]
+        if len(given) == len(lacking):
+            paths = [supply_that_moves(device, peak.upwards) for peak in lacking]
+            changes.append(dict(zip(paths, given, strict=True)))
+    if "amplitude" in scenario.reference.settings:
+        level = float(scenario.reference.settings["level"])
+        changes.append({"reference.amplitude": min(abs(_WITHIN * peak.reach - level) for peak in peaks)})
+    elif PROFILES[scenario.reference.kind].is_monotone:
+        changes.append({"reference.level": _WITHIN * worst.reach})
+    # The judged half of a trial shows a period of the reference.
+    is_long = settled.rests or settled.periods >= FEWEST_PERIODS
+    longer = {} if is_long else {"run.duration": scenario.run.duration / settled.periods}
+    return TrackingCause(text, tuple(remedy(scenario, {**each, **longer}) for each in changes), is_beyond_reach=True)
 
 
 def load_beyond_reach(case: Case) -> TrackingCause | None:

@@ -25,6 +25,7 @@ from ppafo.simulation.tracking.rule import (
     excess_of_walk,
     is_noisy,
     only_switches,
+    settled_periods,
     torque_limit,
 )
 
@@ -99,15 +100,20 @@ def tracking_excess(
             return TrackingExcess(np.where(known, excess, np.nan), np.where(counted | known, turning, np.nan))
         settled = _settled_task(scenario, {name.removeprefix("settled_"): row for name, row in numbers.items()}, least)
         found = excess_of_task(settled, only_switches(scenario, scenario.law))
-        # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
         # On the ramp every loop is behind, and what lies beyond reach may not have been asked for yet.
-        is_short = (shortfall(scenario) > 0.0) & ~np.asarray(settled.ends_on_ramp)
-        missing = np.where(is_short, np.abs(settled.missing) / (LARGEST_SHARE * settled.wanted), 0.0)
+        beyond = np.where(settled.ends_on_ramp, 0.0, shortfall(scenario))
+        allowed = LARGEST_SHARE * settled.wanted
+        # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does. The
+        # mean error of a wave tells nothing of its peaks.
+        cut = np.where(settled.rests, 0.0, beyond / allowed)
+        missing = np.where(beyond > 0.0, np.fmax(np.abs(settled.missing) / allowed, cut), 0.0)
     known = np.isfinite(numbers["settled_error"])
-    # A value that does not move is no oscillation, however far it is from the reference.
-    oscillation = np.fmax(turning, np.where(found.still > 1.0, 0.0, found.swings))
+    largest = np.max([turning, *found, missing], axis=0)
+    known_verdict = known & ~(settled.is_undecided & (largest <= 1.0))
+    # A value that does not move is no oscillation, however far it is from the reference, and a cut wave is none either.
+    oscillation = np.fmax(turning, np.where((found.still > 1.0) | (cut > 1.0), 0.0, found.swings))
     return TrackingExcess(
-        largest=np.where(known, np.max([turning, *found, missing], axis=0), np.nan),
+        largest=np.where(known_verdict, largest, np.nan),
         oscillation=np.where(counted | known, oscillation, np.nan),
     )
 
@@ -158,6 +164,8 @@ def _settled_task(scenario: Scenario, numbers: Mapping[str, Floats], least: floa
         worst=numbers["worst"],
         span=numbers["span"],
         wave=numbers["wave"],
+        periods=settled_periods(scenario),
+        is_smooth=PROFILES[scenario.reference.kind].is_smooth,
         way=np.maximum(asked, highest - lowest) if scenario.controlled == ANGLE else 0.0,
         ends_on_ramp=(share <= 0.0) & PROFILES[scenario.reference.kind].is_monotone,
     )

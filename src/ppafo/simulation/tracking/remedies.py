@@ -36,6 +36,8 @@ _STEP_OF_PAIR = 0.2
 """Step of a pair during its dead time divided by the wanted change, aimed at with a smaller orifice [-]."""
 _TORQUE_OVER_FRICTION = 1.5
 """Torque that a controller should be able to request, divided by the static friction of the joint [-]."""
+_SHORT = 0.1
+"""Time below which a text has milliseconds [s]."""
 _KEPT_OF_ORIFICE = (".critical_ratio", ".discharge_coefficient")
 """Second number of an orifice, which a remedy leaves unchanged."""
 
@@ -71,6 +73,8 @@ def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
 def level_text(unit: str, number: float) -> str:
     """Value with its display unit, from a number in an SI unit; pressures as gauge pressures, or as differences."""
     value, shown = metric_level(float(number), unit)
+    if shown == "s" and abs(value) < _SHORT:
+        value, shown = 1.0e3 * value, "ms"
     # As it can be pasted: a difference of pressures is told from a level by its unit.
     return f"{without_exponent(value, '.3g')} {shown}{'_d' if unit == 'Pa_d' else ''}".rstrip()
 

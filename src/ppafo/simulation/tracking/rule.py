@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.command import command_reversals, requested_samples
 from ppafo.metrics.metric import Floats, controlled_in, extent, followed, hold_start
@@ -36,6 +37,8 @@ LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
 """Largest angle error for a moving reference [rad], or divided by the reference's range [-] if that allows more."""
 LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
 """Largest range of the angle error for a reference at rest, in the same two ways: a swing of 1 deg is visible."""
+LARGEST_WORST_SHARE = 0.4
+"""Largest error divided by the wanted change, for a smooth wave of a torque or a pressure: twice the RMS error [-]."""
 LARGEST_SHARE_OF_WAVE = 0.5
 """Standard deviation of the error divided by the standard deviation of a moving reference [-].
 
@@ -50,6 +53,8 @@ MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
 """Command reversals per stride and per second above which a loop oscillates."""
 PER_TURN = 2.0
 """Additional command reversals for each reversal of the reference: there and back."""
+FEWEST_PERIODS = 0.5
+"""Periods of a reference in the settled part, below which the part may hold no peak of the reference [-]."""
 _TIMES_OF_REFERENCE = 4000
 """Number of times at which a reference is evaluated to count its reversals."""
 SMALLEST_MOVE = 0.01
@@ -79,7 +84,8 @@ class SettledPart(NamedTuple):
     rests. ``start`` [s] is the start of the settled part, 0 for a walk. ``worst`` is the largest error and ``span`` the
     range of the error. ``way`` is the range of initial value and reference for an angle, 0 for other quantities.
     ``reversals`` [1/s] is the rate of command reversals in the last half of the part; ``wave`` the standard deviation
-    of the reference.
+    of the reference, and ``periods`` its number of periods in the part, infinite without a period. ``is_smooth`` is
+    true for a reference without steps and corners.
     """
 
     samples: slice | NDArray[np.bool_]
@@ -99,6 +105,14 @@ class SettledPart(NamedTuple):
     way: float = 0.0
     reversals: float = 0.0
     wave: float = 0.0
+    periods: float = math.inf
+    is_smooth: bool = False
+
+    @property
+    def is_undecided(self) -> Any:
+        """True if the part is no basis for the verdict that a run follows: it ends on a ramp, or may hold no peak."""
+        moves = ~np.asarray(self.rests) & (np.asarray(self.wave) > 0.0)
+        return np.asarray(self.ends_on_ramp) | (moves & (np.asarray(self.periods) < FEWEST_PERIODS))
 
     @property
     def share(self) -> float:
@@ -127,6 +141,15 @@ def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: flo
     times = np.linspace(0.0, duration, _TIMES_OF_REFERENCE)
     values = np.asarray(profile_values(scenario.reference, times)[0], dtype=np.float64)
     return most + PER_TURN * reversals(values, OSCILLATION_THRESHOLD * (highest - lowest))
+
+
+def settled_periods(scenario: Scenario) -> Any:
+    """Periods of the reference in the second half of a run [-], inf without a period; an array (runs,) if it varies."""
+    settings = scenario.reference.settings
+    half = 0.5 * np.asarray(scenario.run.duration)
+    if "frequency" in settings:
+        return half * settings["frequency"]
+    return half / settings["period"] if "period" in settings else math.inf
 
 
 def is_pair(scenario: Scenario) -> bool:
@@ -216,6 +239,8 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
         # Noise that turns the command until the joint rests is no oscillation.
         reversals=2.0 * command_reversals(recording, last_half) / max(float(time[-1] - time[samples][0]), 1.0),
         wave=float(np.std(reference[samples])),
+        periods=float(settled_periods(scenario)),
+        is_smooth=PROFILES[scenario.reference.kind].is_smooth,
     )
 
 
@@ -289,14 +314,17 @@ def largest_error(settled: SettledPart, is_switched: bool) -> Floats:
 
 
 def largest_deviation(settled: SettledPart) -> Floats:
-    """Largest range of the error of an angle whose reference rests [rad], or largest error while that moves [rad].
+    """Largest range of the error while the reference rests, or largest error while it moves; inf without a limit.
 
-    The numbers of ``settled`` may be arrays (runs,).
+    An angle has both limits [rad], a smooth wave of another quantity the second one. The numbers of ``settled`` may be
+    arrays (runs,).
     """
+    rests, way, wanted = (np.asarray(each) for each in (settled.rests, settled.way, settled.wanted))
     # Degrees count for an angle, however far it goes.
-    rests, way = np.asarray(settled.rests), np.asarray(settled.way)
-    swing, error = LARGEST_SWING_SHARE * way, LARGEST_ANGLE_SHARE * way
-    limit: Floats = np.where(rests, np.maximum(LARGEST_ANGLE_SWING, swing), np.maximum(LARGEST_ANGLE_ERROR, error))
+    swing, error = (LARGEST_SWING_SHARE * way, LARGEST_ANGLE_SHARE * way)
+    of_angle = np.where(rests, np.maximum(LARGEST_ANGLE_SWING, swing), np.maximum(LARGEST_ANGLE_ERROR, error))
+    of_other = np.where(~rests & settled.is_smooth, LARGEST_WORST_SHARE * wanted, np.inf)
+    limit: Floats = np.where(way > 0.0, of_angle, of_other)
     return limit
 
 
@@ -308,7 +336,6 @@ def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
     """
     rests, share = np.asarray(settled.rests), np.asarray(settled.share)
     deviation: Floats = np.where(rests, settled.span, settled.worst) / largest_deviation(settled)
-    deviation = np.where(np.asarray(settled.way) > 0.0, deviation, 0.0)
     off = np.asarray(settled.error) / largest_error(settled, is_switched)
     if is_switched:
         # It swings about its reference by design: its mean error is to be less.

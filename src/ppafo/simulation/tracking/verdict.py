@@ -1,5 +1,6 @@
 """Verdict on a run: whether it follows its reference, the cause of a failure, and remedies that were tried."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -12,7 +13,7 @@ from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import CAUSES_OF_TASK
-from ppafo.simulation.tracking.load_causes import torque_beyond_reach
+from ppafo.simulation.tracking.load_causes import cuts_wave, torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
     LARGEST_SHARE,
@@ -174,11 +175,13 @@ def following_text(result: "RecordedResult") -> str:
     case, settled = judged[0], judged[0].settled
     if case.failure is not None:
         return ""
-    if settled.ends_on_ramp:
-        error, since = change_text(controlled.name, settled.error), time_text(settled.start)
-        return _undecided_text(
-            scenario, f"the run ends on the ramp of its reference, with an RMS error of {error}{since}"
-        )
+    if settled.is_undecided:
+        left = f"with an RMS error of {change_text(controlled.name, settled.error)}{time_text(settled.start)}"
+        if settled.ends_on_ramp:
+            return _undecided_text(scenario, f"the run ends on the ramp of its reference, {left}")
+        judged_share = f"the judged half of the run holds {settled.periods:.2g} periods of the reference"
+        longer = override_text([f"run.duration={2.0 * scenario.run.duration / settled.periods:.3g} s"])
+        return f"no verdict on the {controlled.words}: {judged_share}, {left}; not tried: {longer} should give one"
 
     def judged_text(name: str, number: float, limit: float | None, why: str = "") -> str:
         allowed = "" if limit is None else f" ({change_text(controlled.name, limit)} allowed{why})"
@@ -191,12 +194,19 @@ def following_text(result: "RecordedResult") -> str:
         return begin + judged_text(*rms, LARGEST_SHARE_OF_WAVE * settled.wanted)
     # The limit of on/off valves is several times wider, so the swing is reported beside the error.
     why = ", because the valves are either open or shut" if case.only_switches else ""
-    limit = float(largest_deviation(settled)) if settled.way > 0.0 and not case.only_switches else None
+    largest = float(largest_deviation(settled))
+    limit = None if math.isinf(largest) or case.only_switches else largest
     deviation = ("swing", settled.span) if settled.rests else ("largest error", settled.worst)
     texts = judged_text(*rms, float(largest_error(settled, case.only_switches)), why), judged_text(*deviation, limit)
     # A reference just beyond reach is missed by no more than is allowed.
     beyond = torque_beyond_reach(case)
     return f"{begin}{', '.join(texts)}{'' if beyond is None else f'; {beyond.text}'}"
+
+
+def is_undecided(result: "RecordedResult") -> bool:
+    """True if the settled part of a result is no basis for the verdict that the result follows its reference."""
+    judged = _judged(result)
+    return judged is not None and bool(judged[0].settled.is_undecided)
 
 
 def _undecided_text(scenario: Scenario, reason: str) -> str:
@@ -254,7 +264,10 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     else:
         failure = failure_of_walk(settled, turning, limit)
     case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
+    # An error at the cut peaks of a wave reverses more often than the wave, and is no oscillation.
+    if is_task and turning <= 1.0 and failure in (None, "oscillates") and cuts_wave(case):
+        case = case._replace(failure="does not follow")
     # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
-    if failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
+    elif failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
         case = case._replace(failure="does not follow" if torque_beyond_reach(case) is not None else None)
     return case, turning, reversals / recording.duration, stride_time
