@@ -496,6 +496,10 @@ def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> Non
         told = simulate("torque-task-solenoid", [*changes[1:], limited])
         assert not any("a second, and no value" in said for said in told.warnings)
     assert simulate(TASK, ["reference.level=4 N m"]).warnings == ()
+    # A slew limit leaves the spool on its way: the remark stays until the valve is fast enough for its law.
+    slow = simulate(TASK, ["controller.kind=on_off", "reference.level=3 N m", "valve.slew_limit=50 1/s"])
+    (remark,) = (said for said in slow.warnings if "a second" in said)
+    assert "`valve.slew_limit` lets them open and shut fully at most 25 times a second" in remark
 
 
 def test_a_reference_just_beyond_reach_that_is_followed_within_the_limit_is_told_the_reach() -> None:

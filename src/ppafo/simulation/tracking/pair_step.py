@@ -1,7 +1,7 @@
 """Smallest change of the controlled quantity by a pair of on/off valves: the change during their dead time."""
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from ppafo.control.catalog import CONTROLLERS
@@ -29,8 +29,17 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("ppafo")
 
-_LIMITS = ("opening_delay", "closing_delay", "switching_interval", "spool_frequency", "slew_limit")
-"""Numbers of a valve that limit how often it switches; each limits nothing where it is 0."""
+_TRAVEL_TIMES: dict[str, Callable[[float], float]] = {
+    "opening_delay": lambda delay: delay,
+    "closing_delay": lambda delay: delay,
+    "switching_interval": lambda interval: interval,
+    "spool_frequency": lambda frequency: 0.5 / frequency,
+    "slew_limit": lambda slew: 2.0 / slew,
+}
+"""Time [s] in which a valve goes from one end to the other, from each number that limits it; 0 limits nothing.
+
+A second-order spool takes half of its natural period, a limited slew rate two full openings.
+"""
 _REPORTED_SWITCHING = 20.0
 """Switching frequency of the solenoid valves of the paper [Hz], the only one that it reports."""
 _LARGEST_STEP = 0.25
@@ -45,22 +54,32 @@ def pair_step(scenario: Scenario, law: ControllerKind) -> tuple[float, float]:
 
 
 def unlimited_switching(result: "RecordedResult") -> str:
-    """Remark on valves that switch faster than known valves because their data limit no rate; "" for others.
+    """Remark on valves that reverse more often than their data permit, or than known valves do; "" for others.
 
-    The limit is the switching frequency that the paper reports of its solenoid valves.
+    Without data the limit is the switching frequency that the paper reports of its solenoid valves.
     """
     scenario = result.scenario
     if not (scenario.follows_reference and only_switches(scenario, scenario.law)) or REVERSALS not in result.metrics:
         return ""
     often = result.metrics[REVERSALS].value / max(result.recording.duration, 1.0)
     valve = scenario.device.valve.settings
-    limits = [name for name in _LIMITS if name in valve]
-    if often <= _REPORTED_SWITCHING or any(valve[name] > 0.0 for name in limits):
+    names = [name for name in _TRAVEL_TIMES if name in valve]
+    times = {name: _TRAVEL_TIMES[name](float(valve[name])) for name in names if valve[name] > 0.0}
+    slowest = max(times, key=lambda name: times[name], default="")
+    allowed = 1.0 / times[slowest] if slowest else 0.0
+    if often <= max(_REPORTED_SWITCHING, allowed):
         return ""
-    missing = ", ".join(f"`valve.{name}`" for name in limits)
+    reversals = f"the valves are reversed {without_exponent(often, '.3g')} times a second"
+    if slowest:
+        return (
+            f"{reversals}, but `valve.{slowest}` lets them open and shut fully at most "
+            f"{without_exponent(allowed, '.3g')} times a second: they remain partly open, which on/off control does "
+            "not expect; use a lower `controller.rate`, a wider dead zone or a faster valve"
+        )
+    missing = ", ".join(f"`valve.{name}`" for name in names)
     return (
-        f"the valves are reversed {without_exponent(often, '.3g')} times a second, and no value of the "
-        f"parameter set limits this rate ({missing} are 0): give these values, or a lower `controller.rate`"
+        f"{reversals}, and no value of the parameter set limits this rate ({missing} are 0): give these values, or a "
+        "lower `controller.rate`"
     )
 
 
