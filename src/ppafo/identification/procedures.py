@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from ppafo.documents.models import StrictTable, Text
@@ -24,10 +25,18 @@ from ppafo.identification.keys import Columns, Confidence, positive_in, quantity
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.identification.unit_check import with_smoothing_unit
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
-from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si, with_followers
+from ppafo.parameters.parameter_set import (
+    ParameterSet,
+    atmospheric_pressure,
+    chosen_valve,
+    number_in_si,
+    with_followers,
+)
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+from ppafo.units.reference import molar_mass_in
 from ppafo.wording import nearest_name
 
 PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"
@@ -42,8 +51,12 @@ _Valve = Annotated[Text | None, Field(description="name of a valve of the set; d
 _UNKNOWN = "unknown"
 _COLDEST, _HOTTEST = 150.0, 600.0
 """Lowest and highest gas temperature [K] of a bench."""
+_SAME_GAS = 0.01
+"""Relative difference of two molar masses up to which they are of one gas [-]."""
 _THERMOMETER = 1.0
 """Error limit [K] of a gas temperature stated in the problem file."""
+_STEPS_OF_DECAY = 5.0e-6, 0.2
+"""Times between samples of a free decay [s], which lasts seconds at most; others mean a wrong unit of time."""
 _MOST_OF_STOPS = 10.0
 """Largest plausible ratio of swing in a free decay to angle between the stops [-]; more means a wrong unit."""
 
@@ -64,11 +77,30 @@ class ProcedureContext:
             raise IdentificationError(f"{self.label}: {path} is missing; add it to {self.parameter_set.file}")
         return value
 
-    def gas(self, problem: "OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem") -> GasAt:
+    def gas(self, problem: "FlowProblem", sources: tuple[RecordingSource, ...]) -> GasAt:
         """Return the gas of the bench; species and temperature default to the values of the set.
 
-        Raises IdentificationError for an unknown species.
+        Raises IdentificationError for an unknown species, and for a flow recorded as one of another gas.
         """
+        gas = self._gas(problem)
+        for source in sources:
+            channel = source.recording.channels.get("mass_flow")
+            stated = "" if channel is None else channel.stated
+            metered = molar_mass_in(stated)
+            if metered is None or abs(metered / gas.molar_mass - 1.0) < _SAME_GAS:
+                continue
+            used = f"the set's, {gas.molar_mass:.4g} kg/mol" if problem.gas is None else problem.gas
+            names = [name for name, each in SPECIES.items() if abs(each.molar_mass / metered - 1.0) < _SAME_GAS]
+            name = names[0] if names else ""
+            remedy = f"; give gas = '{name}' in the procedure, or correct the unit of the flow" if name else ""
+            raise IdentificationError(
+                f"{source.name}: mass_flow in '{stated}' is a flow of {name or 'another gas'}, "
+                f"{metered:.4g} kg/mol, but the gas of {self.label} is {used}{remedy}"
+            )
+        return gas
+
+    def _gas(self, problem: "FlowProblem") -> GasAt:
+        """Return the gas that the procedure or the set states."""
         temperature = quantity_in(problem, "temperature", "K", self.label, _COLDEST, _HOTTEST)
         if temperature is None:
             temperature = self.number("gas.temperature")
@@ -132,9 +164,18 @@ class FreeDecayProblem(StrictTable):
         return inertia, 0.0 if inertia is None else context.deviation(path, inertia, "kg m^2")
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
-        """Identify damping and friction from recordings. Raises IdentificationError for an implausible angle."""
+        """Identify damping and friction from recordings.
+
+        Raises IdentificationError for an implausible angle or an implausible time between samples.
+        """
         low, high = (number_in_si(context.parameter_set, f"actuator.angle_{end}") for end in ("min", "max"))
         for source in sources:
+            step = float(np.median(np.diff(source.recording.time))) if len(source.recording) > 1 else 0.0
+            if step and not _STEPS_OF_DECAY[0] < step < _STEPS_OF_DECAY[1]:
+                raise IdentificationError(
+                    f"{source.name}: free-decay: the times of the samples are {step:.3g} s apart; is the unit of time "
+                    f"{'ms' if step > 1.0e-3 else 's'}?"
+                )
             angles = source.recording["angle"] if "angle" in source.recording else source.recording.time[:1]
             turned = float(angles.max() - angles.min())
             if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
@@ -177,7 +218,7 @@ class OpenValveFlowProblem(StrictTable):
         path = context.valve_path(self.valve)
         return open_valve_flow(
             sources,
-            context.gas(self),
+            context.gas(self, sources),
             self.law,
             area=number_in_si(context.parameter_set, f"{path}.area"),
             path=path,
@@ -239,7 +280,7 @@ class VaneLeakProblem(StrictTable):
         start, end = times_of(self, context.label)
         return vane_leak(
             sources,
-            context.gas(self),
+            context.gas(self, sources),
             first,
             second,
             discharge_coefficient=number_in_si(context.parameter_set, "actuator.leak.discharge_coefficient"),
@@ -266,7 +307,7 @@ class ValveMapProblem(StrictTable):
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
         """Identify the flow of the valve over command from recordings."""
-        gas = context.gas(self)
+        gas = context.gas(self, sources)
         return valve_map(sources, gas, context.valve_path(self.valve), self.confidence, context.tolerances)
 
 
@@ -275,7 +316,8 @@ def times_of(problem: FreeDecayProblem | VaneLeakProblem, label: str) -> tuple[f
     return quantity_in(problem, "start", "s", label), quantity_in(problem, "end", "s", label)
 
 
-ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
+FlowProblem = OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
+ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | FlowProblem
 
 
 def run_procedure(
@@ -292,6 +334,8 @@ def run_procedure(
         if str(error).startswith((context.label, *(source.name for source in sources))):
             raise
         raise IdentificationError(f"{context.label}: {error}") from error
+    atmosphere = atmospheric_pressure(context.parameter_set)
+    result = with_smoothing_unit(result, sources, atmosphere, lambda again: problem.run(again, context))
     acting = ("zero",) if problem.kind == "static-torque" else ()
     idle = [f"'{name}'" for name in context.tolerances.each_recording if name not in acting]
     if not idle or len(sources) == 1:

@@ -1,17 +1,26 @@
-"""Unit mistakes that explain estimates far from the values of the parameter set."""
+"""Unit mistakes that explain estimates far from the values of the parameter set, or readings far from the model."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
+from ppafo.errors import IdentificationError
+from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.estimate import WRONG_UNIT, Estimate
+from ppafo.identification.source import RecordingSource
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded.misread_units import misread_units
+from ppafo.units import percentage, split_pressure_kind
 
 FAR_FROM_SET = 5.0
 """Ratio to the value of the set above which a wrong unit is suspected: psi read as kPa makes 6.89."""
 _NEAR = 1.5
 """Largest ratio [-] of an estimate, divided by the value of the set, to the factor of a unit mistake."""
+_LARGE_SCATTER, _SMOOTHER = 0.01, 5.0
+"""Scatter of readings from which another unit is tried, and its ratio to the scatter with that unit to report it [-].
+
+The zero of a gauge pressure and the choked flow make a law of the absolute pressure fit one unit only.
+"""
 
 
 def with_wrong_units(
@@ -62,3 +71,52 @@ def with_wrong_units(
                     for item in estimates
                 )
     return explained
+
+
+def with_smoothing_unit(
+    result: BenchResult,
+    sources: tuple[RecordingSource, ...],
+    atmosphere: float,
+    run: Callable[[tuple[RecordingSource, ...]], BenchResult],
+) -> BenchResult:
+    """Return the result, with the verdict of a wrong unit where the readings fit the model far better in another unit.
+
+    ``atmosphere`` [Pa absolute] is the zero of gauge pressures; ``run`` repeats the procedure with other recordings.
+    """
+    if not result.scatter > _LARGE_SCATTER:
+        return result
+    smoothest, found = result.scatter / _SMOOTHER, result
+    for names, mistake, factor in _misread_pressures(sources):
+        again = [replace(source, recording=_in_unit(source.recording, names, factor, atmosphere)) for source in sources]
+        try:
+            scatter = run(tuple(again)).scatter
+        except IdentificationError:
+            continue
+        if scatter < smoothest:
+            smoothest = scatter
+            text = (
+                f"{' and '.join(names)} {'seem' if len(names) > 1 else 'seems'} to be {mistake}, a factor of "
+                f"{max(factor, 1.0 / factor):.4g}; the scatter would be {percentage(scatter, 2)} of the largest "
+                f"reading instead of {percentage(result.scatter, 2)}; correct the unit in the header or the column map"
+            )
+            doubted = (replace(estimate, verdict=WRONG_UNIT, explanation=text) for estimate in result.estimates)
+            found = replace(result, estimates=tuple(doubted))
+    return found
+
+
+def _misread_pressures(sources: tuple[RecordingSource, ...]) -> Iterable[tuple[tuple[str, ...], str, float]]:
+    """Return names of absolute pressures, one or all, with a unit mistake and its factor: reading over true value."""
+    channels = {name: channel for source in sources for name, channel in source.recording.channels.items()}
+    names = tuple(name for name, channel in channels.items() if channel.unit == "Pa")
+    for chosen in dict.fromkeys((names, *((name,) for name in names))):
+        for mistake, factor in misread_units("Pa", [channels[name].stated for name in chosen]):
+            yield chosen, mistake, factor
+
+
+def _in_unit(recording: Recording, names: Iterable[str], factor: float, atmosphere: float) -> Recording:
+    """Return a recording with some absolute pressures divided by a factor, from the zero of their stated unit."""
+    for name in names:
+        channel = recording.channels[name]
+        zero = atmosphere if split_pressure_kind(channel.stated)[1] == "g" else 0.0
+        recording = recording.with_channel(name, zero + (channel.values - zero) / factor, channel.unit)
+    return recording

@@ -114,16 +114,29 @@ def read_unit(unit: str) -> tuple[ParsedUnit, str]:
             f"'{unit}' {'states no gas' if not gases else 'states two gases'}: write '{example}', or use another "
             f"gas ({', '.join(MOLAR_MASSES)}) or a molar mass in kg/mol"
         )
-    word = gases[0]
-    molar_mass = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}.get(word.lower())
-    if molar_mass is None:
-        match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(\S+)\s*", word)
-        of_gas = None if match is None else parse_unit(match[2])[0]
-        if match is None or of_gas is None or of_gas.dimensions != _MOLAR_MASS or not float(match[1]) > 0.0:
-            raise UnitError(f"'{word}' is not a molar mass, such as '0.044 kg/mol'")
-        molar_mass = float(of_gas.in_base(Decimal(match[1])))
-    factor = Decimal(repr(density(condition, molar_mass)))
+    factor = Decimal(repr(density(condition, _molar_mass(gases[0]))))
     return ParsedUnit(DECIMALS.multiply(parsed.scale, factor), Decimal(0), MASS_FLOW), ""
+
+
+def molar_mass_in(unit: str) -> float | None:
+    """Return the molar mass [kg/mol] of the gas that a unit of flow states, such as air in 'L/min (ANR, air)'.
+
+    None for a unit without a gas.
+    """
+    gases = _condition_and_gases(flow_of(unit)[1])[1]
+    return _molar_mass(gases[0]) if gases else None
+
+
+def _molar_mass(word: str) -> float:
+    """Return the molar mass [kg/mol] of a gas, given by name or as a molar mass with unit."""
+    known = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}.get(word.lower())
+    if known is not None:
+        return known
+    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(\S+)\s*", word)
+    of_gas = None if match is None else parse_unit(match[2])[0]
+    if match is None or of_gas is None or of_gas.dimensions != _MOLAR_MASS or not float(match[1]) > 0.0:
+        raise UnitError(f"'{word}' is not a molar mass, such as '0.044 kg/mol'")
+    return float(of_gas.in_base(Decimal(match[1])))
 
 
 def without_condition(unit: str) -> str:

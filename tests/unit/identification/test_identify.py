@@ -433,7 +433,7 @@ def test_bench_and_trajectory_hold_a_number_alike() -> None:
     decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",))
     told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2")
     assert decay.inertia_of(chosen)[1] == held["foot_plate.inertia"] == told.inertia_of(chosen)[1]
-    assert chosen.gas(leak).temperature_deviation == held["gas.temperature"]
+    assert chosen.gas(leak, ()).temperature_deviation == held["gas.temperature"]
     # The displacement is known as well as the torque constant, which it follows.
     swept = math.radians(60.0) - device.actuator.angle_min
     volume = math.hypot(held["actuator.dead_volume_1"], swept * held["actuator.torque_constant"])

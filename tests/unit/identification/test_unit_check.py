@@ -7,6 +7,7 @@ import pytest
 
 from ppafo.analyses.identify.answer import Identification
 from ppafo.analyses.identify.question import identify
+from ppafo.errors import IdentificationError
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.unit_check import with_wrong_units
@@ -111,3 +112,73 @@ def test_values_of_a_fit_of_motion_that_are_all_off_by_one_factor_have_a_wrong_u
     named = {item.path for item in judged if item.verdict == "unit probably wrong"}
     assert named == wrong
     assert all("N cm read as N m, a factor of 100" in item.verdict_text for item in judged if item.path in named)
+
+
+def iso_6358(upstream: np.ndarray, downstream: float, conductance: float, ratio: float) -> np.ndarray:
+    """Mass flow [kg/s] of air at 20 degC by ISO 6358, equations (1) and (2), with the density of its atmosphere."""
+    subsonic = np.clip((downstream / upstream - ratio) / (1.0 - ratio), 0.0, None)
+    return conductance * 1.185 * upstream * np.sqrt(1.0 - subsonic**2)
+
+
+def flow_table(folder: Path, unit: str, gas: str, procedure: str = "") -> Identification:
+    """Identify C and b from a table of ANR litres of air per minute at gauge pressures in psi, stated in ``unit``."""
+    gauge = np.linspace(6.0, 90.0, 15)
+    flow = iso_6358(101325.0 + 6894.757 * gauge, 101325.0, 2.0e-8, 0.3)
+    flow *= 1.0 + np.random.default_rng(3).normal(0.0, 0.002, gauge.size)
+    rows = "".join(f"{p:.4g},{q * 60000.0 / 1.185:.5g}\n" for p, q in zip(gauge, flow, strict=True))
+    (folder / "flow.csv").write_text(f"p1,q\n{rows}")
+    (folder / "problem.toml").write_text(
+        f"""schema_version = 1
+name = "valve"
+device.set = "cylinder-lever"
+[columns.meter.channels]
+upstream_pressure = {{ column = "p1", unit = "{unit}" }}
+downstream_pressure = {{ constant = "101.325 kPa_a" }}
+mass_flow = {{ column = "q", unit = "L/min", at = "ANR"{gas} }}
+[[procedure]]
+kind = "open-valve-flow"
+recordings = ["flow.csv"]
+columns = "meter"
+law = "iso6358"
+temperature = "20 degC"
+{procedure}
+"""
+    )
+    return identify(folder / "problem.toml").found
+
+
+def test_a_table_of_flow_gives_the_conductance_of_its_formula(tmp_path: Path) -> None:
+    found = flow_table(tmp_path, "psi_g", ', gas = "air"')
+    conductance, ratio = found.estimates
+    assert conductance.value == pytest.approx(2.0e-8, rel=0.01)
+    assert ratio.value == pytest.approx(0.3, abs=0.03)
+
+
+def test_a_pressure_in_a_unit_that_scatters_is_no_conductance(tmp_path: Path) -> None:
+    found = flow_table(tmp_path, "kPa_g", ', gas = "air"')
+    mistake = "unit probably wrong: upstream_pressure seems to be psi read as kPa, a factor of 6.895"
+    assert {estimate.verdict_text for estimate in found.estimates} == {mistake}
+    assert not found.new_set.written
+
+
+def test_a_flow_metered_as_one_gas_is_not_used_in_the_law_of_another(tmp_path: Path) -> None:
+    with pytest.raises(
+        IdentificationError, match=r"a flow of CO2, 0\.044 kg/mol, but .* is the set's, 0\.02897 kg/mol; "
+    ):
+        flow_table(tmp_path, "psi_g", ', gas = "CO2"')
+    with pytest.raises(IdentificationError, match=r"is a flow of air, .* is CO2; give gas = 'air' in the procedure"):
+        flow_table(tmp_path, "psi_g", ', gas = "air"', 'gas = "CO2"')
+    # The gas of the procedure is the gas of a flow that states none.
+    litres = [flow_table(tmp_path, "psi_g", "", f'gas = "{gas}"').estimates[0].value for gas in ("air", "N2")]
+    assert litres[0] == pytest.approx(2.0e-8, rel=0.01)
+    # A volume of a lighter gas passes in proportion to 1/sqrt(M): C follows from the volume flow.
+    assert litres[1] != litres[0]
+
+
+@pytest.mark.parametrize(("scale", "step", "unit"), [(1.0e3, "1 s", "ms"), (1.0e-3, "1e-06 s", "s")])
+def test_a_free_decay_in_a_wrong_unit_of_time_is_refused(scale: float, step: str, unit: str, tmp_path: Path) -> None:
+    time = np.arange(0.0, 2.0, 1.0e-3)
+    swing = 0.3 * np.exp(-2.0 * time) * np.cos(30.0 * time)
+    decay = RecordingSource(Recording("decay", scale * time, {"angle": Channel(swing, "rad")}))
+    with pytest.raises(IdentificationError, match=f"the samples are {step} apart; is the unit of time {unit}"):
+        solved(tmp_path, decay, 'kind = "free-decay"\ninertia = "8 g m^2"\n', {})

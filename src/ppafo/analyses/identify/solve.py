@@ -10,7 +10,14 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import ProblemFile
-from ppafo.identification.procedures import PROCEDURES, ProcedureContext, ProcedureProblem, run_procedure, window_of
+from ppafo.identification.procedures import (
+    PROCEDURES,
+    FlowProblem,
+    ProcedureContext,
+    ProcedureProblem,
+    run_procedure,
+    window_of,
+)
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.identification.trajectory.layout import ExperimentSection
@@ -55,7 +62,13 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
                 source
                 for recording in procedure.recordings
                 for source in _sources(
-                    problem, folder / recording, file, procedure.columns, before, _ROW_TIMES.get(procedure.kind)
+                    problem,
+                    folder / recording,
+                    file,
+                    procedure.columns,
+                    before,
+                    _ROW_TIMES.get(procedure.kind),
+                    procedure.gas if isinstance(procedure, FlowProblem) else None,
                 )
             ]
             tasks.append(_Task(procedure, tuple(sources), f"{file}: procedure {number}, {procedure.kind}"))
@@ -117,11 +130,13 @@ def _sources(
     columns: str | None,
     parameter_set: ParameterSet,
     row_time: float | None = None,
+    gas: str | None = None,
 ) -> tuple[RecordingSource, ...]:
     """Return the recordings in a file that a problem names, read through a column map if one is given.
 
-    ``parameter_set`` provides the atmosphere for gauge pressures and the gas for volume flows. ``row_time`` [s] is the
-    time between the rows of a table of text, or of a column map, without a time column; None requires the column.
+    ``parameter_set`` provides the atmosphere for gauge pressures and, unless ``gas`` names it, the gas for volume
+    flows. ``row_time`` [s] is the time between the rows of a table of text, or of a column map, without a time column;
+    None requires the column.
     """
     atmosphere = atmospheric_pressure(parameter_set)
     if path.is_dir():
@@ -132,13 +147,13 @@ def _sources(
     if columns is None:
         return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
     molar_mass = number_in_si(parameter_set, "gas.molar_mass")
-    gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
+    flowing = gas or ("" if molar_mass is None else f"{molar_mass!r} kg/mol")
     column_map = problem.columns[columns]
     # A direction from a rate, and trials that begin anew, need the times of the bench.
     if row_time is not None and not (TIME in column_map.channels or column_map.direction or column_map.trial):
         time = MappedChannel(rate=f"{1.0 / row_time!r} Hz")
         column_map = column_map.model_copy(update={"channels": {TIME: time, **column_map.channels}})
-    recordings = read_trials(path, column_map, None, atmosphere, f"{file}:{columns}", gas)
+    recordings = read_trials(path, column_map, None, atmosphere, f"{file}:{columns}", flowing)
     return tuple(source_of(path, recording, recording.label.removeprefix(path.stem)) for recording in recordings)
 
 

@@ -81,7 +81,8 @@ def open_valve_flow(
     if law == "iso6358" and (np.ptp(ratio) < _SPAN or ratio.max() < _SUBSONIC):
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow: pressure ratios over a range "
-            f"of at least {_SPAN:g} and above {_SUBSONIC:g}, not {ratio.min():.3g} to {ratio.max():.3g}"
+            f"of at least {_SPAN:g} and above {_SUBSONIC:g}, not {ratio.min():.3g} to {ratio.max():.3g}; "
+            "measure more pressures, or check the units of the pressures"
         )
     # Beside a laminar gap the critical ratio decides whether the opening is an orifice.
     opening = Opening(gas, law, area or 1.0, critical_ratio if law == "both" else None)
@@ -99,6 +100,7 @@ def open_valve_flow(
     )
     measured_ordinate, fitted_ordinate = (_GRAMS_PER_BAR * values / upstream for values in (flow, model))
     marks = readings_mark("measured", ratio, measured_ordinate), curve_mark(law, ratio, fitted_ordinate)
+    scatter = float(np.std(flow - model) / flow.max())
     axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")
     result = result_of(
         PROCEDURE,
@@ -106,10 +108,11 @@ def open_valve_flow(
         fitted,
         reported,
         f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
-        f"scatter {np.std(flow - model) / float(flow.max()):.2%} of the largest flow",
+        f"scatter {scatter:.2%} of the largest flow",
         with_residuals("Open-valve flow", *axes, marks, ratio, measured_ordinate - fitted_ordinate),
         f"{NEXT_LAW[law]}, or leave those readings out",
         readings.remarks,
+        scatter,
     )
     # The size is the first of the estimates; without a unit it is a discharge coefficient.
     coefficient, *others = result.estimates

@@ -3,6 +3,7 @@
 Figure 3 of the paper combines the static torque and the free decay.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -23,7 +24,8 @@ class BenchResult:
     """Result of a bench procedure.
 
     ``kind``: origin of the recordings, which figures state unless measured. ``conflict``: sentence on readings whose
-    separate estimates differ from the common estimates, empty if all agree.
+    separate estimates differ from the common estimates, empty if all agree. ``scatter``: standard deviation of the
+    readings from the model, divided by the largest reading [-]; nan where the procedure does not state it.
     """
 
     procedure: str
@@ -33,6 +35,7 @@ class BenchResult:
     kind: RecordingKind
     conflict: str = ""
     remarks: tuple[str, ...] = ()
+    scatter: float = math.nan
 
     def __getitem__(self, path: str) -> Estimate:
         """Return the estimate at a path. Raises KeyError if the procedure did not estimate it."""
@@ -69,10 +72,11 @@ def result_of(
     panels: tuple[Panel, ...],
     remedy: str,
     remarks: tuple[str, ...] = (),
+    scatter: float = math.nan,
 ) -> BenchResult:
     """Return the result of a procedure: an estimate for each reported quantity, and remarks on the recordings.
 
-    ``remedy`` is the advice if some readings contradict the others.
+    ``remedy`` is the advice if some readings contradict the others; ``scatter`` is the field of the result.
     """
     origin = tuple(source.trace for source in sources)
     return BenchResult(
@@ -83,6 +87,7 @@ def result_of(
         kind=kind_of(source.recording.kind for source in sources),
         conflict=conflict_in_words(fitted, remedy),
         remarks=(*remarks, *remarks_on_readings(sources)),
+        scatter=scatter,
     )
 
 

@@ -448,7 +448,7 @@ def _steady_leak(
         tolerances,
         confidence,
     )
-    scatter = np.std(flow - model) / float(np.abs(flow).max())
+    scatter = float(np.std(flow - model) / np.abs(flow).max())
     marks = readings_mark("measured", difference, flow), curve_mark(opening.law, difference, model)
     axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind("Flow", "kg/s", "mass flow")
     return result_of(
@@ -460,4 +460,5 @@ def _steady_leak(
         with_residuals("Steady leak", *axes, marks, difference, flow - model),
         _REMEDY.format(NEXT_LAW[opening.law]),
         remarks,
+        scatter,
     )
