@@ -14,6 +14,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
 from ppafo.parameters.overrides import CHOSEN_VALVE, Override, check_valve, one_path, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
+    LEVELS,
     Entry,
     atmospheric_pressure,
     chosen_units,
@@ -28,8 +29,8 @@ from ppafo.wording import nearest_name, one_line, override_text
 
 logger = logging.getLogger("ppafo")
 
-_SECTIONS_WITH_UNITS = ("initial", "motion", "controller", "reference")
-"""Sections whose quantities define the display units of their author, in increasing priority."""
+_PARTS_WITH_UNITS = ("initial", "motion", "controller.peak_torque", "reference")
+"""Parts of a file whose quantities define the display units of their author, in increasing priority."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,8 +128,9 @@ def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
         device = build_device(hardware.parameter_set, hardware.valve, hardware.links)
     except ParameterError as error:
         raise device_error(reading, error) from error
-    written = chosen_units(_texts([reading.document.get(section) for section in _SECTIONS_WITH_UNITS]))
-    overridden = units_of_texts(value_at(reading.document, path) for path in sorted(reading.overridden))
+    written = chosen_units(_texts([value_at(reading.document, part) for part in _PARTS_WITH_UNITS]))
+    levels = [path for path in sorted(reading.overridden) if path.startswith(LEVELS)]
+    overridden = units_of_texts(value_at(reading.document, path) for path in levels)
     return replace(device, units={**device.units, **written, **overridden})
 
 
