@@ -11,7 +11,7 @@ from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import LinkFunction, acting
 from ppafo.parameters.overrides import other_forms
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, loop_terms
+from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, SLOPE_GAINS, loop_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.wording import override_text, subject_text
@@ -66,8 +66,11 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     """Return the gains in use of a scenario's torque controller; None for a controller without such gains."""
     if scenario.controller.is_outside:
         return None
+    settings = scenario.controller.settings
     items = [
-        quantity for quantity in law_settings(law, scenario.controlled) if GAIN_TERMS.intersection(quantity.follows)
+        quantity
+        for quantity in law_settings(law, scenario.controlled)
+        if GAIN_TERMS.intersection(quantity.follows) or (quantity.name in SLOPE_GAINS and settings[quantity.name])
     ]
     if not items:
         return None
@@ -76,7 +79,7 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
         _Gain(
             quantity.name,
             quantity.unit,
-            float(scenario.controller.settings[quantity.name]),
+            float(settings[quantity.name]),
             f"controller.{quantity.name}" in links,
         )
         for quantity in items
