@@ -152,6 +152,19 @@ _SPEAKING = {
     "rad": ("actuator.angle_max", "actuator.angle_min"),
 }
 """Paths of the values whose unit sets the display unit of a quantity, by SI unit."""
+LEVELS = (
+    "reference.",
+    "motion.",
+    "initial.",
+    "supply.",
+    "controller.peak_torque",
+    *_SPEAKING["N m"],
+    *_SPEAKING["rad"],
+)
+"""Prefixes of the paths whose unit, in an override or a study, sets the display unit of all levels of the quantity.
+
+A unit of a controller setting or a sensor is of this number alone: a tolerance in rad leaves angles in deg.
+"""
 _SPEAKING_ENDS = {
     "kg/s": (".mass_flow",),
     "m^3/(s Pa)": (".sonic_conductance",),

@@ -3,7 +3,7 @@
 Each mistake in the document raises an error of one line.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS
@@ -109,7 +109,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
             reference=reference,
             sensors=sensors,
             assumptions=(*assumptions, *assumed_lines(reading)),
-            origin=origin_of(request, document, hardware),
+            origin=origin_of(request, changed, hardware),
             gas_model=read_gas_model(reading),
             supply_line=supply_line,
             links={**initial_links, **reference_links, **control_links},
@@ -135,12 +135,12 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
 
 
 def origin_of(
-    request: ScenarioRequest, document: Mapping[str, Any], hardware: Hardware, named: Iterable[str] = ()
+    request: ScenarioRequest, changed: OverriddenDocument, hardware: Hardware, named: Iterable[str] = ()
 ) -> Origin:
     """Return the origin of a scenario; ``named`` are the overrides that state the paths of ``request.instead``."""
     overrides = (*(override.words for override in request.overrides), *named)
-    set_name = document["device"]["set"]
-    return Origin(request.path, set_name, hardware.valve, overrides, request.content, hardware.replaced)
+    set_name, kept = changed.document["device"]["set"], "; ".join(filter(None, (hardware.replaced, changed.kept)))
+    return Origin(request.path, set_name, hardware.valve, overrides, request.content, kept)
 
 
 def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:

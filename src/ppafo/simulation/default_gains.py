@@ -57,6 +57,8 @@ GAIN_TERMS = frozenset(
     (*_OF_LOOP, *_OF_REACH, *_OF_JOINT, torque_loop.OPENING, torque_loop.INTEGRAL_GAIN, torque_loop.LEARNING_GAIN)
 ) - {torque_loop.REACH, RATE, DEAD_TIME}
 """Names of the numbers that are gains of a controller, and not numbers of the device."""
+SLOPE_GAINS = ("derivative_gain", "damping")
+"""Gains on the rate of the error, which are 0 by default for every device."""
 
 
 class _GainParts(NamedTuple):

@@ -11,9 +11,10 @@ from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import LinkFunction, acting
 from ppafo.parameters.overrides import other_forms
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, loop_terms
+from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, SLOPE_GAINS, loop_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
+from ppafo.units.shown import in_units, shown_text, written_text
 from ppafo.wording import override_text, subject_text
 
 logger = logging.getLogger("ppafo")
@@ -51,7 +52,7 @@ class Gains:
         parts = []
         for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})")):
             gains = [gain for gain in self.gains if gain.computed == computed]
-            texts = [f"{gain.name} {gain.value:.3g} {gain.unit}".rstrip() for gain in gains]
+            texts = [f"{gain.name} {shown_text(gain.value, gain.unit, '.3g')}" for gain in gains]
             parts += [f"{', '.join(texts)} {origin}"] if texts else []
         without = f"; the load of {', '.join(self.unknown_loads)} is not included" if self.unknown_loads else ""
         return f"gains: {'; '.join(parts)}{without}"
@@ -66,8 +67,11 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     """Return the gains in use of a scenario's torque controller; None for a controller without such gains."""
     if scenario.controller.is_outside:
         return None
+    settings = scenario.controller.settings
     items = [
-        quantity for quantity in law_settings(law, scenario.controlled) if GAIN_TERMS.intersection(quantity.follows)
+        quantity
+        for quantity in law_settings(law, scenario.controlled)
+        if GAIN_TERMS.intersection(quantity.follows) or (quantity.name in SLOPE_GAINS and settings[quantity.name])
     ]
     if not items:
         return None
@@ -76,7 +80,7 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
         _Gain(
             quantity.name,
             quantity.unit,
-            float(scenario.controller.settings[quantity.name]),
+            float(settings[quantity.name]),
             f"controller.{quantity.name}" in links,
         )
         for quantity in items
@@ -89,6 +93,7 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ())
 
 
+@in_units(lambda scenario, _varied: scenario.device.shown)
 def remark_on_following_gains(scenario: Scenario, varied: Collection[str]) -> str:
     """Return a remark on gains computed anew for each value of the varied paths; empty if no gain follows them."""
     gains = None if scenario.law is None else gains_of(scenario, scenario.law)
@@ -99,9 +104,7 @@ def remark_on_following_gains(scenario: Scenario, varied: Collection[str]) -> st
     following = [gain for gain in gains.gains if f"controller.{gain.name}" in moved]
     if not following:
         return ""
-    options = override_text(
-        f"controller.{gain.name}={f'{gain.value:.6g} {gain.unit}'.removesuffix(' -').rstrip()}" for gain in following
-    )
+    options = override_text(f"controller.{gain.name}={written_text(gain.value, gain.unit)}" for gain in following)
     names = ", ".join(gain.name for gain in following)
     return (
         f"{subject_text(scenario.name)}: {names} {'is' if len(following) == 1 else 'are'} recomputed from the "

@@ -2,7 +2,7 @@
 
 import functools
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,10 @@ from ppafo.parameters import ParameterSet, build_device, list_sets, load_paramet
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
-from ppafo.parameters.overrides import Override, check_valve, read_overrides, with_overrides
+from ppafo.parameters.overrides import CHOSEN_VALVE, Override, check_valve, one_path, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
+    LEVELS,
+    Entry,
     atmospheric_pressure,
     chosen_units,
     chosen_valve,
@@ -27,8 +29,8 @@ from ppafo.wording import nearest_name, one_line, override_text
 
 logger = logging.getLogger("ppafo")
 
-_SECTIONS_WITH_UNITS = ("initial", "motion", "controller", "reference")
-"""Sections whose quantities define the display units of their author, in increasing priority."""
+_PARTS_WITH_UNITS = ("initial", "motion", "controller.peak_torque", "reference")
+"""Parts of a file whose quantities define the display units of their author, in increasing priority."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,10 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
         name = chosen_valve(parameter_set, valve)
         is_own = section["set"] == in_file.get("set")
         of_file = _overrides_for(of_file, parameter_set, is_own)
-        replaced = "" if is_own else _replaced_text(parameter_set, section["set"], of_file, overrides)
+        of_valve = [item for item in of_file if item.typed.startswith(CHOSEN_VALVE) and valve != in_file.get("valve")]
+        entries = {one_path(path, name): entry for path, entry in parameter_set.numbers.items()}
+        owner, replacing = (f"valve '{name}'", of_valve) if is_own else (section["set"], of_file)
+        replaced = _replaced_text(entries, owner, replacing, overrides)
         parameter_set = with_overrides(parameter_set, of_file, valve)
         if replaced:
             _warn_once(f"ppafo: {reading.file}: {replaced}")
@@ -81,14 +86,14 @@ def _overrides_for(of_file: tuple[Override, ...], parameter_set: ParameterSet, i
 
 
 def _replaced_text(
-    parameter_set: ParameterSet, name: str, of_file: tuple[Override, ...], overrides: tuple[Override, ...]
+    numbers: Mapping[str, Entry], name: str, of_file: Sequence[Override], overrides: tuple[Override, ...]
 ) -> str:
-    """Sentence on values of the scenario file that replace values of the parameter set ``name``; "" without any."""
+    """Sentence on values of the scenario file that replace values of the set or valve ``name``; "" without any."""
     given = {override.typed for override in overrides}
     replaced = [item for item in of_file if item.typed not in given]
     if not replaced:
         return ""
-    entries = [(item.typed, parameter_set.numbers.get(item.typed)) for item in replaced]
+    entries = [(item.typed, numbers.get(item.typed)) for item in replaced]
     kept = [f"{path}={entry.value:.12g} {entry.unit}".rstrip() for path, entry in entries if entry is not None]
     keeping = f"; {override_text(kept)} restores the replaced values" if kept else ""
     return f"values of the scenario replace values of {name}: {', '.join(map(str, replaced))}{keeping}"
@@ -123,8 +128,9 @@ def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
         device = build_device(hardware.parameter_set, hardware.valve, hardware.links)
     except ParameterError as error:
         raise device_error(reading, error) from error
-    written = chosen_units(_texts([reading.document.get(section) for section in _SECTIONS_WITH_UNITS]))
-    overridden = units_of_texts(value_at(reading.document, path) for path in sorted(reading.overridden))
+    written = chosen_units(_texts([value_at(reading.document, part) for part in _PARTS_WITH_UNITS]))
+    levels = [path for path in sorted(reading.overridden) if path.startswith(LEVELS)]
+    overridden = units_of_texts(value_at(reading.document, path) for path in levels)
     return replace(device, units={**device.units, **written, **overridden})
 
 

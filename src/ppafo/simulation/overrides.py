@@ -32,11 +32,15 @@ _KIND = "kind"
 
 @dataclass(frozen=True, slots=True)
 class OverriddenDocument:
-    """Document with its own overrides applied at ``paths``, and the overrides of the device, not yet applied."""
+    """Document with its own overrides applied at ``paths``, and the overrides of the device, not yet applied.
+
+    ``kept`` is a sentence on the numbers of the document that a newly chosen ``kind`` keeps, else "".
+    """
 
     document: dict[str, Any]
     paths: frozenset[str]
     device: tuple[Override, ...]
+    kept: str
 
 
 def apply_overrides(
@@ -83,7 +87,35 @@ def apply_overrides(
             texts.append(f"{path_in_section}={scenario_overrides[path].text}")
         else:
             _set(changed, path, scenario_overrides[path].text, file, declared)
-    return OverriddenDocument(changed, frozenset(scenario_overrides), tuple(device_overrides.values()))
+    kept = _kept_text(document, changed, scenario_overrides, declared)
+    return OverriddenDocument(changed, frozenset(scenario_overrides), tuple(device_overrides.values()), kept)
+
+
+def _kept_text(
+    before: Mapping[str, Any],
+    changed: Mapping[str, Any],
+    override_at: Mapping[str, Override],
+    declared: DeclaredContent,
+) -> str:
+    """Return a sentence on the numbers that sections keep although another ``kind`` is chosen for them."""
+    old_kinds = {path: value_at(before, path) for path in filter(_is_kind_path, override_at)}
+    of_old = declared.quantities(before) if old_kinds else {}
+    kept: dict[str, list[str]] = {}
+    for path, quantity in declared.quantities(changed).items() if old_kinds else ():
+        deciding, value = deciding_kinds(path, old_kinds)[-1:], value_at(changed, path)
+        if (
+            not deciding
+            or value is None
+            or path in override_at
+            or path.rpartition(".")[2] in _OF_ANY_KIND["controller"]
+        ):
+            continue
+        old, new = old_kinds[deciding[0]], override_at[deciding[0]].text
+        if old not in (None, new):
+            # The meaning is news where both kinds do not have the same one.
+            meaning = "" if path in of_old and of_old[path].summary == quantity.summary else f" ({quantity.summary})"
+            kept.setdefault(f"kept from {old} for {new}", []).append(f"{path}={value}{meaning}")
+    return "; ".join(f"{lead}: {', '.join(numbers)}" for lead, numbers in kept.items())
 
 
 def over_layer(

@@ -334,7 +334,8 @@ class Assumption:
 class Origin:
     """Origin of a scenario: file, parameter set, valve, overrides and the document of the file.
 
-    ``replaced`` is a sentence on values of the file that replace those of a set other than its own, else "".
+    ``replaced`` is a sentence on values of the file that replace values of another set, or that the file gives for
+    another ``kind``, else "".
     """
 
     file: str | None

@@ -113,7 +113,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=_assumed(reading, bottle),
-        origin=origin_of(request, document, hardware, instead),
+        origin=origin_of(request, changed, hardware, instead),
         gas_model=read_gas_model(reading),
         supply_line=line,
         links={**links, **links_of_stature(reading.document)},

@@ -12,8 +12,12 @@ from ppafo.arguments.reading import quantity, units_given
 from ppafo.parameters.parameter_set import written_units
 from ppafo.rig.experiments import record
 from ppafo.rig.folder import write_rig_recording
+from ppafo.running import gains
+from ppafo.simulation.gains import remark_on_following_gains
+from ppafo.studies.loading import load_study
 from ppafo.studies.varying import given_in, varied_path
 from ppafo.units.shown import shown_in, shown_text, written_text
+from ppafo.walking import load_walk
 
 PSI = 6894.757293168361
 TASK, SHORT = "torque-task-proportional", "run.duration=0.4 s"
@@ -67,6 +71,38 @@ def test_numbers_of_a_scenario_say_in_which_units_its_runs_are_read(in_bar: str,
     assert ppafo.load_scenario(TASK, overrides=[f"device.set={in_bar}", "reference.level=4 N m"]).device.shown[
         "N m"
     ] == ("N m")
+
+
+def test_the_unit_of_a_controller_setting_or_a_sensor_is_of_that_number_alone(tmp_path: Path) -> None:
+    # 0.5 deg is pi / 360 rad; the least noise that a person would set is in any unit.
+    words = ["controller.tolerance=0.00872665 rad", "sensors.angle_noise=0.0001 rad", "sensors.pressure_noise=1 kPa_d"]
+    scenario = ppafo.load_scenario("swing-foot-angle", words)
+    assert (scenario.device.shown["rad"], scenario.device.shown["Pa_a"]) == ("deg", "psi_g")
+    assert ppafo.load_scenario("swing-foot-angle", ["motion.angle=1.8 rad"]).device.shown["rad"] == "rad"
+    assert (
+        ppafo.load_scenario(
+            "torque-task-proportional", ["controller.kind=on_off_dead_zone", "controller.dead_zone=30 N cm"]
+        ).device.shown["N m"]
+        == "N m"
+    )
+    assert load_walk("proportional", ["controller.peak_torque=900 N cm"]).device.shown["N m"] == "N cm"
+    with shown_in(scenario.device.shown):
+        given = gains(scenario)
+        assert given is not None
+        assert "tolerance 0.5 deg (given)" in given.sentence
+    remark = remark_on_following_gains(ppafo.load_scenario("swing-foot-angle"), ["actuator.torque_constant"])
+    assert "controller.tolerance=0.5 deg'" in remark
+    assert " rad'" not in remark
+    file = tmp_path / "foot.toml"
+    shipped = resources.files("ppafo.scenarios").joinpath("swing-foot-angle.toml").read_text(encoding="utf-8")
+    file.write_text(shipped.replace('error_limit = "2 deg"', 'error_limit = "0.035 rad"'), encoding="utf-8")
+    assert ppafo.load_scenario(file).device.shown["rad"] == "deg"
+    found = ppafo.find("swing-foot-angle", vary="controller.tolerance=0.005..0.02 rad", such_that="follows", grid=3)
+    assert re.search(r"^controller.tolerance = 0.005 rad .* [\d.]+ deg there", found.said[0])
+    varied = {"path": "controller.tolerance", "kind": "list", "values": ["0.005 rad", "0.01 rad"]}
+    configurations = [{"name": "foot", "scenario": "swing-foot-angle"}]
+    study = load_study({"schema_version": 1, "name": "foot", "configurations": configurations, "vary": [varied]})
+    assert study.shown_for(study.configurations[0].scenario)["rad"] == "deg"
 
 
 def test_axes_and_tables_of_a_study_are_in_the_units_of_its_file(tmp_path: Path) -> None:

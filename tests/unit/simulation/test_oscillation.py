@@ -29,6 +29,18 @@ def test_given_gains_and_computed_ones_are_told_apart() -> None:
     assert gains(load_scenario("step-response")) is None
 
 
+def test_a_gain_on_the_rate_of_the_error_is_said_unless_it_is_0() -> None:
+    paper = gains(load_scenario(TASK))
+    assert paper is not None
+    given = (
+        "proportional_gain 0.095 1/(N m), integral_gain 0.25 1/(N m s), derivative_gain 0.006 s/(N m), anti_windup 0"
+    )
+    assert paper.sentence == f"gains: {given} 1/s (given)"
+    without = gains(load_scenario(TASK, ["controller.derivative_gain=0"]))
+    assert without is not None
+    assert "derivative" not in without.sentence
+
+
 def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:
     result = simulate(TASK, FAST)
     verdict = result.tracking

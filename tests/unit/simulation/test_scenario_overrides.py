@@ -234,3 +234,26 @@ def test_values_of_the_scenario_s_own_device_that_replace_those_of_another_set_a
         "supply.dorsiflexion_pressure=55 psi_g; overrides=['supply.pressure=50 psi_g', "
         "'supply.dorsiflexion_pressure=50 psi_g'] restores the replaced values"
     ]
+
+
+def test_numbers_that_a_newly_chosen_kind_keeps_are_said(tmp_path: Path) -> None:
+    def kept(*overrides: str, scenario: str = TASK) -> str:
+        return load_scenario(scenario, overrides).origin.replaced
+
+    wave = ("reference.kind=sine", "reference.amplitude=2 N m")
+    # The file has the hold at 6 N m, the vane locked at 75 deg, and gains; a pair of valves has none of them.
+    assert kept(*wave) == "kept from ramp_hold for sine: reference.level=6 N m (mean level)"
+    assert (
+        kept(*wave, "reference.level=3 N m") == kept("controller.kind=on_off") == kept("reference.kind=ramp_hold") == ""
+    )
+    assert kept("motion.kind=free", *wave).startswith("kept from locked for free: motion.angle=75 deg; kept from ramp")
+    gains = "controller.proportional_gain=0.095 1/(N m), controller.integral_gain=0.25 1/(N m s)"
+    assert kept("controller.kind=pid_feedforward").startswith(f"kept from pid for pid_feedforward: {gains}, ")
+    own = tmp_path / "own.toml"
+    text = (Path(ppafo.__file__).parent / "scenarios" / f"{TASK}.toml").read_text(encoding="utf-8")
+    own.write_text(text.replace("[run]", 'overrides = ["valve.area=9 mm^2"]\n\n[run]', 1), encoding="utf-8")
+    assert kept(scenario=str(own)) == ""
+    said = kept("device.valve=solenoid", scenario=str(own))
+    # The printed orifice of a solenoid valve is 12.6 mm^2.
+    assert said.startswith("values of the scenario replace values of valve 'solenoid': valve.area=9 mm^2; ")
+    assert "valve.area=12.6 mm^2" in said

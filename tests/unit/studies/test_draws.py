@@ -176,6 +176,6 @@ def test_gains_that_follow_a_varied_value_are_named_with_the_nominal_ones_and_gi
     scenario = load_scenario("torque-task-proportional", ["controller.kind=sliding_mode"])
     remark = remark_on_following_gains(scenario, ["valve.area"])
     assert "surface_slope, boundary_layer are recomputed from the varied values" in remark
-    assert "overrides=['controller.surface_slope=83.3333 1/s'" in remark
+    assert "overrides=['controller.surface_slope=83.3333333 1/s'" in remark
     assert remark_on_following_gains(scenario, ["sensors.seed"]) == ""
     assert remark_on_following_gains(load_scenario("torque-task-proportional"), ["valve.area"]) == ""

@@ -11,6 +11,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import SonicOrifice
 from ppafo.report.display_units import metric_change, metric_level
 from ppafo.simulation.declaration import law_settings
+from ppafo.simulation.default_gains import SLOPE_GAINS
 from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
@@ -30,8 +31,6 @@ SLOWER_ABOVE = frozenset((torque_loop.BOUNDARY,))
 """Settings whose increase makes the loop slower."""
 _SAME_GAIN = 0.02
 """Relative difference up to which two gains count as the same [-]."""
-_SLOPES = ("derivative_gain", "damping")
-"""Gains on the rate of the error, which are 0 by default for every device."""
 _STEP_OF_PAIR = 0.2
 """Step of a pair during its dead time divided by the wanted change, aimed at with a smaller orifice [-]."""
 _TORQUE_OVER_FRICTION = 1.5
@@ -107,7 +106,7 @@ def default_gain_remedy(scenario: Scenario, law: ControllerKind | None) -> Remed
         default = float(terms[term].number(lambda path: number_at(scenario, path)))
         if abs(float(settings[quantity.name]) - default) <= _SAME_GAIN * default:
             continue
-        slopes = {f"controller.{name}": 0.0 for name in _SLOPES if settings.get(name, 0.0) > 0.0}
+        slopes = {f"controller.{name}": 0.0 for name in SLOPE_GAINS if settings.get(name, 0.0) > 0.0}
         return remedy(scenario, {f"controller.{quantity.name}": default, **slopes})
     return None
 

@@ -31,7 +31,7 @@ _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9", BLACK, GREY)
 _RING = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
 """Marker style of the ring around the suggested device."""
 PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
-_TORQUE = Kind("Torque", "N m", "torque", ".3g")
+TORQUE = Kind("Torque", "N m", "torque", ".3g")
 _GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
 _MASS = Kind("Mass", "kg", "part mass")
 _MAXIMUM_OF_LIMIT = 4.0
@@ -41,7 +41,7 @@ _HEAD = (
     "valve",
     ("pressure", PRESSURE),
     ("lowest", PRESSURE),
-    ("RMS error", _TORQUE),
+    ("RMS error", TORQUE),
     ("gas per repetition", _GAS),
     ("total gas", _GAS),
     "bottle",
@@ -216,7 +216,7 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
             errors.append(Mark("line", [sized.pressure], [sized.error], colour=colour, style=_RING))
             gases.append(Mark("line", [sized.pressure], [sized.gas], colour=colour, style=_RING))
 
-    error_kind = replace(_TORQUE, words="RMS error")
+    error_kind = replace(TORQUE, words="RMS error")
     highest = float(error_kind.values(_MAXIMUM_OF_LIMIT * limit))
 
     def set_gas(axes: "Axes") -> None:
@@ -243,11 +243,11 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
     """Return a sizing study as a finding; not passed if there is no suggestion."""
     problem, profile, recording = sizing.problem, sizing.problem.profile, sizing.recording
     table_error = profile.table_error
-    knots = f", {profile.knot_times.size} knots, to {_TORQUE.text(table_error)}" if table_error else ""
+    knots = f", {profile.knot_times.size} knots, to {TORQUE.text(table_error)}" if table_error else ""
     requirements = (
-        f"profile of {TIME.text(profile.period, '.3g')} with up to {_TORQUE.text(profile.largest)} "
+        f"profile of {TIME.text(profile.period, '.3g')} with up to {TORQUE.text(profile.largest)} "
         f"({_ORIGINS[profile.kind]}{knots}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
-        f"at most {_TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
+        f"at most {TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
     )
     carried = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
     method = (
@@ -318,7 +318,7 @@ def _torque_panels(sizing: Sizing) -> list[Panel]:
         label = f"{choice.valve.title} at {PRESSURE.number(choice.pressure, '.3g')} {PRESSURE.axis_unit}"
         colour = _COLOURS[sizing.valves.index(choice) % len(_COLOURS)]
         marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
-    return [Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))]
+    return [Panel(TIME, TORQUE, marks, then=lambda axes: axes.margins(x=0.0))]
 
 
 def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
@@ -331,7 +331,7 @@ def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
     for sized in sizing.valves:
         name = sized.valve.name
         if not sized.works:
-            rows.append((name, None, None, f"{_TORQUE.number(sized.error)} at best", *(None,) * 4, sized.limit))
+            rows.append((name, None, None, f"{TORQUE.number(sized.error)} at best", *(None,) * 4, sized.limit))
             continue
         bottle, lowest = "none" if sized.bottle is None else sized.bottle.name, sized.lowest_pressure or sized.pressure
         gas = (sized.gas, sized.gas_in_all)

@@ -6,6 +6,7 @@ be monotonic in the pressure.
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import product
 from typing import Any, Literal, final
 
@@ -32,7 +33,7 @@ Limit = Literal["torque", "flow", "control", "pressure"]
 LIMITS: dict[Limit, str] = {
     "torque": "the torque ceiling: torque constant times pressure",
     "flow": "the flow: a larger opening would suffice",
-    "control": "the control: neither more pressure nor a larger opening would suffice",
+    "control": "the torque loop: no gains were found with which it follows",
     "pressure": "nothing: the lowest requested pressure suffices",
 }
 """Quantities that limit a valve, each with its description in words."""
@@ -42,6 +43,8 @@ _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
 STREAMS = 16
 """Number of noise streams of each trial if sensors are noisy; the streams are the same for all trials."""
+SCALES = (1.0, 8.0, 64.0, 0.125, 0.015625)
+"""Common factors [-] on the combinations of gain factors, tried in turn: a slow valve needs other gains for a task."""
 _SEED = 1
 """Random seed of the noise streams, the same for every pressure."""
 _AT_ONCE = 16_384
@@ -54,6 +57,8 @@ WIDER = (2.0, 4.0, 16.0)
 """Factors [-] on the valve opening that show whether the flow is the limit."""
 NEAR_CEILING = 1.2
 """Ratio [-] of lowest gauge pressure to ceiling gauge pressure up to which the torque counts as the limit."""
+LAGS = {"delay", "spool_frequency", "slew_limit", "opening_delay", "closing_delay", "switching_interval"}
+"""Figures of a valve that moves late or slowly; without them it moves at once."""
 LEAST_PEAK = 0.7
 """Required share of the peak torque [-]: the RMS error over a mostly zero stride alone would accept half the peak."""
 MORE_PRESSURE = 1.1
@@ -75,7 +80,7 @@ Error and gas are nan if a run failed or oscillated.
 class Trials:
     """Runner of the trials of a sizing problem, which counts runs and failures.
 
-    ``gain_sets`` (sets, gains): every combination of the gain factors
+    ``gain_sets`` (sets, gains): every combination of the gain factors, ``combinations`` of them at each of ``SCALES``
     ``seeds``: noise streams of every trial, the same for all; empty without noise
 
     The error of a trial is the largest over the streams, its gas the mean.
@@ -83,7 +88,10 @@ class Trials:
 
     def __init__(self, problem: SizingProblem, threads: int | None = None) -> None:
         self.problem = problem
-        self.gain_sets: Floats = np.array(list(product(problem.gain_factors, repeat=len(problem.gains))))
+        factors = np.array(list(product(problem.gain_factors, repeat=len(problem.gains))))
+        self.combinations = len(factors)
+        scales = SCALES if problem.gains else SCALES[:1]
+        self.gain_sets: Floats = np.concatenate([scale * factors for scale in scales])
         self.runs = 0
         self.failures: Counter[str] = Counter()
         # The scenario's own seed plays no part, so that two scenarios are judged in the same noise.
@@ -118,14 +126,14 @@ class Trials:
         trial["error"], trial["gas"] = error.max(axis=0), gas.mean(axis=0) / self.problem.simulated
         return trial
 
-    def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> Trial:
-        """Return for each pressure the trial with the best set of gains.
+    def best(self, valve: Part, pressure: Floats, opening: float = 1.0, like: int = 0) -> Trial:
+        """Return for each pressure the trial with the best set of gains at the scale of the gain set ``like``.
 
         The best set uses the least gas of all sets that keep the error limit; if no set keeps the limit, it has the
         smallest error.
         """
-        sets = self.gain_sets.shape[0]
-        pressures, gains = np.repeat(pressure, sets), np.tile(np.arange(sets), pressure.size)
+        sets, first = self.combinations, like - like % self.combinations
+        pressures, gains = np.repeat(pressure, sets), np.tile(first + np.arange(sets), pressure.size)
         trial = self.run(valve, pressures, gains, np.full(pressures.size, opening)).reshape(pressure.size, sets)
         # Infinite for failed runs: argmin would take nan for the smallest.
         error = np.where(np.isnan(trial["error"]), np.inf, trial["error"])
@@ -169,18 +177,38 @@ def highest_pressure(problem: SizingProblem, valve: Part) -> float:
 
 
 def try_pressures(trials: Trials, valve: Part) -> Trial:
-    """Search the lowest feasible pressure of a valve to 0.1 psi; returns the best trial at each pressure tried."""
-    problem = trials.problem
-    tried = trials.best(valve, np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID))
-    if np.isnan(tried["error"]).all():
+    """Search the lowest feasible pressure of a valve to 0.1 psi; returns the best trial at each pressure tried.
+
+    Gains of the next scale are tried unless the torque or the requested range limits the valve.
+    """
+    problem, best, lowest = trials.problem, None, (np.inf, np.inf)
+    for first in range(0, len(trials.gain_sets), trials.combinations):
+        tried = _pressures_at_scale(trials, valve, first)
+        error = float(np.nan_to_num(tried["error"], nan=np.inf).min())
+        reached = float(np.min(tried["pressure"][works_in(problem, tried)], initial=np.inf)), error
+        if best is None or reached < lowest:
+            best, lowest = tried, reached
+        if _limit_of_pressure(problem, tried) is not None:
+            break
+    assert best is not None, "the first scale has a trial"
+    if np.isnan(best["error"]).all():
         reason = next(iter(trials.failures), "no reason was given")
         raise StudyError(f"{problem.file}: every run with valve '{valve.name}' failed; the first failure: {reason}")
+    return best
+
+
+def _pressures_at_scale(trials: Trials, valve: Part, like: int) -> Trial:
+    """Search the lowest feasible pressure of a valve with the gains at the scale of the gain set ``like``."""
+    problem = trials.problem
+    highest = highest_pressure(problem, valve)
+    tried = trials.best(valve, np.linspace(problem.lowest_pressure, highest, GRID), like=like)
     while lowest := first_of(works_in(problem, tried)):
         lower, upper = tried["pressure"][lowest - 1 : lowest + 1]
         if upper - lower <= FINENESS:
             break
         # Without both ends, which were tried before.
-        tried = np.concatenate([tried, trials.best(valve, np.linspace(lower, upper, GRID)[1:-1])])
+        between = trials.best(valve, np.linspace(lower, upper, GRID)[1:-1], like=like)
+        tried = np.concatenate([tried, between])
         tried = tried[np.argsort(tried["pressure"], kind="stable")]
     return tried
 
@@ -198,25 +226,35 @@ def first_of(members: NDArray[np.bool_]) -> int | None:
 def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
     """Return the quantity that limits a valve at lower pressures, or at every pressure if no pressure is feasible.
 
-    There is no limit if the lowest requested pressure works ('pressure'). The limit is the torque if the lowest
-    feasible pressure is near ``ceiling_pressure``. Otherwise larger openings are tried halfway between these two
-    pressures (or between ``ceiling_pressure`` and the highest pressure if none is feasible): if a larger opening works,
-    the limit is the flow, else the control.
+    The limit is the torque if the lowest feasible pressure is near ``ceiling_pressure``. Otherwise a valve without lag,
+    and then larger openings, are tried halfway between these two pressures (or between ``ceiling_pressure`` and the
+    highest pressure if none is feasible): the limit is the flow if only a larger opening works, else the control.
     """
     problem = trials.problem
+    known = _limit_of_pressure(problem, tried)
+    if known is not None:
+        return known
     first = first_of(works_in(problem, tried))
-    # No lower pressure was tried.
+    pressure = np.array([0.5 * (float(tried["pressure"][-1 if first is None else first]) + ceiling_pressure(problem))])
+    at_once = replace(valve, values={name: valve.values[name] for name in valve.values.keys() - LAGS})
+    is_slow = at_once.values != valve.values
+    for part, opening in [(at_once, 1.0)] * is_slow + [(valve, wider) for wider in WIDER]:
+        for first in range(0, len(trials.gain_sets), trials.combinations):
+            if trials.best(part, pressure, opening, first)["error"][0] <= problem.largest_error:
+                return "flow" if part is valve else "control"
+    return "control"
+
+
+def _limit_of_pressure(problem: SizingProblem, tried: Trial) -> Limit | None:
+    """Return the limit of a valve if its lowest feasible pressure alone tells it; None if it does not.
+
+    There is no limit if the lowest requested pressure works ('pressure').
+    """
+    first = first_of(works_in(problem, tried))
     if first == 0:
         return "pressure"
-    atmosphere, ceiling_limit = problem.atmosphere, ceiling_pressure(problem)
-    lowest = float(tried["pressure"][-1 if first is None else first])
-    if lowest - atmosphere <= NEAR_CEILING * (ceiling_limit - atmosphere):
-        return "torque"
-    pressure = np.array([0.5 * (lowest + ceiling_limit)])
-    is_limited_by_flow = any(
-        trials.best(valve, pressure, wider)["error"][0] <= problem.largest_error for wider in WIDER
-    )
-    return "flow" if is_limited_by_flow else "control"
+    gauge = float(tried["pressure"][-1 if first is None else first]) - problem.atmosphere
+    return "torque" if gauge <= NEAR_CEILING * (ceiling_pressure(problem) - problem.atmosphere) else None
 
 
 def ceiling_pressure(problem: SizingProblem) -> float:
@@ -252,17 +290,17 @@ def ceiling(problem: SizingProblem, pressure: float) -> float:
     return problem.torque_constant * (pressure - problem.atmosphere)
 
 
-def flow_margin(trials: Trials, valve: Part, pressure: float) -> float:
+def flow_margin(trials: Trials, valve: Part, pressure: float, like: int) -> float:
     """Return the possible reduction of the opening [-] at a gauge pressure one tenth higher, with the best gains.
 
-    At the lowest feasible pressure itself no reduction is possible.
+    Gains have the scale of the gain set ``like``. At the lowest feasible pressure itself no reduction is possible.
     """
     atmosphere = trials.problem.atmosphere
     higher = np.array([atmosphere + MORE_PRESSURE * (pressure - atmosphere)])
     smallest = 1.0
     for opening in OPENINGS:
         # Negated, so that a failed run, whose error is nan, ends the search too.
-        if not trials.best(valve, higher, opening)["error"][0] <= trials.problem.largest_error:
+        if not trials.best(valve, higher, opening, like)["error"][0] <= trials.problem.largest_error:
             break
         smallest = opening
     return 1.0 - smallest

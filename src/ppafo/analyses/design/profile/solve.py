@@ -5,9 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ppafo.analyses.design.profile.answer import PRESSURE, SizedValve, Sizing, SizingMargins
+from ppafo.analyses.design.profile.answer import PRESSURE, TORQUE, SizedValve, Sizing, SizingMargins
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.profile.search import (
+    LAGS,
     Trials,
     ceiling,
     first_of,
@@ -111,10 +112,22 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         margins = SizingMargins(
             error=1.0 - error / problem.largest_error,
             torque=ceiling(problem, pressure) / problem.profile.largest - 1.0,
-            flow=flow_margin(trials, valve, pressure),
+            flow=flow_margin(trials, valve, pressure, gains),
             gas=None if bottle is None or gas_used <= 0.0 else bottle.values["content"] / gas_used - 1.0,
         )
     columns = trials.columns(valve, np.array([pressure]), np.array([gains]), np.ones(1))
+    limit = limit_of(trials, valve, tried)
+    if lowest is None and limit == "control":
+        lags = [
+            f"{name.replace('_', ' ')} {part.value:g} {part.unit}"
+            for name, part in valve.figures.items()
+            if name in LAGS
+        ]
+        slowed = f"; the valve has {', '.join(lags)}" if lags else ""
+        remarks.append(
+            f"no gains were found with which the torque loop follows: RMS error {TORQUE.text(error)} at best, limit "
+            f"{TORQUE.text(problem.largest_error)}{slowed}"
+        )
     return SizedValve(
         valve=valve,
         works=lowest is not None,
@@ -127,7 +140,7 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         bottle=bottle,
         mass=None if bottle is None else sum(part.full_mass for part in (valve, bottle, *problem.carried)),
         margins=margins,
-        limit=limit_of(trials, valve, tried),
+        limit=limit,
         remark="; ".join(remarks),
         curve=(tried["pressure"], tried["error"], tried["gas"]),
     )

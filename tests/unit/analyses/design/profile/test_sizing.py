@@ -21,6 +21,7 @@ from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.loading import load_scenario
 from ppafo.parameters.parts import load_catalogue
+from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.ensemble import COMPLETED
@@ -130,6 +131,63 @@ def test_a_valve_that_is_too_small_is_limited_by_its_flow(folder: Path) -> None:
     item = design(folder / "flow.toml").found.valves[0]
     assert item.limit == "flow"
     assert not item.works or item.pressure > 1.2 * ceiling_pressure(load_design(folder / "flow.toml"))
+
+
+def with_small_valve(folder: Path, name: str, figure: str, value: float, unit: str) -> Path:
+    """A design file whose only valve opens by 12 mm^2 and has one more figure."""
+    head = "[valves.enfield-ls-v05s.mass]"
+    more = (
+        f'{head.replace("mass", figure)}\nvalue = {value}\nunit = "{unit}"\norigin = "datasheet"\nsource = "page 3"\n'
+    )
+    catalogue = load_text_of_catalogue().replace("value = 31.6", "value = 12.0", 1).replace(head, more + head, 1)
+    (folder / f"{name}-parts.toml").write_text(catalogue)
+    (folder / f"{name}.toml").write_text(
+        FILE.replace('name = "trap', f'catalogue = "./{name}-parts.toml"\nname = "trap')
+    )
+    return folder / f"{name}.toml"
+
+
+def test_a_slow_valve_that_follows_by_hand_is_found_with_gains_of_another_size(folder: Path) -> None:
+    file = with_small_valve(folder, "slewing", "slew_limit", 100.0, "1/s")
+    times = [f"reference.time_0{row}={time} s" for row, time in ((2, 0.3), (3, 0.6), (4, 0.8))]
+    torques = [f"reference.value_0{row}={torque} N m" for row, torque in ((1, 0), (2, 4), (3, 4), (4, 0))]
+    by_hand = simulate(
+        "torque-task-proportional",
+        [
+            *("reference.kind=tabulated", "reference.level=0 N m", "reference.period=1 s", *times, *torques),
+            *("run.duration=1 s", "valve.area=12 mm^2", "valve.slew_limit=100 1/s"),
+            *("supply.pressure=45 psi_g", "supply.dorsiflexion_pressure=45 psi_g"),
+            *("controller.proportional_gain=2 1/(N m)", "controller.integral_gain=0 1/(N m s)"),
+        ],
+    )
+    assert by_hand.metrics["rms_error"].value < 0.2
+    item = design(file).found.valves[0]
+    assert (item.works, item.limit) == (True, "torque")
+    assert item.pressure < ATMOSPHERE + 45.0 * 6894.757
+    assert item.margins is not None
+    assert item.margins.flow > 0.0
+
+
+def test_a_valve_too_late_for_any_gains_is_limited_by_the_control_and_says_its_delay(folder: Path) -> None:
+    item = design(with_small_valve(folder, "late", "delay", 200.0, "ms")).found.valves[0]
+    # For 0.2 s after the start no torque can follow, which rises at 4 N m in 0.3 s: this part of the error alone is
+    # the root of (4 / 0.3)^2 (0.2 s)^3 / 3 over the second of the run.
+    assert item.error > ((4.0 / 0.3) ** 2 * 0.2**3 / 3.0) ** 0.5 > 0.4
+    assert (item.works, item.limit) == (False, "control")
+    assert item.remark.startswith("no gains were found with which the torque loop follows: RMS error ")
+    assert item.remark.endswith(" N m at best, limit 0.4 N m; the valve has delay 200 ms")
+
+
+def test_a_valve_that_needs_pressure_only_because_it_slews_is_not_limited_by_its_flow(folder: Path) -> None:
+    slow, quick = (
+        design(with_small_valve(folder, f"slew-{limit}", "slew_limit", limit, "1/s")).found.valves[0]
+        for limit in (8.0, 1.0e4)
+    )
+    assert quick.lowest_pressure is not None
+    assert slow.lowest_pressure is not None
+    # The same opening follows at less pressure where it moves at once: its flow suffices.
+    assert quick.lowest_pressure < slow.lowest_pressure - 20_000.0
+    assert slow.limit == "control"
 
 
 def load_text_of_catalogue() -> str:
