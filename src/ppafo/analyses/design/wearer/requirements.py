@@ -19,7 +19,7 @@ from ppafo.units.shown import shown_unit
 from ppafo.version import __version__
 from ppafo.walking.motion import LONGEST_MINUTES
 from ppafo.walking.result import WalkResult
-from ppafo.walking.wearer import STATURES, WEARER
+from ppafo.walking.wearer import WEARER
 from ppafo.wording import argument_text
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
@@ -96,20 +96,12 @@ class DesignRequirements:
 
 def check_requirements(requirements: DesignRequirements) -> None:
     """Raise StudyError, naming the argument, for requirements outside the ranges for which devices are sized."""
-    low, high = STATURES
     mass, tallest = (next(each for each in WEARER if each.name == name) for name in ("body_mass", "stature"))
     weight, height, toes = requirements.mass, requirements.height, requirements.toes
     if not mass.minimum <= weight <= mass.maximum:
         raise StudyError(
             f"{argument_text('mass')}: {weight:g} kg: must be at least {mass.minimum:g} kg and "
             f"at most {mass.maximum:g} kg"
-        )
-    if requirements.stature is None and not low <= height <= high:
-        lightest, heaviest = (BODY_MASS_INDEX * tall * tall for tall in STATURES)
-        raise StudyError(
-            f"{argument_text('mass')}: {weight:g} kg: give {argument_text('stature')} too; it is "
-            f"derived from body mass only for {lightest:.1f} to "
-            f"{heaviest:.0f} kg"
         )
     if not requirements.pressure > STANDARD_ATMOSPHERE:
         raise StudyError(f"{argument_text('pressure')}: must be above the atmosphere, for example '50 psi_g'")
