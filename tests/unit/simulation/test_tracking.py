@@ -159,6 +159,13 @@ def test_a_loop_that_keeps_only_the_mean_of_a_sine_does_not_follow_it() -> None:
     assert slow.tracking.error < 0.2 * slow.tracking.wanted
     quick = simulate(TASK, [*SMALL_SINE, "controller.proportional_gain=4.5 1/(N m)"])
     assert quick.tracking is None
+    # Nor do valves that are open or shut, whose steps of 2.2 N m are as large as the wave.
+    wave = ["reference.kind=sine", "reference.level=3 N m", "reference.amplitude=2 N m", "reference.frequency=1 Hz"]
+    coarse = simulate("torque-task-solenoid", wave)
+    assert coarse.tracking is not None
+    settled = settled_task(coarse.scenario, coarse.recording)
+    assert 0.5 * 2.0 / math.sqrt(2.0) < settled.error < 0.25 * settled.wanted
+    assert "the valves cause a step of 2.19 N m in their dead time of 75 ms" in coarse.tracking.cause
     # A constant delay behind a slow ramp is not judged by how little the ramp changes.
     ramp = ["reference.kind=sine", "reference.level=3 N m", "reference.amplitude=1.5 N m", "reference.frequency=0.1 Hz"]
     assert (
