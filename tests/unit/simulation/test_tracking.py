@@ -381,7 +381,7 @@ def test_a_judged_part_without_a_peak_gives_no_verdict_and_a_slower_trial_is_lon
     ]
     short = simulate(TASK, changes)
     assert short.tracking is None
-    assert "the judged half of the run holds 0.15 periods of the reference" in short.following
+    assert "the second half of the run has only 0.15 periods of the reference" in short.following
     longer = simulate(TASK, [*changes, "run.duration=40 s"])
     assert longer.tracking is None
     assert longer.following.startswith("the torque follows its reference")

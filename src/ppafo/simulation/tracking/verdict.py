@@ -192,9 +192,9 @@ def following_text(result: "RecordedResult") -> str:
         left = f"with an RMS error of {change_text(controlled.name, settled.error)}{time_text(settled.start)}"
         if settled.ends_on_ramp:
             return _undecided_text(scenario, f"the run ends on the ramp of its reference, {left}")
-        judged_share = f"the judged half of the run holds {settled.periods:.2g} periods of the reference"
+        short = f"the second half of the run has only {settled.periods:.2g} periods of the reference"
         longer = override_text([f"run.duration={2.0 * scenario.run.duration / settled.periods:.3g} s"])
-        return f"no verdict on the {controlled.words}: {judged_share}, {left}; not tried: {longer} should give one"
+        return f"no verdict on the {controlled.words}: {short}, {left}; not tried: {longer} should give one"
 
     def judged_text(name: str, number: float, limit: float | None, why: str = "") -> str:
         allowed = "" if limit is None else f" ({change_text(controlled.name, limit)} allowed{why})"
