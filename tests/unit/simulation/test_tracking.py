@@ -643,3 +643,14 @@ def test_noise_that_turns_the_command_until_the_joint_rests_is_not_counted_as_os
     assert settled_task(scenario, recording.with_channel("command", command, "-")).reversals == 0.0
     command[last:] = np.where(np.arange(count - last) % 4 < 2, 1.0, -1.0)
     assert settled_task(scenario, recording.with_channel("command", command, "-")).reversals > 100.0
+
+
+def test_the_largest_error_is_said_where_it_decided() -> None:
+    wave = ["reference.kind=sine", "reference.amplitude=40 deg", "reference.frequency=4 Hz"]
+    run = simulate("swing-foot-angle", ["motion.kind=free", "run.duration=3 s", *wave])
+    error = np.abs(run["angle", "deg"] - run["reference_angle", "deg"])[run["time"] >= 1.5]
+    assert run.tracking is not None
+    # 5 % of the 80 deg from crest to trough are allowed.
+    said = f"largest error {error.max():.3g} deg (4 deg allowed) from 1.5 s on"
+    assert run.tracking.sentence.startswith(f"the angle does not follow its reference: {said}; ")
+    assert run.tracking.allowed == pytest.approx(math.radians(4.0), rel=1e-3)
