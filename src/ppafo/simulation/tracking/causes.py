@@ -12,7 +12,13 @@ from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
-from ppafo.simulation.tracking.load_causes import flung_at_start, load_beyond_reach, stop_of, torque_beyond_reach
+from ppafo.simulation.tracking.load_causes import (
+    flung_at_start,
+    load_beyond_reach,
+    stop_of,
+    torque_at_its_limit,
+    torque_beyond_reach,
+)
 from ppafo.simulation.tracking.pair_step import pair_step
 from ppafo.simulation.tracking.remedies import (
     CASCADE,
@@ -298,6 +304,7 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     torque_beyond_reach,
     load_beyond_reach,
     flung_at_start,
+    torque_at_its_limit,
     _slow_decisions,
     _static_friction,
     _shut_valve,

@@ -20,6 +20,12 @@ from ppafo.simulation.tracking.rule import FEWEST_PERIODS, LARGEST_SHARE
 
 _MARGINS = (1.05, 1.5)
 """Static torque at an increased supply pressure divided by the wanted torque; the second for a fast wave [-]."""
+_NEARLY_ALL, _OFTEN = 0.97, 0.03
+"""Torque divided by the reach at which the actuator counts as at its limit, and fraction of the time that is often."""
+_MORE_TORQUE = (1.1, 1.3, 1.6, 2.5)
+"""Torques of trials, divided by the largest present torque [-]."""
+_ANGLES = 400
+"""Number of samples at which the reach is compared with the torque."""
 _WITHIN = 0.95
 """Reduced reference divided by the actuator's reach [-]."""
 LOCKED = Remedy({}, ("motion.kind=locked",))
@@ -56,9 +62,9 @@ class TorqueReach(NamedTuple):
 
 def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
     """Highest and lowest wanted torque with the reach there; a reference with a period counts with its own peaks."""
-    scenario, has_period = case.scenario, math.isfinite(case.settled.periods)
-    samples = slice(None) if has_period else case.settled.samples
+    scenario, samples = case.scenario, case.settled.samples
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
+    has_period = math.isfinite(case.settled.periods)
     lowest, highest = profile_bounds(scenario.reference) if has_period else (reference.min(), reference.max())
     top, bottom = float(angle[int(np.argmax(reference))]), float(angle[int(np.argmin(reference))])
     return (
@@ -154,6 +160,30 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
             held = abs(numbers.get("motion.external_torque", outside)) + float(device.friction.static_torque)
             remedies += stiffer_laws(scenario, held, case.settled, numbers)
     return TrackingCause(text, tuple(remedies), advice)
+
+
+def torque_at_its_limit(case: Case) -> TrackingCause | None:
+    """Cause: the actuator of a joint whose angle is controlled often gives all the torque that its supplies allow."""
+    scenario, device, samples = case.scenario, case.scenario.device, case.settled.samples
+    if scenario.controlled != ANGLE or case.oscillates or case.only_switches:
+        return None
+    angle, torque, own = case.recording["angle"][samples], case.recording["torque"][samples], static_torque(device)
+    places = np.unique(np.linspace(0, angle.size - 1, _ANGLES).astype(np.intp))
+    reaches = np.array([torque_reach(device, float(angle[place]), own) for place in places])
+    shares = torque[places, None] / reaches
+    share, place = float(np.mean(shares.max(axis=1) > _NEARLY_ALL)), int(np.argmax(shares.max(axis=1)))
+    if share <= _OFTEN:
+        return None
+    upwards = bool(shares[place, 1] > shares[place, 0])
+    supply, given = supply_that_moves(device, upwards), float(reaches[place, int(upwards)])
+    text = (
+        f"for {100.0 * share:.0f} % of the time the actuator gives all the torque that it can, such as "
+        f"{level_text('N m', given)} at {level_text('rad', float(angle[places[place]]))} and "
+        f"{level_text('Pa', number_at(scenario, supply))}"
+    )
+    needed = [supply_for(device, float(angle[places[place]]), factor * given) for factor in _MORE_TORQUE]
+    remedies = [remedy(scenario, {supply: pressure}) for pressure in needed if pressure is not None]
+    return TrackingCause(text, tuple(remedies), f"increase `{supply}`", is_beyond_reach=True)
 
 
 def stop_of(scenario: Scenario, angle: Floats) -> str:

@@ -37,8 +37,8 @@ LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
 """Largest angle error for a moving reference [rad], or divided by the reference's range [-] if that allows more."""
 LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
 """Largest range of the angle error for a reference at rest, in the same two ways: a swing of 1 deg is visible."""
-LARGEST_WORST_SHARE = 0.4
-"""Largest error divided by the wanted change, for a smooth wave of a torque or a pressure: twice the RMS error [-]."""
+LARGEST_CREST = 1.5
+"""Largest error divided by the largest RMS error, for a smooth wave of a torque or a pressure; of a lag it is 1.41."""
 LARGEST_SHARE_OF_WAVE = 0.5
 """Standard deviation of the error divided by the standard deviation of a moving reference [-].
 
@@ -318,11 +318,11 @@ def largest_deviation(settled: SettledPart) -> Floats:
     An angle has both limits [rad], a smooth wave of another quantity the second one. The numbers of ``settled`` may be
     arrays (runs,).
     """
-    rests, way, wanted = (np.asarray(each) for each in (settled.rests, settled.way, settled.wanted))
+    rests, way = np.asarray(settled.rests), np.asarray(settled.way)
     # Degrees count for an angle, however far it goes.
     swing, error = (LARGEST_SWING_SHARE * way, LARGEST_ANGLE_SHARE * way)
     of_angle = np.where(rests, np.maximum(LARGEST_ANGLE_SWING, swing), np.maximum(LARGEST_ANGLE_ERROR, error))
-    of_other = np.where(~rests & settled.is_smooth, LARGEST_WORST_SHARE * wanted, np.inf)
+    of_other = np.where(~rests & settled.is_smooth, LARGEST_CREST * largest_error(settled, False), np.inf)
     limit: Floats = np.where(way > 0.0, of_angle, of_other)
     return limit
 
