@@ -112,7 +112,8 @@ class _RunReport:
 
 def assessed(result: "Result", check: bool) -> _RunReport:
     """Assess a result for its report; ``check`` runs the scenario again to test its repeatability."""
-    from ppafo.running import gains, tried
+    from ppafo.remedy_trials import tried
+    from ppafo.running import gains
 
     scenario = result.scenario
     # A run that diverged has no result to repeat; its exit code says so already.

@@ -150,7 +150,7 @@ def fits(unit: str, si_unit: str) -> bool:
 
 
 def range_rule(quantity: Quantity, given: str = "") -> str:
-    """Return the rule for a value out of range, such as ``must be at least 0 m^2 (open area)``.
+    """Return the rule for a value out of range, such as ``must be at least 0 m^2 (area of the opening)``.
 
     Limits are in the unit ``given`` by the user, as in ``limits_text``.
     """

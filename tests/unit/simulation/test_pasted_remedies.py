@@ -11,7 +11,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.documents.toml_text import table_lines
 from ppafo.loading import load_scenario, reloaded, usage_text
-from ppafo.running import tried
+from ppafo.remedy_trials import tried
 from ppafo.simulation.simulate import simulate
 from ppafo.wording import read_by
 

@@ -8,7 +8,8 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
-from ppafo.running import simulate, tried
+from ppafo.remedy_trials import tried
+from ppafo.running import simulate
 from ppafo.simulation.scenario import Scenario
 
 SERVO = ("cylinder-servo", ("run.duration=1 s",))

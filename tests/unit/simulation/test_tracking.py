@@ -14,7 +14,8 @@ from ppafo.errors import PpafoError
 from ppafo.loading import load_scenario, reloaded
 from ppafo.metrics.metric import hold_start
 from ppafo.parameters.reach import supply_for, torque_reach
-from ppafo.running import most_reversals, simulate, tried
+from ppafo.remedy_trials import tried
+from ppafo.running import most_reversals, simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking.pair_step import coarse_pair

@@ -10,8 +10,8 @@ from ppafo.analyses.compare.pairs import COMPARED, PairedMetric, best_probabilit
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
+from ppafo.remedy_trials import tried
 from ppafo.report.kind import ConfidenceInterval
-from ppafo.running import tried
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many

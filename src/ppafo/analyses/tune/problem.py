@@ -366,7 +366,9 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
         minimum, maximum = varied.level(gain.minimum), varied.level(gain.maximum)
         before = value_at(gain.path, scenario)
         if before is None:
-            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{gain.path}'; give an override")
+            raise ScenarioError(
+                f"scenario '{scenario.name}' has no value for '{gain.path}'; set it in the scenario or by an override"
+            )
     if gain.path == NOISE:
         raise StudyError(
             f"search '{gain.path}': cannot be searched, because all candidates use the same noise; omit this search"

@@ -22,11 +22,11 @@ from ppafo.documents.json_text import plain
 from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
+from ppafo.remedy_trials import tried
 from ppafo.report.display_units import quantity_text
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
-from ppafo.running import tried
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import UNITS

@@ -109,9 +109,9 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
         has_noise = channel.floor > 0.0 or noise_of(channel.values) > 0.0
         if is_at_limit(channel.values, clipped) and not (rests or has_noise):
             raise IdentificationError(
-                f"{where}: channel '{channel.name}' is exactly its {clipped.word} value for {clipped.count} of "
-                f"{channel.values.size} samples: the sensor is at its limit; end the recording earlier, or give the "
-                "standard deviation of the sensor in noise"
+                f"{where}: channel '{channel.name}' stays at its {clipped.word} value for {clipped.count} of "
+                f"{channel.values.size} samples: the sensor is probably saturated; end the recording earlier, or, if "
+                "the sensor is not saturated, give its standard deviation in noise"
             )
     scenario = scenario_of(experiment)
     scenario = replace(scenario, run=replace(scenario.run, duration=float(time[-1]) + reach))

@@ -244,7 +244,7 @@ def build(text: str) -> bytes:
         line = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "module.c", "-o", "module.wasm"]
         done, made = asked(line, _HOW_TO_INSTALL, folder, Path(folder)), Path(folder) / "module.wasm"
         if done.returncode != 0:
-            raise ProgramError(f"ziglang failed to build the module: {complaint(done)}")
+            raise ProgramError(f"ziglang failed to build the WebAssembly module: {complaint(done)}")
         if not made.is_file():
             raise ProgramError("ziglang returned 0 but produced no module")
         return made.read_bytes()

@@ -76,7 +76,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         )
     pair = in_two_forms(values)
     if pair is not None:
-        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' vary: {either(pair[0])}")
+        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' cannot both vary: {either(pair[0])}")
     for section in ORIFICES:
         form = [f"{section}.{name}" for name in other_form(base.device, section)]
         missing = [path for path in form if path not in values]

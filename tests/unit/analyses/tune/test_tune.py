@@ -256,7 +256,7 @@ def test_present_values_are_found(path: str, value: float) -> None:
 
 def test_a_value_that_is_not_there_yet_is_said() -> None:
     conductance = {"path": "valve.sonic_conductance", "minimum": "1e-9 m^3/(s Pa)", "maximum": "1e-8 m^3/(s Pa)"}
-    with pytest.raises(StudyError, match=r"has no value for 'valve.sonic_conductance'; give an override"):
+    with pytest.raises(StudyError, match=r"has no value for 'valve.sonic_conductance'; set it in the scenario or by an override"):
         load_tuning(changed(search=[conductance]))
 
 

@@ -70,7 +70,7 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     if names[at].lower() not in _TIMES:
         raise DataError(
             f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; give at "
-            "least two strides over time instead of one mean stride over percent"
+            "least two strides over time instead of one mean stride over percent of the stride"
         )
     if "" in names[at:]:
         raise DataError(f"{path}: a column has no name; name every column")

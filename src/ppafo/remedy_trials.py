@@ -1,0 +1,102 @@
+"""Trials of the remedies that a tracking verdict names: further runs, of which the first that follows is reported."""
+
+import contextlib
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from ppafo.errors import PpafoError
+from ppafo.loading import reloaded
+from ppafo.simulation import simulate as of_loaded
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.scenario import RunSettings, Scenario
+from ppafo.units.shown import shown_in
+
+if TYPE_CHECKING:
+    from ppafo.simulation.tracking import Tracking
+    from ppafo.simulation.tracking.remedies import Remedy
+
+MOST_TRIED = 16
+"""Largest number of remedies simulated for a verdict."""
+_STRIDES_TRIED = 8.0
+"""Number of strides simulated for a remedy of a walk."""
+_LESS_ERROR = 0.5
+"""Remaining error divided by the original one, below which a remedy that does not suffice is reported [-]."""
+
+
+class _Trial(NamedTuple):
+    """Scenario with a remedy of a cause applied."""
+
+    cause: str
+    remedy: "Remedy"
+    scenario: Scenario
+
+
+def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
+    """Return a tracking verdict with the first remedy that succeeds in a simulation.
+
+    Remedies are the overrides named in the verdict; for a walk, only the first strides are simulated. If only a
+    remedy of a less certain cause succeeds, that cause becomes the cause of the verdict. If none succeeds, the verdict
+    gets the remedy with the smallest remaining error, provided that this is less than half of the original one.
+    """
+    if verdict is None or verdict.accepted:
+        return verdict
+    # What was changed in Python would be lost with overrides.
+    is_of_file = replace(reloaded(scenario, ()), run=scenario.run) == scenario
+    trials = _trials(scenario, verdict, is_of_file)
+    if not trials:
+        return verdict
+    from ppafo.simulation.tracking.verdict import is_undecided
+
+    try:
+        results = of_loaded.simulate_many([trial.scenario for trial in trials])
+    except PpafoError:
+        return verdict
+    judged = [
+        (trial, result.tracking)
+        for trial, result in zip(trials, results, strict=True)
+        if result.status.is_completed and not is_undecided(result)
+    ]
+    for trial, left in judged:
+        if left is None:
+            told = f"with {trial.remedy.text} it follows, as a further run shows"
+            return replace(verdict, cause=trial.cause, tried=told, mended=trial.remedy.overrides if is_of_file else ())
+    of_cause = [(trial.remedy, left.error) for trial, left in judged if left and trial.cause == verdict.cause]
+    return replace(verdict, tried=_remainder_text(verdict, of_cause))
+
+
+def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> list[_Trial]:
+    """Return a scenario for each remedy that can be applied, those of the most certain cause first."""
+    causes = [(verdict.cause, remedy) for remedy in verdict.remedies]
+    causes += [(other.text, remedy) for other in verdict.others for remedy in other.remedies]
+    trials = []
+    for cause, remedy in causes[:MOST_TRIED]:
+        with contextlib.suppress(PpafoError):
+            again = reloaded(scenario, remedy.overrides) if is_of_file else with_numbers(scenario, remedy.numbers)
+            trials.append(_Trial(cause, remedy, replace(again, run=_trial_run(again))))
+    return trials
+
+
+def _trial_run(scenario: Scenario) -> RunSettings:
+    """Return the run settings for a remedy: unchanged for a task, first strides for a walk."""
+    run, duration = scenario.run, _STRIDES_TRIED * scenario.motion.stride_time
+    if scenario.follows_reference or not 0.0 < duration < run.duration:
+        return run
+    # A whole number of output intervals, as the walk itself has.
+    return replace(run, duration=round(duration / run.output_interval) * run.output_interval)
+
+
+def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]") -> str:
+    """Return a sentence on the remedy with the smallest remaining error, or on remedies that do not help."""
+    from ppafo.simulation.tracking.remedies import change_text
+    from ppafo.simulation.tracking.verdict import time_text
+
+    best, error = min(errors, key=lambda pair: pair[1], default=(None, verdict.error))
+    if best is not None and error < _LESS_ERROR * verdict.error:
+        with shown_in(verdict.units):
+            left = f"an RMS error of {change_text(verdict.controlled, error)} is left{time_text(verdict.since)}"
+        return f"with {best.text} {left}, as a further run shows"
+    names = ", ".join(dict.fromkeys(each.partition("=")[0] for remedy in verdict.remedies for each in remedy.overrides))
+    if not names:
+        return verdict.tried
+    advice = f"{verdict.advice}; " if verdict.advice else ""
+    return f"{advice}other values of {names} alone did not suffice"
