@@ -118,7 +118,7 @@ def _float(text: str) -> float:
     value = float(text)
     if value == 0.0 and text.lower().partition("e")[0].strip("+-0_."):
         raise tomllib.TOMLDecodeError(
-            f"{one_line(text)} is below the smallest 64-bit number and would become 0; write 0 or a larger number"
+            f"{one_line(text)} is too close to 0 for a 64-bit number and would become 0; write 0 or a larger number"
         )
     return value
 

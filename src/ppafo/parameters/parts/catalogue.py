@@ -272,7 +272,7 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
     for key in parsed.unknown:
         if key not in declared:
             hint = nearest_name(key, declared)
-            raise ParameterError(f"{where}.unknown: there is no figure '{key}'{hint}; available: {', '.join(declared)}")
+            raise ParameterError(f"{where}.unknown: there is no value '{key}'{hint}; available: {', '.join(declared)}")
         if key in figures:
             raise ParameterError(f"{where}.unknown: '{key}' has a value in this part; omit it from unknown")
     forms_given = [[quantity.name for quantity in form if quantity.name in figures] for form in (AREA_FORM, SONIC_FORM)]
@@ -288,7 +288,7 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
         # A guess without its reason cannot be checked by the next reader.
         if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
             raise ParameterError(
-                f"{where}.{key}.note is missing; give the reason for a figure with origin '{figure.origin}'"
+                f"{where}.{key}.note is missing; give the reason for a value with origin '{figure.origin}'"
             )
         # Data sheets give gauge pressures at sea level.
         values[key] = allowed_number(shown, figure, declared[key])

@@ -216,7 +216,7 @@ def test_a_file_that_makes_no_sense_is_one_line(changes: dict[str, Any], text: s
 
 def test_a_goal_that_is_zero_before_needs_a_scale() -> None:
     document = changed(objective=[{"metric": "mechanical_work"}])
-    with pytest.raises(StudyError, match="'mechanical_work' is 0 before tuning and cannot serve as scale; set"):
+    with pytest.raises(StudyError, match="'mechanical_work' is 0 before tuning, which cannot be its scale; set"):
         tune(document)
 
 
@@ -256,7 +256,9 @@ def test_present_values_are_found(path: str, value: float) -> None:
 
 def test_a_value_that_is_not_there_yet_is_said() -> None:
     conductance = {"path": "valve.sonic_conductance", "minimum": "1e-9 m^3/(s Pa)", "maximum": "1e-8 m^3/(s Pa)"}
-    with pytest.raises(StudyError, match=r"has no value for 'valve.sonic_conductance'; set it in the scenario or by an override"):
+    with pytest.raises(
+        StudyError, match=r"has no value for 'valve.sonic_conductance'; set it in the scenario or by an override"
+    ):
         load_tuning(changed(search=[conductance]))
 
 

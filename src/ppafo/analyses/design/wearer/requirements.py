@@ -112,7 +112,7 @@ def check_requirements(requirements: DesignRequirements) -> None:
             f"{heaviest:.0f} kg"
         )
     if not requirements.pressure > STANDARD_ATMOSPHERE:
-        raise StudyError(f"{argument_text('pressure')}: must be above the atmosphere, for example '50 psi_g'")
+        raise StudyError(f"{argument_text('pressure')}: must be above atmospheric pressure, for example '50 psi_g'")
     if not 0.0 < requirements.torque < _STRONGEST:
         text, most = TORQUE.text(requirements.torque), TORQUE.text(_STRONGEST)
         raise StudyError(f"{argument_text('torque')}: {text}: must be above 0 and below {most}")
