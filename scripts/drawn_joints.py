@@ -24,7 +24,7 @@ import numpy as np
 from ppafo.errors import PpafoError
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.reach import torque_reach
-from ppafo.running import tried
+from ppafo.remedy_trials import tried
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.simulate import Result, simulate
 

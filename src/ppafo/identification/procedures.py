@@ -37,7 +37,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.units.reference import molar_mass_in
-from ppafo.wording import nearest_name
+from ppafo.wording import nearest_name, said_missing
 
 PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"
 """Identification procedures in the recommended order."""
@@ -70,12 +70,13 @@ class ProcedureContext:
     label: str
     tolerances: Tolerances = DEFAULTS
 
-    def number(self, path: str) -> float:
-        """Return the value of a parameter [SI]. Raises IdentificationError if the set has none."""
-        value = number_in_si(with_followers(self.parameter_set), path)
-        if value is None:
-            raise IdentificationError(f"{self.label}: {path} is missing; add it to {self.parameter_set.file}")
-        return value
+    def numbers(self, *paths: str) -> list[float]:
+        """Return the values of parameters [SI]. Raises IdentificationError with every one that the set lacks."""
+        found = {path: number_in_si(with_followers(self.parameter_set), path) for path in paths}
+        missing = [path for path, value in found.items() if value is None]
+        if missing:
+            raise IdentificationError(f"{self.label}: {said_missing(missing)} in {self.parameter_set.file}")
+        return [value for value in found.values() if value is not None]
 
     def gas(self, problem: "FlowProblem", sources: tuple[RecordingSource, ...]) -> GasAt:
         """Return the gas of the bench; species and temperature default to the values of the set.
@@ -103,13 +104,13 @@ class ProcedureContext:
         """Return the gas that the procedure or the set states."""
         temperature = quantity_in(problem, "temperature", "K", self.label, _COLDEST, _HOTTEST)
         if temperature is None:
-            temperature = self.number("gas.temperature")
+            (temperature,) = self.numbers("gas.temperature")
             deviation = self.deviation("gas.temperature", temperature, "K")
         else:
             limit = self.tolerances.gas_temperature
             deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
         if problem.gas is None:
-            molar_mass, heat_capacity_ratio = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
+            molar_mass, heat_capacity_ratio = self.numbers("gas.molar_mass", "gas.heat_capacity_ratio")
             return GasAt(molar_mass, heat_capacity_ratio, temperature, deviation)
         if problem.gas not in SPECIES:
             hint = nearest_name(problem.gas, SPECIES)
@@ -264,7 +265,7 @@ class VaneLeakProblem(StrictTable):
                     "give volume_1 and volume_2"
                 )
             names = ("angle_min", "angle_max", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
-            lower, upper, per_angle, dead_1, dead_2 = (context.number(f"actuator.{name}") for name in names)
+            lower, upper, per_angle, dead_1, dead_2 = context.numbers(*(f"actuator.{name}" for name in names))
             if not lower <= angle <= upper:
                 raise IdentificationError(
                     f"{context.label}: angle = {self.angle!r} lies beyond the stops in the parameter set; give an "

@@ -257,9 +257,10 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     parameter_set = _flatten(parsed, file, folder or Path())
     chosen_valve(parameter_set, None)
     declared = parameter_set.declarations()
+    of_second = OF_SECOND_CHAMBER.intersection(parameter_set.numbers if parameter_set.has_one_chamber else ())
+    if of_second:
+        raise ParameterError(f"{parameter_set.file}: {WHY_ONE_CHAMBER}; remove {', '.join(sorted(of_second))}")
     for path, entry in parameter_set.numbers.items():
-        if path in OF_SECOND_CHAMBER and parameter_set.has_one_chamber:
-            raise ParameterError(f"{parameter_set.file}: {path}: {WHY_ONE_CHAMBER}; remove it")
         # Only what is reported of a valve by name can be undeclared: the layout of the file knows all other paths.
         if path not in declared:
             valve = path.split(".")[2]

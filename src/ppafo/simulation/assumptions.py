@@ -28,14 +28,11 @@ def read_assumptions(
     """
     replaced = {override.typed for override in overrides}
     notes: Mapping[str, str] = reading.document.get(_ASSUMED, {})
-    assumptions = []
+    assumptions, unknown = [], []
     for path, note in notes.items():
         value, value_in_file = _value_text(reading, hardware, path), _value_text(as_written, hardware, path)
         if value is None and value_in_file is None:
-            hint = nearest_name(path, [*OF_A_VANE.paths(reading.document), *device_paths()])
-            raise ScenarioError(
-                f"{reading.file}: [{_ASSUMED}] names '{one_line(path)}', which has no value in this scenario{hint}"
-            )
+            unknown.append(path)
         if value is None:
             continue
         if path in replaced:
@@ -43,6 +40,11 @@ def read_assumptions(
             assumptions.append(Assumption(path, value, f"set by an override; the scenario has {file_value}: {note}"))
         else:
             assumptions.append(Assumption(path, value, note))
+    if unknown:
+        known = [*OF_A_VANE.paths(reading.document), *device_paths()]
+        hints = "".join(nearest_name(path, known) for path in unknown)
+        names, has = ", ".join(f"'{one_line(path)}'" for path in unknown), "has" if len(unknown) == 1 else "have"
+        raise ScenarioError(f"{reading.file}: [{_ASSUMED}] names {names}, which {has} no value in this scenario{hints}")
     return tuple(assumptions)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ppafo.engine.lanes import Floats
-from ppafo.errors import ArgumentError
 from ppafo.signals.recording import Recording
 from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.units.shown import in_units
@@ -69,8 +68,6 @@ def dataset(self: RecordedResult, units: Mapping[str, str] | None = None) -> "xa
     """
     from ppafo.storage import dataset_of
 
-    if not isinstance(units, Mapping | None):
-        raise ArgumentError(f"units={units!r}: must be units by channel, such as {{'pressure_1': 'psi_g'}}")
     atmosphere = self.scenario.device.supply.atmospheric_pressure
     return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
 

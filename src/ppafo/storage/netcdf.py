@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import ArgumentError
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
@@ -38,6 +39,8 @@ def dataset_of(
     """
     import xarray
 
+    if not isinstance(units, Mapping | None):
+        raise ArgumentError(f"units={units!r}: must be units by channel, such as {{'pressure_1': 'psi_g'}}")
     joint = joint_of(scenario)
     variables = {name: (TIME, recording[name], channel_attributes(recording, name, joint)) for name in recording.names}
     for name, unit in (units or {}).items():

@@ -13,7 +13,7 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import csv_bytes
 from ppafo.storage.files import add_files, read_bytes
-from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.storage.netcdf import dataset_of, netcdf_bytes
 from ppafo.storage.owned_folder import (
     HASHES,
     MARK,
@@ -28,6 +28,7 @@ from ppafo.storage.owned_folder import (
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
+    import xarray
     from matplotlib.figure import Figure
 
 RUN_FILE = "run.json"
@@ -58,6 +59,10 @@ class StoredResult:
     def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
         """Return the values of a channel, in SI or in a given unit; ``time`` gives the sample times [s]."""
         return self.recording.values_of(channel, self.atmosphere)
+
+    def dataset(self, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
+        """Return the recording as an xarray Dataset, like ``Result.dataset``."""
+        return dataset_of(self.recording, self.document.get("scenario"), units, self.atmosphere)
 
     def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
         """Return the channels as columns indexed by time [s], like ``Recording.to_dataframe``."""

@@ -1,7 +1,7 @@
 """Ensemble runs of a scenario or model over columns of values, with metrics accumulated in one table."""
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -194,9 +194,9 @@ def excess(
     return tracking_excess(with_numbers(scenario, varied), rows, most_reversals(scenario), least)
 
 
-def is_to_follow(scenario: Scenario, columns: Mapping[str, Floats]) -> bool:
-    """Return whether runs are expected to follow the reference: not if the scenario declares it beyond reach."""
-    return not scenario.beyond_reach or changes_reach(columns)
+def is_to_follow(scenario: Scenario, varied: Iterable[str]) -> bool:
+    """Return whether runs are to follow the reference: not if it is stated as beyond reach, which no path changes."""
+    return not scenario.beyond_reach or changes_reach(varied)
 
 
 def tracking_violation(

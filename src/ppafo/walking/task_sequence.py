@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional, table, validate
 from ppafo.documents.problems import NAME, quote
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ScenarioError
+from ppafo.errors import PpafoError, ScenarioError, noted_in, raise_noted
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.schema import kind_field, model_name, number_type, quantity_fields
@@ -87,27 +87,28 @@ def load_task_sequence(name_or_path: str | Path) -> TaskSequence:
     document = FILE.parse(FILE.read(name_or_path), file)
     # The content of the segments is checked segment by segment, so that messages name the segment.
     validate(_task_sequence_table(dict[str, Any], "TaskSequenceOutline"), document, file, ScenarioError)
-    segments = []
+    segments, wrong = [], list[PpafoError]()
     for number, segment in enumerate(document["segment"], start=1):
-        kind = segment.get("kind")
-        if not isinstance(kind, str) or kind not in KINDS:
-            allowed = f"allowed: {', '.join(KINDS)}"
-            if kind is None:
-                raise ScenarioError(f"{file}: segment {number}: 'kind' is missing; {allowed}")
-            hint = nearest_name(str(kind), KINDS)
-            raise ScenarioError(f"{file}: segment {number}: kind = {quote(kind)} is not known{hint}; {allowed}")
-        prefix = f"{file}: segment {number} ({kind})"
-        validate(_segment_table(kind), segment, prefix, ScenarioError)
-        reading = DocumentReader(prefix, segment)
-        present = [quantity for quantity in KINDS[kind][1] if quantity not in _OPTIONAL or quantity.name in segment]
-        values = {quantity.name: reading.number(quantity.name, quantity) for quantity in present}
-        strides = values.get("strides")
-        if strides is not None and strides != int(strides):
-            raise reading.refusal("strides", "must be a whole number")
-        segments.append(TaskSegment(kind, values))
+        with noted_in(wrong):
+            kind = segment.get("kind")
+            if not isinstance(kind, str) or kind not in KINDS:
+                allowed = f"allowed: {', '.join(KINDS)}"
+                if kind is None:
+                    raise ScenarioError(f"{file}: segment {number}: 'kind' is missing; {allowed}")
+                hint = nearest_name(str(kind), KINDS)
+                raise ScenarioError(f"{file}: segment {number}: kind = {quote(kind)} is not known{hint}; {allowed}")
+            prefix = f"{file}: segment {number} ({kind})"
+            validate(_segment_table(kind), segment, prefix, ScenarioError)
+            reading = DocumentReader(prefix, segment)
+            present = [quantity for quantity in KINDS[kind][1] if quantity not in _OPTIONAL or quantity.name in segment]
+            values = {quantity.name: reading.number(quantity.name, quantity) for quantity in present}
+            strides = values.get("strides")
+            if strides is not None and strides != int(strides):
+                raise reading.refusal("strides", "must be a whole number")
+            segments.append(TaskSegment(kind, values))
+    raise_noted(wrong)
     sequence = TaskSequence(document["name"], document.get("description", ""), tuple(segments), file)
-    for index, reason in _contradictions(sequence.segments):
-        raise sequence.refusal(index, reason)
+    raise_noted([sequence.refusal(index, reason) for index, reason in _contradictions(sequence.segments)])
     return sequence
 
 

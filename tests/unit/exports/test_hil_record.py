@@ -151,7 +151,7 @@ def test_where_no_sample_comes_one_line_says_what_came() -> None:
         DataError, match=r"^no sample arrived within 1 s; received: 5 stray bytes; check the connection and the sender$"
     ):
         played([b"hello"])
-    with pytest.raises(DataError, match=r"1 without a channel$"):
+    with pytest.raises(DataError, match=r"1 without a channel; check the connection and the sender$"):
         played([sample_bytes(WireSample(0, 7, 0, 0, {}))])
 
 

@@ -45,6 +45,21 @@ def test_a_stored_result_is_shown_without_its_numbers(result: Result, tmp_path: 
     assert len(shown.splitlines()) == 3
 
 
+def test_a_stored_result_is_the_dataset_of_its_run(tmp_path: Path) -> None:
+    run = ppafo.simulate("step-response", ["run.duration=0.05 s"])
+    stored = ppafo.read_result(run.save(tmp_path / "run"))
+    assert stored.dataset().identical(run.dataset())
+    in_psi = stored.dataset(units={"pressure_1": "psi_g"})["pressure_1"]
+    # Chamber 1 starts at the atmosphere; 1 psi is 6894.757 Pa.
+    assert in_psi.attrs["units"] == "psi_g"
+    assert float(in_psi[0]) == pytest.approx(0.0, abs=1e-9)
+    absolute = float(stored["pressure_1"][-1])
+    assert float(in_psi[-1]) == pytest.approx((absolute - 101325.0) / 6894.757293, rel=1e-8)
+    for result in (run, stored):
+        with pytest.raises(ppafo.PpafoError, match="units='psi_g': must be units by channel"):
+            result.dataset(units="psi_g")  # type: ignore[arg-type]
+
+
 def test_the_document_holds_every_number_of_the_device_in_si(result: Result) -> None:
     device = result.to_dict()["scenario"]["device"]
     scenario = result.scenario

@@ -206,6 +206,8 @@ def test_an_assumption_carries_the_value_it_is_about() -> None:
 def test_an_assumption_about_nothing_is_refused_with_the_nearest_path() -> None:
     with pytest.raises(ScenarioError, match=r"\[assumed\] names 'motion.angel', .*did you mean 'motion.angle'"):
         small(assumed={"motion.angel": "a guess"})
+    with pytest.raises(ScenarioError, match=r"names 'controller.slope', 'reference.knot', which have no value in this"):
+        small(assumed={"controller.slope": "of another law", "motion.angle": "a guess", "reference.knot": "of another"})
 
 
 def test_the_paper_s_gains_and_times_are_in_its_scenarios() -> None:

@@ -159,6 +159,13 @@ def test_a_loop_that_keeps_only_the_mean_of_a_sine_does_not_follow_it() -> None:
     assert slow.tracking.error < 0.2 * slow.tracking.wanted
     quick = simulate(TASK, [*SMALL_SINE, "controller.proportional_gain=4.5 1/(N m)"])
     assert quick.tracking is None
+    # Nor do valves that are open or shut, whose steps of 2.2 N m are as large as the wave.
+    wave = ["reference.kind=sine", "reference.level=3 N m", "reference.amplitude=2 N m", "reference.frequency=1 Hz"]
+    coarse = simulate("torque-task-solenoid", wave)
+    assert coarse.tracking is not None
+    settled = settled_task(coarse.scenario, coarse.recording)
+    assert 0.5 * 2.0 / math.sqrt(2.0) < settled.error < 0.25 * settled.wanted
+    assert "the valves cause a step of 2.19 N m in their dead time of 75 ms" in coarse.tracking.cause
     # A constant delay behind a slow ramp is not judged by how little the ramp changes.
     ramp = ["reference.kind=sine", "reference.level=3 N m", "reference.amplitude=1.5 N m", "reference.frequency=0.1 Hz"]
     assert (
@@ -374,7 +381,7 @@ def test_a_judged_part_without_a_peak_gives_no_verdict_and_a_slower_trial_is_lon
     ]
     short = simulate(TASK, changes)
     assert short.tracking is None
-    assert "the judged half of the run holds 0.15 periods of the reference" in short.following
+    assert "the second half of the run has only 0.15 periods of the reference" in short.following
     longer = simulate(TASK, [*changes, "run.duration=40 s"])
     assert longer.tracking is None
     assert longer.following.startswith("the torque follows its reference")
@@ -636,3 +643,14 @@ def test_noise_that_turns_the_command_until_the_joint_rests_is_not_counted_as_os
     assert settled_task(scenario, recording.with_channel("command", command, "-")).reversals == 0.0
     command[last:] = np.where(np.arange(count - last) % 4 < 2, 1.0, -1.0)
     assert settled_task(scenario, recording.with_channel("command", command, "-")).reversals > 100.0
+
+
+def test_the_largest_error_is_said_where_it_decided() -> None:
+    wave = ["reference.kind=sine", "reference.amplitude=40 deg", "reference.frequency=4 Hz"]
+    run = simulate("swing-foot-angle", ["motion.kind=free", "run.duration=3 s", *wave])
+    error = np.abs(run["angle", "deg"] - run["reference_angle", "deg"])[run["time"] >= 1.5]
+    assert run.tracking is not None
+    # 5 % of the 80 deg from crest to trough are allowed.
+    said = f"largest error {error.max():.3g} deg (4 deg allowed) from 1.5 s on"
+    assert run.tracking.sentence.startswith(f"the angle does not follow its reference: {said}; ")
+    assert run.tracking.allowed == pytest.approx(math.radians(4.0), rel=1e-3)

@@ -211,6 +211,8 @@ def test_a_file_that_sets_its_regulator_to_another_pressure_is_refused(tmp_path:
     words = r"own\.toml sets regulator\.set_pressure to 30 psi_g, but supply\.pressure is 50 psi_g: make both equal"
     with pytest.raises(ScenarioError, match=words):
         load_walk(WALK, bottle=file)
+    with pytest.raises(ScenarioError, match=r"^2 things are wrong: .*contains CO2, but the device uses air.*make both"):
+        load_walk(WALK, ["gas.species=air"], bottle=file)
     lower = ["supply.pressure=30 psi_g", "supply.dorsiflexion_pressure=25 psi_g"]
     assert walk_of(load_walk(WALK, lower, bottle=file)).bottle is not None
 

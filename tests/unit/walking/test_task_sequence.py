@@ -79,6 +79,14 @@ def test_a_mistake_is_one_line_that_names_the_segment(mistake: str, tmp_path: Pa
         assert words in message
 
 
+def test_mistakes_in_several_segments_are_in_one_refusal(tmp_path: Path) -> None:
+    lacking = STAND.replace('duration = "1 s"\n', ""), WALK.replace('kind = "walk"\n', ""), WALK
+    with pytest.raises(ScenarioError) as raised:
+        load_task_sequence(written(tmp_path, *lacking))
+    missing = [part.partition("segment ")[2].partition(" missing")[0] for part in raised.value.parts]
+    assert missing == ["1 (stand): 'duration' is", "2: 'kind' is"]
+
+
 def test_a_cadence_beyond_the_speeds_of_a_task_sequence_is_refused(tmp_path: Path) -> None:
     sequence = sequence_of(tmp_path, WALK.replace('speed = "1.2 m/s"', 'cadence = "150 1/min"'))
     with pytest.raises(ScenarioError, match=r"segment 1 \(walk\): cadence: .* 0\.4 to 1\.6 m/s"):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import FileOrName, Length, Mass, Minutes, Pressure, Threads, Torque, Word, checked
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
-from ppafo.units.shown import shown_in
+from ppafo.units.shown import shown_in, written_text
 from ppafo.wording import argument_text
 
 if TYPE_CHECKING:
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from ppafo.analyses.design.wearer.requirements import WearerSizing
     from ppafo.report.finding import Finding
 
-FOR_A_WEARER = {"mass": "72.5 kg", "torque": "2.5 N m", "pressure": "50 psi_g", "minutes": "5"}
+FOR_A_WEARER = {"mass": "72.5 kg", "stature": "1.85 m", "torque": "2.5 N m", "pressure": "50 psi_g", "minutes": "5"}
+_UNITS = {"mass": "kg", "stature": "m", "torque": "N m", "pressure": "Pa_a", "minutes": "1", "toes": "m"}
 DesignLike = Annotated["SizingProblem | str | Path", Word("DESIGN")]
 
 
@@ -79,36 +80,45 @@ def design(
     from ppafo.analyses.design.profile import answer as profile
     from ppafo.analyses.design.profile.solve import size_for_profile
     from ppafo.analyses.design.wearer import answer as wearer
-    from ppafo.analyses.design.wearer.requirements import DesignRequirements
+    from ppafo.analyses.design.wearer.requirements import BODY_MASS_INDEX, DesignRequirements
     from ppafo.analyses.design.wearer.solve import size_for_wearer
     from ppafo.arguments.reading import units_given
     from ppafo.errors import StudyError
     from ppafo.parameters.parts.catalogue import DEFAULT
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
+    from ppafo.walking.wearer import STATURES
 
-    wished = {"mass": mass, "torque": torque, "pressure": pressure, "minutes": minutes}
     report = progress or report_nothing
-    example = " ".join(argument_text(*pair) for pair in FOR_A_WEARER.items())
+    wished: dict[str, Any] = {"mass": mass, "stature": stature, "torque": torque, "pressure": pressure}
+    wished |= {"minutes": minutes, "toes": toes, "catalogue": catalogue, "bottle": bottle, "gait": gait}
+    given = {name: value for name, value in wished.items() if value is not None}
     if problem is None:
-        # Stature, toes and catalogue may be left out, so they are not among them.
-        missing = [argument_text(name) for name, value in wished.items() if value is None]
-        if len(missing) == len(wished) and stature is None:
-            raise StudyError(
-                f"no design was given; name a design, give a .toml file, or describe the wearer: {example}"
-            )
-        if mass is None or torque is None or pressure is None or minutes is None:
-            raise StudyError(f"a design for a wearer also needs {', '.join(missing)}, for example {example}")
-        seconds = 60.0 * minutes
-        requirements = DesignRequirements(mass, stature, float(torque), float(pressure), seconds, toes, gait=gait)
+        lightest, heaviest = (BODY_MASS_INDEX * tall * tall for tall in STATURES)
+        optional = ["stature"] if mass is None or lightest <= mass <= heaviest else []
+        missing = [name for name in FOR_A_WEARER if name not in [*given, *optional]]
         with shown_in(units_given({"Pa_a": pressure, "N m": torque})):
+            if mass is None or torque is None or pressure is None or minutes is None or missing:
+                texts = FOR_A_WEARER | {"stature": "1.4 m" if mass is not None and mass < lightest else "1.85 m"}
+                for name, value in given.items():
+                    unit = _UNITS.get(name, "")
+                    texts[name] = written_text(value, unit, unit="m" * (name == "stature")) if unit else str(value)
+                words = [argument_text(name, text) for name, text in texts.items() if name in [*given, *missing]]
+                python, command = f"ppafo.design({', '.join(words)})", f"ppafo design {' '.join(words)}"
+                range_text = f" (derived from body mass only for {lightest:.1f} to {heaviest:.0f} kg)"
+                needs = [argument_text(name) + range_text * (name == "stature") for name in missing]
+                start = f"a design for a wearer also needs {', '.join(needs)}, for example"
+                if not given:
+                    start = "no design was given; name a design, give a .toml file, or describe the wearer:"
+                raise StudyError(f"{start} {command if words[0].startswith('--') else python}")
+            requirements = DesignRequirements(
+                mass, stature, float(torque), float(pressure), 60.0 * minutes, toes, gait=gait
+            )
             parts = DEFAULT if catalogue is None else catalogue
             return wearer.finding_of(size_for_wearer(requirements, report, parts, bottle))
-    of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue}
-    of_a_wearer |= {"bottle": bottle, "gait": gait}
-    named = [argument_text(name) for name, value in of_a_wearer.items() if value is not None]
-    if named:
+    if given:
         raise StudyError(
-            f"{', '.join(named)} cannot be combined with a design file, which states the requirements; omit one of them"
+            f"{', '.join(map(argument_text, given))} cannot be combined with a design file, which states the "
+            "requirements; omit one of them"
         )
     chosen = load_design(problem) if isinstance(problem, str | Path) else problem
     warn_of_coarse_pairs([chosen.scenario])

@@ -128,25 +128,29 @@ def _verdict(outcome: FindResult, kind: Kind) -> str:
     nearest = f"{condition.metric} of " if is_verdict else ""
     if index is None:
         # The nearest one says whether a wider range could.
-        row = int((np.nanargmin if condition.is_most else np.nanargmax)(tried["judged"]))
+        row = int(np.searchsorted(tried["value"], outcome.nearest))
+        metric = "" if outcome.verdicts else f"{nearest}{of_condition.text(tried['judged'][row])} at "
         return (
             f"no {path} from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])} {meets}; "
-            f"the nearest is {nearest}{of_condition.text(tried['judged'][row])} at {kind.text(tried['value'][row])}"
+            f"the nearest is {metric}{kind.text(tried['value'][row])}"
         )
     value = float(tried["value"][index])
     # Beyond it the condition may be met by a loop that does not follow its reference.
     follows = " and follows its reference" if _not_followed(outcome) and not is_verdict else ""
     lead = f"{path} = {kind.text(value)} is the {wanted} value that {meets}{follows}"
-    there = f"{condition.metric} is {of_condition.text(float(tried['metric'][index]))} there"
+    # Verdicts have the number that decided, in a line of their own.
+    metric = f": {condition.metric} is {of_condition.text(float(tried['metric'][index]))} there"
+    there = "" if outcome.verdicts else metric
     if neighbour is None:
-        return f"{lead}, at the end of the range: {there}; a wider range may have a {further} value"
-    return f"{lead}: {there} (bracketed to {kind.change(abs(value - neighbour), '.1g')})"
+        return f"{lead}, at the end of the range{there}; a wider range may have a {further} value"
+    return f"{lead}{there} (bracketed to {kind.change(abs(value - neighbour), '.1g')})"
 
 
 def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
     """Yield remarks on runs, further intervals, noise, oscillation and failures."""
     condition, is_met, tried, runs = outcome.condition, outcome.is_met, outcome.tried, outcome.runs
     index, _ = outcome.found
+    yield from (f"at {kind.text(value, '.9g')} {said}" for value, said in outcome.verdicts if said)
     evenly = np.count_nonzero(tried["is_of_grid"])
     met = np.count_nonzero(is_met)
     where = "everywhere" if is_met.all() else f"at {met} of them" if met else "nowhere"

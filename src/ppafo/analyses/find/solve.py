@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 from ppafo.errors import ScenarioError, StudyError, UnitError, at_fault, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
+from ppafo.running import simulate
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
 from ppafo.studies.sampling import NOISE
+from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, given_in, varied_path
 from ppafo.study.runs import RunCounter, Runs, excess, is_to_follow, scenario_runs, settled, with_companions
-from ppafo.units import split_quantity
+from ppafo.units import SI, split_quantity
 from ppafo.wording import one_line
 
 FEWEST, MOST = 3, 100_000
@@ -102,7 +104,10 @@ TRIED = np.dtype(
 
 @dataclass(frozen=True, slots=True)
 class FindResult:
-    """Search result: tried values, ascending, as a structured array of ``TRIED``, and the counted ``runs``."""
+    """Search result: tried values, ascending, as a structured array of ``TRIED``, and the counted ``runs``.
+
+    ``verdicts`` are values [SI] with the verdict of a run of their own, for the condition that the run follows.
+    """
 
     scenario: str
     path: VariedPath
@@ -111,6 +116,7 @@ class FindResult:
     noise_streams: int
     runs: Runs
     tried: NDArray[np.void]
+    verdicts: tuple[tuple[float, str], ...] = ()
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
@@ -126,6 +132,12 @@ class FindResult:
         index = int(met[-1] if self.highest else met[0])
         outer = index + (1 if self.highest else -1)
         return index, float(self.tried["value"][outer]) if 0 <= outer < self.tried.size else None
+
+    @property
+    def nearest(self) -> float:
+        """Tried value [SI] that is nearest to the condition."""
+        choose = np.nanargmin if self.condition.is_most else np.nanargmax
+        return float(self.tried["value"][choose(self.tried["judged"])])
 
     @property
     def met_intervals(self) -> list[list[float]]:
@@ -148,7 +160,9 @@ class FindResult:
         # A loop whose command turns all the time meets no condition that anybody would build on.
         verdicts = excess(rows, base, columns)
         turns = verdicts.oscillates == 1.0
-        fails = (verdicts.follows == 0.0) & is_to_follow(base, columns)
+        # A run without a verdict is none that follows.
+        is_asked = self.condition.text == FOLLOWS
+        fails = verdicts.follows != 1.0 if is_asked else (verdicts.follows == 0.0) & is_to_follow(base, columns)
         by_stream = (
             each.reshape(streams, values.size)
             for each in (rows[metric], np.where(turns, np.nan, judged), judged > rows[metric], turns, fails)
@@ -209,4 +223,15 @@ def outermost(
             break
         search = search.with_values(base, np.linspace(value, neighbour, _PARTS + 1)[1:-1], seeds, False)
         index, neighbour = search.found
-    return search
+    # Under noise one run tells nothing of the mean over the streams.
+    if condition.text != FOLLOWS or seeds.size:
+        return search
+    value = search.nearest if index is None else float(search.tried["value"][index])
+    values = [value] if neighbour is None else [value, neighbour]
+    return replace(search, verdicts=tuple((value, _verdict_at(base, path.path, value)) for value in values))
+
+
+def _verdict_at(base: Scenario, path: str, value: float) -> str:
+    """Return the verdict of ``simulate`` on the run at a value [SI], with the number that decided."""
+    result = simulate(with_overrides(base, [f"{path}={value!r} {SI}"]))
+    return result.following if result.tracking is None else result.tracking.found

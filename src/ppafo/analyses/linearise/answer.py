@@ -267,7 +267,7 @@ def _loop(model: LinearModel) -> Section:
         for name, text, at in values
     ]
     rows.append(("peak sensitivity", f"{margins.peak_sensitivity:.3g}"))
-    return Section("Loop with the PID of the scenario, sampled and with its delays", facts(rows))
+    return Section("Loop with the PID of the scenario for small changes, sampled and with its delays", facts(rows))
 
 
 def frequency_panels(model: LinearModel) -> list[Panel]:

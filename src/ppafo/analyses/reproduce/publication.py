@@ -23,7 +23,7 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.walk import healthy_metrics, walk
-from ppafo.wording import argument_text, nearest_name
+from ppafo.wording import argument_text, nearest_name, said_missing
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5
@@ -205,9 +205,10 @@ def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict
                 f"{where}.arguments: '{name}' is unknown{hint}; arguments of {entry.computation}: {known}"
             )
     values: dict[str, float] = {}
+    missing = [name for name in computation.arguments if name not in entry.arguments]
+    if missing:
+        raise ScenarioError(f"{where}.arguments: {said_missing(missing)}; arguments of {entry.computation}: {known}")
     for name, unit in computation.arguments.items():
-        if name not in entry.arguments:
-            raise ScenarioError(f"{where}.arguments: '{name}' is missing; arguments of {entry.computation}: {known}")
         key, text = f"{where}.arguments.{name}", entry.arguments[name]
         with refused_as(ScenarioError, key, UnitError):
             value = values[name] = parse_quantity(text, unit)

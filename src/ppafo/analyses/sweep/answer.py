@@ -62,6 +62,7 @@ class _Summary(BaseModel, strict=True):
     completed_by_configuration: dict[str, _Count]
     oscillating: dict[str, _Count] = Field(default_factory=dict)
     not_following: dict[str, _Count] = Field(default_factory=dict)
+    without_verdict: dict[str, _Count] = Field(default_factory=dict)
     failures: list[_Failure]
     quantile_definition: str
     configurations: dict[str, dict[str, _Described]]
@@ -125,12 +126,16 @@ def _useless_runs(results: StudyResults) -> list[str]:
     flags = (
         ("oscillating", "the loop oscillates (column 'oscillates')"),
         ("not_following", "the reference is not followed (column 'follows')"),
+        ("without_verdict", "it is not known whether the reference is followed (column 'follows' is empty)"),
     )
+    without = summary.get("without_verdict", {})
     return sentences + [
-        f"{name}: in {count:,} runs {words}"
+        f"{name}: in {count:,} of {completed:,} runs ({100.0 * count / max(completed, 1):.3g} %) {words}"
         for key, words in flags
-        for name, count in summary.get(key, {}).items()
-        if count
+        for name, completed in summary["completed_by_configuration"].items()
+        # Where some runs have a verdict, 0 is news too.
+        if (count := summary.get(key, {}).get(name, 0))
+        or (key == "not_following" and without.get(name, completed) < completed)
     ]
 
 

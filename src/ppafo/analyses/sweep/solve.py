@@ -41,7 +41,7 @@ from ppafo.studies.study import Study, check_can_be_swept
 from ppafo.study.blocks import chunk_count, samples_of
 from ppafo.study.folder import study_folder
 from ppafo.study.manifest import read_manifest
-from ppafo.study.runs import RunCounter, joined
+from ppafo.study.runs import RunCounter, is_to_follow, joined
 from ppafo.study.store import (
     FOLLOWS,
     OSCILLATES,
@@ -83,6 +83,16 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
         for configuration in study.configurations
         for part in results.parts(configuration.name, "failure_time")
     )
+    # A reference that lies beyond reach on purpose is followed by no run, unless the study varies the reach.
+    varied = {
+        each.name: [path for path in study.paths if study.varies(path, each.name)] for each in study.configurations
+    }
+    judged = [each for each in study.configurations if is_to_follow(each.scenario, varied[each.name])]
+    parts = {each.name: list(results.parts(each.name, FOLLOWS)) for each in judged}
+    verdicts = {
+        name: (sum(int(np.count_nonzero(part == 0.0)) for part in own), sum(part.size for part in own))
+        for name, own in parts.items()
+    }
     return {
         "study": study.name,
         "runs": study.runs,
@@ -93,13 +103,11 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
         "oscillating": {
             name: int(sum(np.count_nonzero(part) for part in results.parts(name, OSCILLATES))) for name in completed
         },
-        # A reference that lies beyond reach on purpose is followed by no run.
-        "not_following": {
-            configuration.name: int(
-                sum(np.count_nonzero(part == 0.0) for part in results.parts(configuration.name, FOLLOWS))
-            )
-            for configuration in study.configurations
-            if not configuration.scenario.beyond_reach
+        "not_following": {name: off for name, (off, _) in verdicts.items()},
+        "without_verdict": {
+            each.name: completed[each.name] - verdicts[each.name][1]
+            for each in judged
+            if verdicts[each.name][1] or each.scenario.follows_reference
         },
         "failures": failures,
         "quantile_definition": QUANTILE_DEFINITION,

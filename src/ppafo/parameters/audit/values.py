@@ -38,7 +38,8 @@ def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
             sides=(),
             paragraph=(
                 f"{path} is {number_text(entry)} and refers to '{entry.key}', which has {stated_number}. Give that "
-                "number, or the key of another statement ('ppafo reproduce --list')."
+                "number, or the key of another statement ('ppafo reproduce --list'); for a value of another origin, "
+                f"delete the line 'key' of [{path}] and change origin and source."
             ),
         )
 

@@ -14,7 +14,7 @@ from ppafo.arguments import checked
 from ppafo.documents.models import SchemaVersion, StrictTable, make_schema, one_of, optional, table, validate
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError
+from ppafo.errors import ParameterError, PpafoError, noted_in, raise_noted
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM
@@ -256,14 +256,16 @@ def parse_catalogue(content: bytes, file: str) -> Catalogue:
     Raises ParameterError if the catalogue is not usable.
     """
     parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
+    wrong: list[PpafoError] = []
     groups = {
-        group: {name: _part(file, group, name, table) for name, table in getattr(parsed, group).items()}
+        group: {name: _part(file, group, name, table, wrong) for name, table in getattr(parsed, group).items()}
         for group in GROUPS
     }
+    raise_noted(wrong)
     return Catalogue(file, parsed.name, parsed.title, parsed.notes, groups)
 
 
-def _part(file: str, group: str, name: str, parsed: Any) -> Part:
+def _part(file: str, group: str, name: str, parsed: Any, wrong: list[PpafoError]) -> Part:
     # Only valves come in kinds.
     kind = getattr(parsed, "kind", "")
     declared = {quantity.name: quantity for quantity in figures_of(group, kind)}
@@ -272,26 +274,25 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
     for key in parsed.unknown:
         if key not in declared:
             hint = nearest_name(key, declared)
-            raise ParameterError(f"{where}.unknown: there is no value '{key}'{hint}; available: {', '.join(declared)}")
+            text = f"there is no value '{key}'{hint}; available: {', '.join(declared)}"
+            wrong.append(ParameterError(f"{where}.unknown: {text}"))
         if key in figures:
-            raise ParameterError(f"{where}.unknown: '{key}' has a value in this part; omit it from unknown")
+            wrong.append(ParameterError(f"{where}.unknown: '{key}' has a value in this part; omit it from unknown"))
     forms_given = [[quantity.name for quantity in form if quantity.name in figures] for form in (AREA_FORM, SONIC_FORM)]
     # Half a form of an orifice is as unusable as two forms at once.
     if group == "valves" and sorted(map(len, forms_given)) != [0, 2]:
-        raise ParameterError(
-            f"{where}: needs either area and discharge_coefficient or sonic_conductance and critical_ratio, "
-            f"but has {', '.join(forms_given[0] + forms_given[1]) or 'none of them'}"
-        )
+        needs = "needs either area and discharge_coefficient or sonic_conductance and critical_ratio, but has"
+        wrong.append(ParameterError(f"{where}: {needs} {', '.join(forms_given[0] + forms_given[1]) or 'none of them'}"))
     values = {}
     for key, figure in figures.items():
         shown = f"{where}.{key} = {figure.value:g} {figure.unit}"
         # A guess without its reason cannot be checked by the next reader.
         if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
-            raise ParameterError(
-                f"{where}.{key}.note is missing; give the reason for a value with origin '{figure.origin}'"
-            )
+            reason = f"give the reason for a value with origin '{figure.origin}'"
+            wrong.append(ParameterError(f"{where}.{key}.note is missing; {reason}"))
         # Data sheets give gauge pressures at sea level.
-        values[key] = allowed_number(shown, figure, declared[key])
+        with noted_in(wrong):
+            values[key] = allowed_number(shown, figure, declared[key])
     if "torque_constant" in values:
         values.setdefault("displacement_per_radian", values["torque_constant"])
     return Part(

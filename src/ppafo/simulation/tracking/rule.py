@@ -301,12 +301,11 @@ class _TaskExcess(NamedTuple):
 
 def largest_error(settled: SettledPart, is_switched: bool) -> Floats:
     """Largest RMS error with which a task still follows its reference [unit of ``settled``]; arrays (runs,) allowed."""
-    if is_switched:
-        return LARGEST_SHARE_SWITCHED * np.asarray(settled.wanted)
     rests, wanted, wave = np.asarray(settled.rests), np.asarray(settled.wanted), np.asarray(settled.wave)
     # A wave below what a reference at rest may be missed by is judged as rest.
-    is_wave = ~rests & (wave > LARGEST_SHARE * wanted)
-    allowed: Floats = np.where(rests, LARGEST_SHARE, LARGEST_SHARE_MOVING) * wanted
+    is_wave = ~rests & (wave > (LARGEST_SHARE_SWITCHED if is_switched else LARGEST_SHARE) * wanted)
+    share = LARGEST_SHARE_SWITCHED if is_switched else np.where(rests, LARGEST_SHARE, LARGEST_SHARE_MOVING)
+    allowed: Floats = share * wanted
     # An offset beside the wave is judged by the share alone.
     of_wave = np.hypot(LARGEST_SHARE_OF_WAVE * wave, settled.missing)
     limit: Floats = np.where(is_wave, np.minimum(allowed, of_wave), allowed)

@@ -56,7 +56,8 @@ class Tracking:
     ``tried`` is the result of tried remedies, and ``mended`` the overrides with which the run follows. ``accepted`` is
     the scenario's reason for a reference beyond reach, else "". ``at_rest`` is true if reference and joint stand still.
     ``since`` [s] is the start of the settled part, 0 for a walk. ``span`` is the range of the error of an angle that
-    swings slowly, else 0.
+    swings slowly, else 0. ``worst`` is the largest error beside a moving reference and ``allowed`` its limit, if the
+    RMS error alone would be within its own limit, else 0.
     """
 
     kind: Failure
@@ -77,6 +78,8 @@ class Tracking:
     at_rest: bool = True
     since: float = 0.0
     span: float = 0.0
+    worst: float = 0.0
+    allowed: float = 0.0
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
@@ -100,10 +103,12 @@ class Tracking:
             last = f"; {self.tried or self.advice}" if self.tried or self.advice else ""
         else:
             last = f": {remedies}"
-        return f"{self._found}; {self.cause}{last}"
+        return f"{self.found}; {self.cause}{last}"
 
     @property
-    def _found(self) -> str:
+    @in_units(lambda tracking: tracking.units)
+    def found(self) -> str:
+        """Failure with the number that decided, without cause and remedy."""
         words = CONTROLLED[self.controlled].words
         error, wanted, moved = (change_text(self.controlled, each) for each in (self.error, self.wanted, self.moved))
         plain_moved, rms = moved.partition(" ")[0], f"RMS error {error} (requested {wanted}){time_text(self.since)}"
@@ -121,6 +126,9 @@ class Tracking:
             missing = change_text(self.controlled, abs(self.missing))
             side = "below" if self.missing < 0.0 else "above"
             return f"the {words} stays {missing} {side} its reference (requested change {wanted})"
+        if self.worst:
+            worst, limit = (change_text(self.controlled, each) for each in (self.worst, self.allowed))
+            rms = f"largest error {worst} ({limit} allowed){time_text(self.since)}"
         return f"the {words} does not follow its reference: {rms}"
 
 
@@ -138,6 +146,9 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
     if settled.turns and turning <= 1.0:
         per_second = settled.turns / settled.duration
     overshoots, is_of_walk = failure == "overshoots", stride_time > 0.0
+    switches, largest = only_switches(scenario, scenario.law), float(largest_deviation(settled))
+    is_within = is_task and not switches and settled.error <= largest_error(settled, switches)
+    is_worst = is_within and not settled.rests and settled.worst > largest
     return Tracking(
         kind=failure,
         controlled=scenario.controlled,
@@ -154,6 +165,8 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
         at_rest=settled.rests,
         since=settled.start,
+        worst=settled.worst if is_worst else 0.0,
+        allowed=largest if is_worst else 0.0,
         span=settled.span if failure == "oscillates" and turning <= 1.0 and not settled.turns and settled.way else 0.0,
     )
 
@@ -179,9 +192,9 @@ def following_text(result: "RecordedResult") -> str:
         left = f"with an RMS error of {change_text(controlled.name, settled.error)}{time_text(settled.start)}"
         if settled.ends_on_ramp:
             return _undecided_text(scenario, f"the run ends on the ramp of its reference, {left}")
-        judged_share = f"the judged half of the run holds {settled.periods:.2g} periods of the reference"
+        short = f"the second half of the run has only {settled.periods:.2g} periods of the reference"
         longer = override_text([f"run.duration={2.0 * scenario.run.duration / settled.periods:.3g} s"])
-        return f"no verdict on the {controlled.words}: {judged_share}, {left}; not tried: {longer} should give one"
+        return f"no verdict on the {controlled.words}: {short}, {left}; not tried: {longer} should give one"
 
     def judged_text(name: str, number: float, limit: float | None, why: str = "") -> str:
         allowed = "" if limit is None else f" ({change_text(controlled.name, limit)} allowed{why})"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, UNIVERSAL_GAS_CONSTANT
-from ppafo.errors import ParameterError, ScenarioError, refused_as
+from ppafo.errors import ParameterError, PpafoError, ScenarioError, raise_noted, refused_as
 from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, following_rates, isobar, supply_now
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import specific_gas_constant
@@ -156,13 +156,22 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
     # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
     own_pressure = to_si(stated.value, stated.unit, "Pa_a", device.supply.atmospheric_pressure)
     # A bottle of the package is set to the paper's pressure, which says nothing of this walk; a user's file does.
+    wrong: list[PpafoError] = []
+    if not is_of_bottle(device.gas.molar_mass, bottle):
+        species = bottle.fluid.name
+        wrong.append(
+            reading.refusal(
+                BOTTLE_NAME,
+                f"contains {species}, but the device uses {device.gas.species}: set gas.species={species}, or "
+                f"choose a bottle of {device.gas.species}",
+            )
+        )
     if path.suffix == ".toml" and abs(own_pressure - pressure) > _SAME_PRESSURE * pressure:
         room = device.supply.atmospheric_pressure
-        raise ScenarioError(
-            f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to "
-            f"{shown_text(own_pressure, 'Pa_a', atmosphere=room)}, but supply.pressure is "
-            f"{shown_text(pressure, 'Pa_a', atmosphere=room)}: make both equal"
-        )
+        own_text, text = (shown_text(each, "Pa_a", atmosphere=room) for each in (own_pressure, pressure))
+        problem = f"{name} sets {_SET_PRESSURE} to {own_text}, but supply.pressure is {text}: make both equal"
+        wrong.append(ScenarioError(f"{reading.file}: {BOTTLE_NAME}: {problem}"))
+    raise_noted(wrong)
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
     entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
     regulator = bottle.regulator._replace(set_pressure=pressure)
@@ -210,13 +219,7 @@ def is_of_bottle(molar_mass: float, bottle: Bottle) -> bool:
 
 def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> None:
     """Raise ScenarioError for settings of a walk that conflict with a bottle."""
-    fluid, regulator = supply.bottle.fluid, supply.bottle.regulator
-    if not is_of_bottle(device.gas.molar_mass, supply.bottle):
-        raise reading.refusal(
-            BOTTLE_NAME,
-            f"contains {fluid.name}, but the device uses {device.gas.species}: set gas.species={fluid.name}, or "
-            f"choose a bottle of {device.gas.species}",
-        )
+    regulator = supply.bottle.regulator
     if device.supply.relieving:
         raise ScenarioError(f"{reading.file}: supply.relieving: must be false with a bottle, which takes no gas back")
     if kind_at(reading.document, "gas_model") == THERMAL:

@@ -6,7 +6,7 @@ GRID = {
     "schema_version": 1,
     "name": "grid",
     "description": "Two values of a loop, some of which follow their reference.",
-    "configurations": [{"name": "angle", "scenario": "torque-task-anti-windup", "overrides": ["run.duration=2.5 s"]}],
+    "configurations": [{"name": "angle", "scenario": "torque-task-anti-windup", "overrides": ["run.duration=5 s"]}],
     "vary": [
         {"path": "supply.pressure", "kind": "grid", "first": "30 psi_g", "last": "90 psi_g", "count": 3},
         {"path": "valve.area", "kind": "grid", "first": "4 mm^2", "last": "12 mm^2", "count": 2},

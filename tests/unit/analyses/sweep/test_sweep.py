@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+import ppafo
 from ppafo.analyses.sweep import solve as solve_module
 from ppafo.cli.main import main
+from ppafo.report.finding import page_files
 
 STUDY = """
 schema_version = 1
@@ -150,3 +152,31 @@ def test_the_schema_describes_the_studies_of_the_package(capsys: pytest.CaptureF
     broken["outputs"]["metric"] = []
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(broken, schema)
+
+
+def test_the_share_of_runs_that_do_not_follow_is_said_and_the_share_without_a_verdict(tmp_path: Path) -> None:
+    def said(name: str, *overrides: str) -> tuple[list[str], dict[str, dict[str, int]]]:
+        # The torque at most is 0.1 N m per psi: 4.8 N m lack 17 and 6 % at 40 and 45 psi, where 5 % are allowed.
+        study = {
+            "schema_version": 1,
+            "name": name,
+            "configurations": [
+                {"name": "task", "scenario": "torque-task-proportional", "overrides": list(overrides)},
+                {"name": "open", "scenario": "torque-task-proportional", "overrides": ["controller.kind=constant"]},
+            ],
+            "vary": [{"path": "supply.pressure", "kind": "list", "values": [f"{at} psi_g" for at in (40, 45, 52, 60)]}],
+            "outputs": {"metrics": ["peak_torque"]},
+        }
+        finding = ppafo.sweep(study, out=tmp_path / name)
+        assert "ask: in " in page_files(finding)["report.html"].decode()
+        return list(finding.said[1:]), json.loads((tmp_path / name / "summary.json").read_text(encoding="utf-8"))
+
+    lines, summary = said("share", "reference.level=4.8 N m")
+    assert lines == ["task: in 2 of 4 runs (50 %) the reference is not followed (column 'follows')"]
+    assert (summary["not_following"]["task"], summary["without_verdict"]) == (2, {"task": 0})
+    wave = ("reference.kind=sine", "reference.level=2 N m", "reference.amplitude=1 N m", "reference.frequency=0.1 Hz")
+    lines, summary = said("short", *wave)
+    # Less than half a period of 10 s in the judged half of 3 s.
+    assert len(lines) == 1
+    assert lines[0].startswith("task: in 4 of 4 runs (100 %) it is not known whether the reference is followed")
+    assert summary["without_verdict"] == {"task": 4}

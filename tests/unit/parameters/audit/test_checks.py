@@ -9,6 +9,7 @@ import pytest
 from ppafo.errors import ParameterError
 from ppafo.parameters import apply_overrides, build_device, list_sets, load_parameter_set
 from ppafo.parameters.audit import AuditFinding, findings_of
+from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
 
 BASE = load_parameter_set("ppafo2011")
 BLADDER = Path(__file__).parents[3] / "actuators" / "measured-bladder.toml"
@@ -277,6 +278,18 @@ def test_a_key_of_another_number_or_of_none_is_an_error(key: str) -> None:
     (found,) = with_key("reported.walking_torque", key)
     assert (found.severity, found.id) == ("error", "reported-walking-torque-against-statement")
     assert f"'{key}'" in found.title
+
+
+def test_a_copied_value_that_is_changed_is_cured_by_the_removal_of_the_key_line_that_the_audit_offers() -> None:
+    copied = parameter_set_toml(BASE).replace("value = 50.0\n", "value = 60.0\n", 1)
+    head, key, rest = copied.partition('key = "ppafo-2011/source_pressure"\n')
+    errors = [
+        [found for found in findings_of(parse_parameter_set(text.encode(), "own.toml")) if found.severity == "error"]
+        for text in (copied, head + rest)
+    ]
+    assert key
+    assert "delete the line 'key' of [supply.pressure]" in errors[0][0].paragraph
+    assert (len(errors[0]), errors[1]) == (1, [])
 
 
 @pytest.mark.parametrize(

@@ -120,3 +120,11 @@ def test_every_mistake_is_one_line_with_file_key_and_value(before: str, after: s
         parse_catalogue(GOOD.replace(before, after, 1).encode(), "mine.toml")
     assert str(caught.value).startswith("mine.toml: ")
     assert "\n" not in str(caught.value)
+
+
+def test_every_key_that_parts_lack_is_in_one_refusal() -> None:
+    two = GOOD.replace('note = "scaled"', "").replace('title = "Mine"', f'title = "Mine"\n{VALVE}')
+    with pytest.raises(ParameterError) as caught:
+        parse_catalogue(two.encode(), "mine.toml")
+    lacking = [part.split(";")[0].split(": needs ")[0] for part in caught.value.parts]
+    assert lacking == ["mine.toml: valves.v", "mine.toml: bottles.small.empty_mass.note is missing"]

@@ -181,36 +181,27 @@ def try_pressures(trials: Trials, valve: Part) -> Trial:
 
     Gains of the next scale are tried unless the torque or the requested range limits the valve.
     """
-    problem, best, lowest = trials.problem, None, (np.inf, np.inf)
+    problem, best, reached = trials.problem, None, (np.inf, np.inf)
+    pressures = np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID)
     for first in range(0, len(trials.gain_sets), trials.combinations):
-        tried = _pressures_at_scale(trials, valve, first)
-        error = float(np.nan_to_num(tried["error"], nan=np.inf).min())
-        reached = float(np.min(tried["pressure"][works_in(problem, tried)], initial=np.inf)), error
-        if best is None or reached < lowest:
-            best, lowest = tried, reached
+        tried = trials.best(valve, pressures, like=first)
+        while lowest := first_of(works_in(problem, tried)):
+            lower, upper = tried["pressure"][lowest - 1 : lowest + 1]
+            if upper - lower <= FINENESS:
+                break
+            # Without both ends, which were tried before.
+            between = trials.best(valve, np.linspace(lower, upper, GRID)[1:-1], like=first)
+            tried = np.sort(np.concatenate([tried, between]), order="pressure", kind="stable")
+        feasible = float(np.min(tried["pressure"][works_in(problem, tried)], initial=np.inf))
+        rank = feasible, float(np.nan_to_num(tried["error"], nan=np.inf).min())
+        if best is None or rank < reached:
+            best, reached = tried, rank
         if _limit_of_pressure(problem, tried) is not None:
             break
-    assert best is not None, "the first scale has a trial"
-    if np.isnan(best["error"]).all():
+    if best is None or np.isnan(best["error"]).all():
         reason = next(iter(trials.failures), "no reason was given")
         raise StudyError(f"{problem.file}: every run with valve '{valve.name}' failed; the first failure: {reason}")
     return best
-
-
-def _pressures_at_scale(trials: Trials, valve: Part, like: int) -> Trial:
-    """Search the lowest feasible pressure of a valve with the gains at the scale of the gain set ``like``."""
-    problem = trials.problem
-    highest = highest_pressure(problem, valve)
-    tried = trials.best(valve, np.linspace(problem.lowest_pressure, highest, GRID), like=like)
-    while lowest := first_of(works_in(problem, tried)):
-        lower, upper = tried["pressure"][lowest - 1 : lowest + 1]
-        if upper - lower <= FINENESS:
-            break
-        # Without both ends, which were tried before.
-        between = trials.best(valve, np.linspace(lower, upper, GRID)[1:-1], like=like)
-        tried = np.concatenate([tried, between])
-        tried = tried[np.argsort(tried["pressure"], kind="stable")]
-    return tried
 
 
 def works_in(problem: SizingProblem, tried: Trial) -> NDArray[np.bool_]:

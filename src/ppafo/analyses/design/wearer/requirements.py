@@ -11,7 +11,7 @@ from ppafo.analyses.design.wearer.electrical import Electrical
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.parts.sections import doubts_data
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
-from ppafo.errors import StudyError
+from ppafo.errors import StudyError, raise_noted
 from ppafo.parameters.parts import Part
 from ppafo.report.kind import Kind
 from ppafo.units import from_si, to_si
@@ -19,7 +19,7 @@ from ppafo.units.shown import shown_unit
 from ppafo.version import __version__
 from ppafo.walking.motion import LONGEST_MINUTES
 from ppafo.walking.result import WalkResult
-from ppafo.walking.wearer import STATURES, WEARER
+from ppafo.walking.wearer import WEARER
 from ppafo.wording import argument_text
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
@@ -95,42 +95,25 @@ class DesignRequirements:
 
 
 def check_requirements(requirements: DesignRequirements) -> None:
-    """Raise StudyError, naming the argument, for requirements outside the ranges for which devices are sized."""
-    low, high = STATURES
+    """Raise StudyError, naming every argument, for requirements outside the ranges for which devices are sized."""
     mass, tallest = (next(each for each in WEARER if each.name == name) for name in ("body_mass", "stature"))
-    weight, height, toes = requirements.mass, requirements.height, requirements.toes
-    if not mass.minimum <= weight <= mass.maximum:
-        raise StudyError(
-            f"{argument_text('mass')}: {weight:g} kg: must be at least {mass.minimum:g} kg and "
-            f"at most {mass.maximum:g} kg"
-        )
-    if requirements.stature is None and not low <= height <= high:
-        lightest, heaviest = (BODY_MASS_INDEX * tall * tall for tall in STATURES)
-        raise StudyError(
-            f"{argument_text('mass')}: {weight:g} kg: give {argument_text('stature')} too; it is "
-            f"derived from body mass only for {lightest:.1f} to "
-            f"{heaviest:.0f} kg"
-        )
+    ranges = (
+        ("mass", requirements.mass, mass.minimum, mass.maximum, "kg"),
+        ("minutes", requirements.seconds / 60.0, SHORTEST / 60.0, LONGEST_MINUTES, "min"),
+        ("toes", 1000.0 * (requirements.toes or 0.0), 0.0, 1000.0 * _HIGHEST_TOES, "mm"),
+        ("stature", requirements.height, _SHORTEST_WEARER, tallest.maximum, "m"),
+    )
+    problems = {
+        name: f" {value:g} {unit}: must be at least {low:g} {unit} and at most {high:g} {unit}"
+        for name, value, low, high, unit in ranges
+        if not (low or 0.0) <= value <= (high or 0.0)
+    }
     if not requirements.pressure > STANDARD_ATMOSPHERE:
-        raise StudyError(f"{argument_text('pressure')}: must be above atmospheric pressure, for example '50 psi_g'")
+        problems["pressure"] = " must be above atmospheric pressure, for example '50 psi_g'"
     if not 0.0 < requirements.torque < _STRONGEST:
         text, most = TORQUE.text(requirements.torque), TORQUE.text(_STRONGEST)
-        raise StudyError(f"{argument_text('torque')}: {text}: must be above 0 and below {most}")
-    if not SHORTEST <= requirements.seconds <= 60.0 * LONGEST_MINUTES:
-        minutes = requirements.seconds / 60.0
-        raise StudyError(
-            f"{argument_text('minutes')}: {minutes:g} min: must be at least 0.1 min and at most {LONGEST_MINUTES:g} min"
-        )
-    if toes is not None and not 0.0 <= toes <= _HIGHEST_TOES:
-        highest = 1000.0 * _HIGHEST_TOES
-        raise StudyError(
-            f"{argument_text('toes')}: {1000.0 * toes:g} mm: must be at least 0 mm and at most {highest:g} mm"
-        )
-    if not _SHORTEST_WEARER <= height <= tallest.maximum:
-        raise StudyError(
-            f"{argument_text('stature')}: {height:g} m: must be at least {_SHORTEST_WEARER:g} m and "
-            f"at most {tallest.maximum:g} m"
-        )
+        problems["torque"] = f" {text}: must be above 0 and below {most}"
+    raise_noted([StudyError(f"{argument_text(name)}:{problem}") for name, problem in problems.items()])
 
 
 def shown_clearance(toes: float) -> float:

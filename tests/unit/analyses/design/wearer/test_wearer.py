@@ -211,13 +211,29 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
     assert float(shown[-2]) == pytest.approx(found[0].flow * 1000.0 / 1.82 * 60.0, rel=0.02)
 
 
-@pytest.mark.parametrize("mass", [35.0, 95.0])
-def test_a_stature_that_no_adult_has_is_asked_for_and_not_clamped(mass: float) -> None:
+@pytest.mark.parametrize(("mass", "stature"), [(35.0, "1.4 m"), (95.0, "1.85 m")])
+def test_a_stature_that_no_adult_has_is_asked_for_and_not_clamped(mass: float, stature: str) -> None:
     with pytest.raises(ppafo.StudyError) as caught:
-        ppafo.design(mass=mass, torque=2.5, pressure=4.5e5, minutes=1.0)
+        ppafo.design(mass=mass, torque=2.5, pressure="3 bar_g", minutes=1.0)
     assert str(caught.value) == (
-        f"mass: {mass:g} kg: give stature too; it is derived from body mass only for 46.3 to 88 kg"
+        "a design for a wearer also needs stature (derived from body mass only for 46.3 to 88 kg), for example "
+        f"ppafo.design(mass='{mass:g} kg', stature='{stature}', torque='2.5 N m', pressure='3 bar_g', minutes='1')"
     )
+
+
+def test_one_refusal_names_all_that_a_child_needs_and_its_command_is_complete(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["design", "--mass", "35 kg", "--toes", "4 mm"]) == 2
+    said = capsys.readouterr().err
+    assert "needs --stature (derived from body mass only for 46.3 to 88 kg), --torque, --pressure, --minutes, " in said
+    seen: list[DesignRequirements] = []
+    monkeypatch.setattr(solving, "check_requirements", seen.append)
+    monkeypatch.setattr(solving, "shelf_of", lambda _: load_catalogue("none"))
+    assert main(shlex.split(said.partition("for example ppafo ")[2])) == 2
+    assert [(each.mass, each.stature, each.torque, each.seconds, each.toes) for each in seen] == [
+        (35.0, 1.4, 2.5, 300.0, 0.004)
+    ]
 
 
 @pytest.mark.long
@@ -233,7 +249,7 @@ def test_a_stature_that_no_adult_has_is_asked_for_and_not_clamped(mass: float) -
 )
 def test_a_device_for_a_child_is_found_once_the_stature_that_is_asked_for_is_given(mass: float, stature: float) -> None:
     wanted = {"mass": mass, "torque": 1.0, "pressure": 4.5e5, "minutes": 0.5}
-    with pytest.raises(StudyError, match="give stature too"):
+    with pytest.raises(StudyError, match="also needs stature"):
         ppafo.design(**wanted)
     finding = ppafo.design(**wanted, stature=stature)
     assert isinstance(finding.found, WearerSizing)
