@@ -70,8 +70,8 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     if names[at].lower() not in _TIMES:
         raise DataError(
             f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; a mean stride "
-            "over percent of the stride cannot be read: give at least two strides over time, with shank and ankle angle; "
-            f"loads also need {setting_text('body_mass')}"
+            "over percent of the stride cannot be read: give at least two strides over time, with shank and ankle "
+            f"angle; loads also need {setting_text('body_mass')}"
         )
     if "" in names[at:]:
         raise DataError(f"{path}: a column has no name; name every column")
