@@ -14,7 +14,7 @@ from ppafo.control.profiles import KNOTS
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import beside
-from ppafo.errors import DataError, StudyError, UnitError, refused_as
+from ppafo.errors import DataError, PpafoError, StudyError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.loading import reloaded
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
@@ -287,15 +287,24 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     catalogue = load_catalogue(beside(document.catalogue, folder))
     profile = read_profile(document.profile, folder, file)
     scenario = _scenario(document, profile, folder, file)
-    parts = document.parts
-    valves = tuple(catalogue.part("valves", name) for name in dict.fromkeys(parts.valves))
+    parts, wrong = document.parts, list[PpafoError]()
+    # A part that is named twice is one choice, but two regulators that are carried.
+    named = {"valves": tuple(dict.fromkeys(parts.valves)), "bottles": tuple(dict.fromkeys(parts.bottles))}
+    named |= {"regulators": parts.regulators, "actuators": () if parts.actuator is None else (parts.actuator,)}
+    chosen: dict[str, list[Part]] = {group: [] for group in named}
+    for group, name in [(group, name) for group, names in named.items() for name in names]:
+        with noted_in(wrong):
+            chosen[group].append(catalogue.part(group, name))
     kind = scenario.device.valve.kind
-    for valve in valves:
-        if valve.kind != kind:
-            raise StudyError(
-                f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{scenario.name}' "
-                f"needs a {kind} valve"
-            )
+    wrong += [
+        StudyError(
+            f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{scenario.name}' "
+            f"needs a {kind} valve"
+        )
+        for valve in chosen["valves"]
+        if valve.kind != kind
+    ]
+    raise_noted(wrong)
     # The settings that multiply a torque error.
     quantities = CONTROLLERS[scenario.controller.kind].quantities
     gains = tuple(f"controller.{quantity.name}" for quantity in quantities if "(N m" in quantity.unit)
@@ -331,10 +340,10 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
         repetitions=float(use.repetitions) if use.repetitions else hours / profile.period,
         reserve=use.reserve,
         largest_error=largest_error,
-        valves=valves,
-        bottles=tuple(catalogue.part("bottles", name) for name in dict.fromkeys(parts.bottles)),
-        actuator=None if parts.actuator is None else catalogue.part("actuators", parts.actuator),
-        regulators=tuple(catalogue.part("regulators", name) for name in parts.regulators),
+        valves=tuple(chosen["valves"]),
+        bottles=tuple(chosen["bottles"]),
+        actuator=next(iter(chosen["actuators"]), None),
+        regulators=tuple(chosen["regulators"]),
         lowest_pressure=lowest,
         highest_pressure=highest,
         gains=gains,

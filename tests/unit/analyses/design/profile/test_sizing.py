@@ -286,6 +286,21 @@ def test_every_mistake_in_a_file_is_one_line(tmp_path: Path, before: str, after:
     assert "\n" not in str(caught.value)
 
 
+def test_every_part_that_the_catalogue_lacks_is_in_one_refusal_and_a_regulator_counts_as_often_as_it_is_named(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "lacking.toml").write_text(
+        FILE.replace("enfield-ls-v05s", "no-valve").replace("co2-3_5oz", "no-bottle")
+    )
+    with pytest.raises(PpafoError) as caught:
+        load_design(tmp_path / "lacking.toml")
+    assert [re.search(r"no part '(.*?)'", part)[1] for part in caught.value.parts] == ["no-valve", "no-bottle"]  # type: ignore[index]
+    twice = FILE.replace("bottles =", 'regulators = ["festo-lrma-qs-4", "festo-lrma-qs-4"]\nbottles =')
+    (tmp_path / "twice.toml").write_text(twice)
+    carried = load_design(tmp_path / "twice.toml").carried
+    assert [part.name for part in carried] == ["festo-lrma-qs-4", "festo-lrma-qs-4", "smc-crb2bw40-90d"]
+
+
 def test_runs_that_all_fail_are_said_in_one_line(folder: Path) -> None:
     late = FILE.replace(
         "simulated = 1", 'simulated = 1\noverrides = ["actuator.dead_volume_1=1e-6 mm^3", "motion.angle=20 deg"]'
