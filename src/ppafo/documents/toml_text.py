@@ -82,7 +82,9 @@ class TomlKind:
         try:
             text = decoded(content)
         except UnicodeDecodeError as error:
-            raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start}){self._remedy(file)}") from error
+            raise self.error(
+                f"{file}: is not a text file in UTF-8 (byte {error.start} is invalid){self._remedy(file)}"
+            ) from error
         if not text.strip():
             raise self.error(f"{file}: is empty; 'ppafo doctor --schema {self.schema}' prints its format")
         # Before the parser, whose time grows with the square of the dots.

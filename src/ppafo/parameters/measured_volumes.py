@@ -76,7 +76,7 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
     try:
         text = decoded(read_regular_file(path, MAXIMUM_BYTES_TYPED))
     except UnicodeDecodeError as error:
-        raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
+        raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start} is invalid)") from error
     except (OSError, ValueError) as error:
         raise ParameterError(f"{file}: cannot be read: {reason(error)}") from error
     columns, digits = _columns(text, file)

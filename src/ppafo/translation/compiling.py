@@ -70,10 +70,7 @@ def asked(
                     return subprocess.CompletedProcess(line, process.returncode, said, complained)
                 interrupts.check()
                 if time.monotonic() > end:
-                    raise CompilerError(
-                        f"{Path(line[0]).name} did not finish within {seconds:g} s and was stopped; try again when the "
-                        "computer is less busy"
-                    )
+                    raise CompilerError(f"{Path(line[0]).name} did not finish within {seconds:g} s and was stopped")
         finally:
             # Ended by an interrupt or its time, the driver's children would go on.
             if process.poll() is None or process.returncode < 0:
