@@ -211,5 +211,5 @@ def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool)
                 fontsize=font_size(8.5),
             )
 
-    legend = "inside" if is_first else ""
+    legend = "above" if is_first else ""
     return Panel(_STRIDE, _PANELS[name], marks, legend=legend, then=name_events, shares_x=True)

@@ -346,6 +346,11 @@ def test_every_curve_has_a_panel_with_its_events() -> None:
     assert {text.get_text() for text in top.texts} == {"heel strike", "toe-off"}
     assert np.degrees(gait.shank_angle.values_at([0.25]))[0] == pytest.approx(top.lines[-1].get_ydata()[25])
     assert [text.get_text() for text in figure.texts] == ["falisse2019-subject1: 62 kg, 1.33 m/s, stride 1.04 s"]
+    narrow = gait_finding(gait).plot(width="84 mm")
+    narrow.canvas.draw()
+    legend = narrow.axes[0].get_legend()
+    assert legend is not None
+    assert legend.get_window_extent().y0 >= narrow.axes[0].get_window_extent().y1, "above the curves"
 
 
 def test_the_ankle_angle_is_drawn_from_neutral_with_dorsiflexion_positive(imported: ImportedGait) -> None:

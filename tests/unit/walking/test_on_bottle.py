@@ -15,6 +15,7 @@ from ppafo.parameters.overrides import over
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.bottle import coupling
 from ppafo.walking.bottle.coupling import Schedule
+from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import WalkResult
@@ -36,6 +37,16 @@ def test_mass_and_energy_close(small: WalkResult) -> None:
     assert balance.left_bottle == pytest.approx(balance.regulated, rel=1e-12)
     assert balance.regulated > 4.0e-3
     assert balance.given_up + balance.ice + balance.room == pytest.approx(balance.delivered, rel=1e-12)
+
+
+def test_the_band_of_the_line_is_narrow_beside_the_pressure_of_the_regulator(small: WalkResult) -> None:
+    behind = bottle_figure(small).axes[0]
+    (band,) = behind.collections
+    heights = band.get_paths()[0].vertices[:, 1]
+    lowest, highest = behind.get_ylim()
+    assert lowest == 0.0
+    # Within a stride the line loses a few of its 50 psi.
+    assert np.ptp(heights) < 0.2 * (highest - lowest)
 
 
 def test_a_bottle_of_a_gram_ends_empty_and_its_gas_stays_what_a_gas_can_be() -> None:

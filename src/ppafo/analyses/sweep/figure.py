@@ -58,7 +58,9 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
     with_values = [
         metric for metric in all_metrics if any(described[metric]["count"] for described in results.metrics.values())
     ]
-    metrics = (with_values or all_metrics)[:MOST_METRICS]
+    differing = _differing(results, with_values) or with_values[:1] or all_metrics
+    constant = ", ".join(metric for metric in with_values if metric not in differing)
+    metrics = differing[:MOST_METRICS]
     # No more configurations than distinguishable colours.
     names = results.configurations[:MOST_CONFIGURATIONS]
     # The value of a seed has no meaning.
@@ -66,12 +68,10 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
     grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED]
     # Over two paths each configuration has a panel of each metric, a map or points; else all share one panel.
     is_mapped = 2 in (len(grid), len(varied))
-    if is_mapped:
-        metrics = _differing(results, metrics) or metrics[:1]
-        # A map of the verdict, if some runs follow their reference and others do not.
-        if "not_following" in results.summary:
-            verdicts = np.concatenate(list(results.thin(FOLLOWS, MAXIMUM_DRAWN).values()))
-            metrics += [FOLLOWS] if {0.0, 1.0} <= set(verdicts.tolist()) else []
+    # A map of the verdict, if some runs follow their reference and others do not.
+    if is_mapped and "not_following" in results.summary:
+        verdicts = np.concatenate(list(results.thin(FOLLOWS, MAXIMUM_DRAWN).values()))
+        metrics += [FOLLOWS] if {0.0, 1.0} <= set(verdicts.tolist()) else []
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not is_mapped and len(varied) > 1:
         labels = [label_of(path) for path in varied[:_NAMED]]
@@ -87,7 +87,7 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
         remarks=remarks,
         panels=partial(_panels, results, metrics, names, varied, grid),
         name=FIGURE,
-        caption=_CAPTION,
+        caption=_CAPTION + (f" Not drawn, because without a difference in the runs: {constant}." if constant else ""),
         across=len(names) if is_compared else min(_COLUMNS, max(1, count)),
         size=_COMPARED_PANEL if is_compared else _PANEL,
         title=title,
@@ -142,15 +142,25 @@ def _histogram(results: StudyResults, metric: str) -> Panel:
     if filled:
         low, high = min(float(values.min()) for values in filled), max(float(values.max()) for values in filled)
         are_whole = all(bool(np.all(values == np.round(values))) for values in filled)
-        if are_whole and high - low < _HISTOGRAM_BINS:
+        if high == low:
+            # One bar about the only value.
+            edges = low + (abs(low) or 1.0) * np.array([-0.05, 0.05])
+        elif are_whole and high - low < _HISTOGRAM_BINS:
             # A bin for each whole number where values are counts of few kinds: others would be empty now and then.
             edges = np.arange(low - 0.5, high + 1.0)
         else:
             bins = min(_HISTOGRAM_BINS, max(8, round(sum(values.size for values in filled) ** 0.5)))
-            edges = np.linspace(low, high or low + 1.0, 1 + bins)
+            edges = np.linspace(low, high, 1 + bins)
         for (name, values), colour in zip(values_by_name.items(), COLOURS, strict=False):
             marks.append(Mark("bars", edges, np.histogram(values, edges)[0], label=name, colour=colour))
-    return Panel(metric_kind(results, metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
+    kind = metric_kind(results, metric)
+
+    def set_ticks(axes: "Axes") -> None:
+        axes.set_yticks([])
+        if filled and high == low:
+            axes.set_xticks(kind.values(np.array([low])))
+
+    return Panel(kind, Kind(), marks, then=set_ticks)
 
 
 def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -> Panel:

@@ -86,6 +86,7 @@ def search_panels(
     costs_of_starts.append(Mark("level", y=before.objective, label="before", colour=BLACK, style=thin))
 
     def scale(axes: "Axes") -> None:
+        axes.xaxis.get_major_locator().set_params(integer=True)
         # Below a decade a logarithmic axis has no tick that reads as a number.
         if axes.dataLim.ymax > _DECADE * axes.dataLim.ymin > 0.0:
             axes.set_yscale("log")
@@ -114,7 +115,7 @@ def search_panels(
         axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])
 
     return [
-        Panel(Kind("Generation"), Kind(), costs_of_starts, "Objective, best so far", then=scale),
+        Panel(Kind("Generation"), Kind(), costs_of_starts, "Objective, best so far", legend="inside", then=scale),
         Panel(Kind("Between bounds"), Kind(), marks, then=name_gains),
     ]
 

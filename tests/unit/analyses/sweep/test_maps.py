@@ -20,3 +20,29 @@ def test_a_map_is_drawn_of_what_differs_and_of_whether_the_run_follows() -> None
     drawn = [axes.get_ylabel().replace("\n", " ") for axes in finding.plot().axes if axes.get_label() == "<colorbar>"]
     assert set(finding.found.table(["follows"])["follows"]) == {0.0, 1.0}
     assert drawn == ["RMS error (N m)", "Follows its reference; 1: yes, 0: no"]
+
+
+def test_a_metric_that_all_runs_share_is_named_and_not_drawn_unless_it_is_the_only_one() -> None:
+    def swept(name: str, *metrics: str) -> tuple[list[tuple[str, float, float]], str]:
+        vary = [
+            {"path": path, "kind": "uniform", "minimum": f"{low} {unit}", "maximum": f"{high} {unit}"}
+            for path, low, high, unit in (
+                ("supply.pressure", 45, 55, "psi_g"),
+                ("valve.area", 8, 12, "mm^2"),
+                ("actuator.leak.area", 0.1, 0.2, "mm^2"),
+            )
+        ]
+        configurations = [{"name": "task", "scenario": "torque-task-proportional", "overrides": ["run.duration=0.2 s"]}]
+        parts = {"configurations": configurations, "vary": vary, "outputs": {"metrics": list(metrics)}}
+        finding = ppafo.sweep({"schema_version": 1, "name": name, "sample": {"method": "random", "runs": 8}, **parts})
+        axes = finding.plot(width="84 mm").axes
+        return [(each.get_xlabel(), *each.get_xlim()) for each in axes], finding.figures["figure"].caption
+
+    # The vane is locked, so that its angle has no range.
+    drawn, caption = swept("three", "angle_range", "gas_imbalance", "peak_torque")
+    assert [name for name, _, _ in drawn] == ["Peak torque (N m)"]
+    assert caption.endswith("Not drawn, because without a difference in the runs: angle_range, gas_imbalance.")
+    ((name, low, high),), caption = swept("one", "angle_range")
+    assert name == "Angle range (deg)"
+    assert -5.0 < low < 0.0 < high < 5.0
+    assert "Not drawn" not in caption

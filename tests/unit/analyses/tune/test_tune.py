@@ -54,7 +54,15 @@ def test_gains_are_found_that_are_better_and_can_be_pasted() -> None:
     assert tuning.before.result.metrics["rms_error"].value == pytest.approx(tuning.before.values["rms_error"], rel=1e-9)
     assert tuning.bounds_reached["controller.proportional_gain"] == "maximum"  # no delay: any gain is taken
     assert tune(DOCUMENT).found.lines == tuning.lines
-    _, places = finding.plot("search").axes
+    figure = finding.plot("search", width="84 mm")
+    figure.canvas.draw()
+    costs, places = figure.axes
+    legend, locator = costs.get_legend(), costs.xaxis.get_major_locator()
+    assert legend is not None
+    assert legend.get_window_extent().x1 <= figure.bbox.x1
+    # Four steps from 0 to 10 would be of 2.5 generations.
+    locator.set_params(nbins=4)
+    assert all(tick == round(tick) for tick in locator.tick_values(0.0, 10.0))
     assert [label.get_text() for label in places.get_yticklabels()] == ["Proportional gain", "Integral gain"]
 
 
