@@ -15,7 +15,7 @@ from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import over, read_overrides
-from ppafo.plugins import Plugins, name_plugins
+from ppafo.plugins import Plugins, name_plugins, plugin_words
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
 from ppafo.simulation.document import ScenarioRequest, kind_at
@@ -152,7 +152,8 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
 def usage_text(scenario: Scenario) -> str:
     """Return the command that runs a scenario with its overrides, and the equivalent tables of a file."""
     origin, command = scenario.origin, scenario.motion.motion_kind.command
-    words = [word for override in origin.overrides for word in ("--set", override)]
+    words = plugin_words(str(origin.content))
+    words += [word for override in origin.overrides for word in ("--set", override)]
     name = origin.file or scenario.name
     return "\n".join((shlex.join(("ppafo", command, name, *words)), "", _IN_FILE, *_changed_tables(scenario)))
 

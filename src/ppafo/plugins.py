@@ -157,6 +157,13 @@ def nearest_kind(name: str, allowed: Iterable[str], kind_type: type = object) ->
     return nearest_name(name, words)
 
 
+def plugin_words(text: str) -> list[str]:
+    """Return the words ``--plugin FILE`` of the plug-ins whose objects a text names."""
+    named = {plugin.module for plugin in named_plugins()}
+    modules = dict.fromkeys(module for module in _OBJECT_IN_TEXT.findall(text) if module in named)
+    return [word for module in modules for word in ("--plugin", _remedy(module))]
+
+
 def _remedy(module: str) -> str:
     """Return the argument that allows a module: its path if in the working folder."""
     file = Path(*module.split(".")).with_suffix(_SUFFIX)

@@ -153,9 +153,11 @@ def check_moment_time(walk: MeanStride) -> None:
     if at < fraction and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
         return
     where = "" if at >= fraction else f" and is {swing:.2g} N m/kg in swing"
+    # Without a force the toe-off is only as good as the angle of the shank.
+    force = "" if "vertical_force" in walk.curves else "; toe-off follows from the shank angle: give a vertical force"
     raise DataError(
         f"{column} peaks at {100.0 * at:.0f} % of the stride{where}, but the foot is off the ground "
-        f"from {100.0 * fraction:.0f} % on; {_OTHER_TIME[walk.signs_from]}"
+        f"from {100.0 * fraction:.0f} % on; {_OTHER_TIME[walk.signs_from]}{force}"
     )
 
 

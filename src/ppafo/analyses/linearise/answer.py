@@ -34,6 +34,8 @@ DURATION, INTERVAL = 1.0, 1.0e-3
 """Duration of a run after a step of the command, and sample time of its output [s]."""
 SHARES = tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
 """Step heights of the command divided by the steady command [-]: three decades."""
+_FULL = 0.99
+"""Gauge pressure of a chamber divided by that of its supply, above which the chamber counts as full [-]."""
 _LARGEST_COMMAND = 0.7
 """Steady command [-] above which the largest step comes too close to full opening, which is 1."""
 
@@ -162,6 +164,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     )
     omitted = ", ".join(f"{name} {1.0e3 * delay:g} ms" for name, delay in delays if delay > 0.0)
     sentences.append(f"not in the model: {omitted}, noise, resolution and bandwidth of sensors")
+    sentences += _limit_sentences(model)
     remarks = []
     for edge in model.edges:
         side, other = ("above", "below") if edge.is_above else ("below", "above")
@@ -199,6 +202,20 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         files={"linearise.npz": partial(_arrays, model)},
         overrides=changes_in(model.scenario),
     )
+
+
+def _limit_sentences(model: LinearModel) -> list[str]:
+    """Return a sentence for each chamber that is so near to its supply pressure that hardly any flow is left."""
+    supply, values = model.scenario.device.supply, {each.name: each.value for each in (*model.states, *model.outputs)}
+    zero, sentences = float(supply.atmospheric_pressure), list[str]()
+    for name, highest in (("pressure_1", supply.pressure), ("pressure_2", supply.dorsiflexion_pressure)):
+        share = (values.get(name, zero) - zero) / (float(highest) - zero) if highest > zero else 0.0
+        if share > _FULL:
+            sentences.append(
+                f"{name} is {100.0 * share:.4g} % of its supply pressure, at the limit of the actuator: hardly any "
+                "flow into the chamber is left, and gains and margins hold for very small changes only"
+            )
+    return sentences
 
 
 def _point(model: LinearModel) -> Section:

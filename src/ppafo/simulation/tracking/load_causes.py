@@ -15,7 +15,15 @@ from ppafo.simulation.numbers import number_at
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
-from ppafo.simulation.tracking.remedies import Remedy, change_text, level_text, remedy, stiffer_laws, torque_asked
+from ppafo.simulation.tracking.remedies import (
+    Remedy,
+    change_text,
+    level_text,
+    remedy,
+    stiffened,
+    stiffer_laws,
+    torque_asked,
+)
 from ppafo.simulation.tracking.rule import FEWEST_PERIODS, LARGEST_SHARE
 
 _MARGINS = (1.05, 1.5)
@@ -170,19 +178,33 @@ def torque_at_its_limit(case: Case) -> TrackingCause | None:
     angle, torque, own = case.recording["angle"][samples], case.recording["torque"][samples], static_torque(device)
     places = np.unique(np.linspace(0, angle.size - 1, _ANGLES).astype(np.intp))
     reaches = np.array([torque_reach(device, float(angle[place]), own) for place in places])
-    shares = torque[places, None] / reaches
-    share, place = float(np.mean(shares.max(axis=1) > _NEARLY_ALL)), int(np.argmax(shares.max(axis=1)))
+    # An actuator that pushes one way only has a reach in one direction only: below 0 downwards, above 0 upwards.
+    acts = reaches * np.array([-1.0, 1.0]) > 0.0
+    shares = np.divide(torque[places, None], reaches, out=np.zeros_like(reaches), where=acts)
+    share = float(np.mean(shares.max(axis=1) > _NEARLY_ALL))
     if share <= _OFTEN:
         return None
-    upwards = bool(shares[place, 1] > shares[place, 0])
-    supply, given = supply_that_moves(device, upwards), float(reaches[place, int(upwards)])
+    found = [(upwards, int(np.argmax(shares[:, int(upwards)]))) for upwards in (False, True)]
+    limited = [(upwards, place) for upwards, place in found if shares[place, int(upwards)] > _NEARLY_ALL]
+    ends = [
+        (supply_that_moves(device, up), float(angle[places[at]]), float(reaches[at, int(up)])) for up, at in limited
+    ]
+    (supply, where, given), *_ = ends
     text = (
         f"for {100.0 * share:.0f} % of the time the actuator gives all the torque that it can, such as "
-        f"{level_text('N m', given)} at {level_text('rad', float(angle[places[place]]))} and "
+        f"{level_text('N m', given)} at {level_text('rad', where)} and "
         f"{level_text('Pa', number_at(scenario, supply))}"
     )
-    needed = [supply_for(device, float(angle[places[place]]), factor * given) for factor in _MORE_TORQUE]
-    remedies = [remedy(scenario, {supply: pressure}) for pressure in needed if pressure is not None]
+    trials = [{path: supply_for(device, at, factor * reach) for path, at, reach in ends} for factor in _MORE_TORQUE]
+    pressures = [
+        {path: pressure for path, pressure in each.items() if pressure is not None}
+        for each in trials
+        if None not in each.values()
+    ]
+    # A load that is near the limit of the actuator often is too much for the stiffness of the law, too.
+    stiffer = [dict(each.numbers) for each in stiffened(scenario, (2.0, 4.0))]
+    both = [{**pressure, **numbers} for pressure in pressures[-2:] for numbers in stiffer]
+    remedies = [remedy(scenario, numbers) for numbers in (*pressures, *both)]
     return TrackingCause(text, tuple(remedies), f"increase `{supply}`", is_beyond_reach=True)
 
 

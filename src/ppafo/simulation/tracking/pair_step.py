@@ -74,13 +74,10 @@ def unlimited_switching(result: "RecordedResult") -> str:
         return (
             f"{reversals}, but `valve.{slowest}` lets them open and shut fully at most "
             f"{without_exponent(allowed, '.3g')} times a second: they remain partly open, which on/off control does "
-            "not expect; use a lower `controller.rate`, a wider dead zone or a faster valve"
+            "not expect; use a wider dead zone or a faster valve"
         )
     missing = ", ".join(f"`valve.{name}`" for name in names)
-    return (
-        f"{reversals}, and no value of the parameter set limits this rate ({missing} are 0): give these values, or a "
-        "lower `controller.rate`"
-    )
+    return f"{reversals}, and no value of the parameter set limits this rate ({missing} are 0): give these values"
 
 
 def warn_of_coarse_pairs(scenarios: Iterable[Scenario]) -> None:

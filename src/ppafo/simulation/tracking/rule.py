@@ -84,7 +84,7 @@ class SettledPart(NamedTuple):
     rests. ``start`` [s] is the start of the settled part, 0 for a walk. ``worst`` is the largest error and ``span`` the
     range of the error. ``way`` is the range of initial value and reference for an angle, 0 for other quantities.
     ``reversals`` [1/s] is the rate of command reversals in the last half of the part; ``wave`` the standard deviation
-    of the reference, and ``periods`` its number of periods in the part, infinite without a period. ``is_smooth`` is
+    of the reference, and ``periods`` the number of periods of a sine in the part, else infinite. ``is_smooth`` is
     true for a reference without steps and corners.
     """
 
@@ -144,12 +144,12 @@ def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: flo
 
 
 def settled_periods(scenario: Scenario) -> Any:
-    """Periods of the reference in the second half of a run [-], inf without a period; an array (runs,) if it varies."""
-    settings = scenario.reference.settings
-    half = 0.5 * np.asarray(scenario.run.duration)
-    if "frequency" in settings:
-        return half * settings["frequency"]
-    return half / settings["period"] if "period" in settings else math.inf
+    """Periods of a sine in the second half of a run [-], inf for another reference; an array (runs,) if it varies.
+
+    A table may have a part of its period alone on purpose, such as the swing of a stride.
+    """
+    frequency = scenario.reference.settings.get("frequency")
+    return math.inf if frequency is None else 0.5 * np.asarray(scenario.run.duration) * frequency
 
 
 def is_pair(scenario: Scenario) -> bool:

@@ -11,6 +11,7 @@ from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE, SPECIES_PATH
 from ppafo.parameters.parts import Part
 from ppafo.units.shown import written_text
+from ppafo.walking.contradictions import COMPRESSION
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import walk
@@ -27,6 +28,8 @@ _EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.
 """Overrides for an earlier foot lift from toe-off, used if toes do not clear the ground with the walk's own lift."""
 _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 """Catalogue figures of an actuator that a walk adopts."""
+_SENSOR_RANGE, _SENSOR_MARGIN = 2.0e6, 1.1
+"""Default range of the chamber pressure sensors [Pa absolute], and range of larger ones over the highest pressure."""
 _PROPORTIONAL = "proportional"
 """Valve type that a torque controller needs; solenoid valves only limit the torque."""
 SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
@@ -93,6 +96,9 @@ def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: P
     """Return the overrides common to all walks with a pair: wearer, supply, figures of the parts, shut-off valve."""
     dorsiflexion = STANDARD_ATMOSPHERE + _DORSIFLEXION * (requirements.pressure - STANDARD_ATMOSPHERE)
     units = {quantity.name: quantity.unit for quantity in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
+    # A foot that moves compresses the gas above the range that sensors have by default.
+    compressed = _SENSOR_MARGIN * COMPRESSION * requirements.pressure
+    sensor = (f"controller.highest_pressure={written_text(compressed, 'Pa_a')}",) if compressed > _SENSOR_RANGE else ()
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     return (
         *of_wearer(requirements),
@@ -101,4 +107,5 @@ def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: P
         f"supply.dorsiflexion_pressure={written_text(dorsiflexion, 'Pa_a')}",
         *(f"{path}={written_text(number, units[path.partition('.')[2]])}" for path, number in numbers.items()),
         f"shut_off.area={written_text(SHUT_OFF_PARTS['area'], 'm^2')}",
+        *sensor,
     )
