@@ -45,15 +45,9 @@ def check_sources(
                 zero = ' (at atmospheric pressure: { constant = "0 kPa_g" })' if known.unit == "Pa" else ""
                 derived = ', or derive it: direction.of = "pressure_difference", with a threshold and a window'
                 raise IdentificationError(
-<<<<<<< HEAD
                     f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; the "
                     f"file has {', '.join(recording.names) or 'only time'}; a column map can assign a column to "
-                    f"'{name}'{derived if name == 'direction' else ''}"
-=======
-                    f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
-                    f"the file has {', '.join(recording.names) or 'only time'}; a column map can assign it{zero}"
-                    f"{derived if name == 'direction' else ''}"
->>>>>>> round
+                    f"'{name}'{zero}{derived if name == 'direction' else ''}"
                 )
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
             worst = int(np.argmax(np.abs(values)))
