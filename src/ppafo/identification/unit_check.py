@@ -4,6 +4,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.estimate import WRONG_UNIT, Estimate
@@ -56,7 +58,11 @@ def with_wrong_units(
         names = [name for name, channel in channels.items() if channel.unit.removesuffix("_d") == si_unit]
         acted_on = dependent.get(si_unit, set())
         mistakes = misread_units(si_unit, [channels[name].stated for name in names]) if far <= acted_on else []
+        swings = [float(np.ptp(recording[name])) for recording in recordings for name in names if name in recording]
         for mistake, factor in mistakes:
+            # No joint turns round: an angle that would be off by this factor was no angle of one.
+            if si_unit == "rad" and max(swings) / factor > math.tau:
+                continue
             size = abs(math.log(factor))
             distance = max(abs(ratios[path] - size) for path in acted_on & ratios.keys())
             if distance < nearest:

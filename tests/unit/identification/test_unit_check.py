@@ -182,3 +182,11 @@ def test_a_free_decay_in_a_wrong_unit_of_time_is_refused(scale: float, step: str
     decay = RecordingSource(Recording("decay", scale * time, {"angle": Channel(swing, "rad")}))
     with pytest.raises(IdentificationError, match=f"the samples are {step} apart; is the unit of time {unit}"):
         solved(tmp_path, decay, 'kind = "free-decay"\ninertia = "8 g m^2"\n', {})
+
+
+@pytest.mark.parametrize(("largest", "is_wrong"), [(0.01, True), (0.5, False)])
+def test_an_angle_that_would_turn_round_in_the_other_unit_has_its_own(largest: float, is_wrong: bool) -> None:
+    swing = Channel(np.array([largest, -0.4 * largest, 0.0]), "rad", stated="deg")
+    angle = Recording("r", np.arange(3.0), {"angle": swing})
+    judged = with_wrong_units(values(friction=1.0 / 55.0), {"friction": 1.0}, [angle])
+    assert (judged[0].verdict == "unit probably wrong") == is_wrong

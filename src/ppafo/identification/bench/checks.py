@@ -1,6 +1,6 @@
 """Checks that recordings suit a bench procedure; messages name the file and a remedy."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -25,7 +25,7 @@ _LARGEST_NUMBER = 1.0e12
 def check_sources(
     sources: tuple[RecordingSource, ...],
     procedure: str,
-    channels: Iterable[str],
+    channels: Sequence[str],
     fewest: int,
     moving: Iterable[str] = (),
     absolute: Iterable[str] = (),
@@ -40,11 +40,13 @@ def check_sources(
         recording = source.recording
         for name in channels:
             if name not in recording:
-                known, hint = CHANNELS[name], nearest_name(name, recording.names)
+                known = CHANNELS[name]
+                hint = nearest_name(name, [other for other in recording.names if other not in channels])
+                zero = ' (at atmospheric pressure: { constant = "0 kPa_g" })' if known.unit == "Pa" else ""
                 derived = ', or derive it: direction.of = "pressure_difference", with a threshold and a window'
                 raise IdentificationError(
                     f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
-                    f"the file has {', '.join(recording.names) or 'only time'}; a column map can assign it"
+                    f"the file has {', '.join(recording.names) or 'only time'}; a column map can assign it{zero}"
                     f"{derived if name == 'direction' else ''}"
                 )
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):

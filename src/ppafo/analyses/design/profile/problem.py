@@ -294,7 +294,9 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     chosen: dict[str, list[Part]] = {group: [] for group in named}
     for group, name in [(group, name) for group, names in named.items() for name in names]:
         with noted_in(wrong):
-            chosen[group].append(catalogue.part(group, name))
+            # A catalogue that lacks a group is completed by that of the package.
+            source = catalogue if catalogue.groups[group] else load_catalogue()
+            chosen[group].append(source.part(group, name))
     kind = scenario.device.valve.kind
     wrong += [
         StudyError(

@@ -30,6 +30,9 @@ from ppafo.simulation.simulate import simulate
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.coupling import Schedule
 
+_LONG_PERIOD = 5.0
+"""Period of a controller that is named among the delays of a loop that does not follow [ms]."""
+
 
 def size_for_profile(problem: SizingProblem, threads: int | None = None, report: Report = report_nothing) -> Sizing:
     """Return the lowest pressure and smallest bottle of each valve for a torque profile.
@@ -123,10 +126,15 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
             for name, part in valve.figures.items()
             if name in LAGS
         ]
-        slowed = f"; the valve has {', '.join(lags)}" if lags else ""
+        period = 1.0e3 * problem.scenario.controller.period
+        slow = [f"the valve has {', '.join(lags)}"] if lags else []
+        slow += [f"the controller decides every {period:.3g} ms (controller.rate)"] if period > _LONG_PERIOD else []
+        slowed = f"; {' and '.join(slow)}" if slow else ""
+        found = (
+            "no gains were found with which the torque loop follows" if problem.gains else "the loop does not follow"
+        )
         remarks.append(
-            f"no gains were found with which the torque loop follows: RMS error {TORQUE.text(error)} at best, limit "
-            f"{TORQUE.text(problem.largest_error)}{slowed}"
+            f"{found}: RMS error {TORQUE.text(error)} at best, limit {TORQUE.text(problem.largest_error)}{slowed}"
         )
     return SizedValve(
         valve=valve,

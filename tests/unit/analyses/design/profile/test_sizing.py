@@ -147,25 +147,38 @@ def with_small_valve(folder: Path, name: str, figure: str, value: float, unit: s
     return folder / f"{name}.toml"
 
 
-def test_a_slow_valve_that_follows_by_hand_is_found_with_gains_of_another_size(folder: Path) -> None:
-    file = with_small_valve(folder, "slewing", "slew_limit", 100.0, "1/s")
+def error_by_hand(*overrides: str) -> float:
+    """RMS error [N m] of the trapezium of FILE, followed by the proportional valve with 12 mm^2."""
     times = [f"reference.time_0{row}={time} s" for row, time in ((2, 0.3), (3, 0.6), (4, 0.8))]
     torques = [f"reference.value_0{row}={torque} N m" for row, torque in ((1, 0), (2, 4), (3, 4), (4, 0))]
-    by_hand = simulate(
-        "torque-task-proportional",
-        [
-            *("reference.kind=tabulated", "reference.level=0 N m", "reference.period=1 s", *times, *torques),
-            *("run.duration=1 s", "valve.area=12 mm^2", "valve.slew_limit=100 1/s"),
-            *("supply.pressure=45 psi_g", "supply.dorsiflexion_pressure=45 psi_g"),
-            *("controller.proportional_gain=2 1/(N m)", "controller.integral_gain=0 1/(N m s)"),
-        ],
-    )
-    assert by_hand.metrics["rms_error"].value < 0.2
-    item = design(file).found.valves[0]
+    profile = ("reference.kind=tabulated", "reference.level=0 N m", "reference.period=1 s", *times, *torques)
+    run = simulate("torque-task-proportional", [*profile, "run.duration=1 s", "valve.area=12 mm^2", *overrides])
+    return run.metrics["rms_error"].value
+
+
+def at_pressure(pressure: str) -> tuple[str, str]:
+    return f"supply.pressure={pressure}", f"supply.dorsiflexion_pressure={pressure}"
+
+
+def test_a_slow_valve_that_follows_by_hand_is_found_with_gains_of_another_size(folder: Path) -> None:
+    gains = "controller.proportional_gain=2 1/(N m)", "controller.integral_gain=0 1/(N m s)"
+    assert error_by_hand("valve.slew_limit=100 1/s", *at_pressure("45 psi_g"), *gains) < 0.2
+    item = design(with_small_valve(folder, "slewing", "slew_limit", 100.0, "1/s")).found.valves[0]
     assert (item.works, item.limit) == (True, "torque")
     assert item.pressure < ATMOSPHERE + 45.0 * 6894.757
     assert item.margins is not None
     assert item.margins.flow > 0.0
+
+
+def test_smaller_gains_are_tried_where_a_valve_follows_with_none_of_the_file_s(folder: Path) -> None:
+    file = with_small_valve(folder, "quick-gains", "delay", 20.0, "ms")
+    file.write_text(file.read_text().replace("[1.0, 4.0]", "[0.0, 1000.0]"))
+    item = design(file).found.valves[0]
+    assert (item.works, item.limit) == (True, "torque")
+    gains = [f"{path}={gain!r} SI" for path, gain in item.gains.items()]
+    actuator = "actuator.torque_constant=14.51 cm^3", "actuator.displacement_per_radian=14.51 cm^3/rad"
+    found = error_by_hand("valve.delay=20 ms", *at_pressure(f"{item.pressure!r} Pa_a"), *gains, *actuator)
+    assert item.error == pytest.approx(found, rel=1e-3)
 
 
 def test_a_valve_too_late_for_any_gains_is_limited_by_the_control_and_says_its_delay(folder: Path) -> None:
