@@ -100,7 +100,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             try:
                 if point.name in self._own:
                     name = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
-                    raise KindError(f"{name}: ppafo already has a kind with this name; rename the kind of the package")
+                    raise KindError(f"{name}: ppafo already has a kind with this name; rename the kind in its package")
                 if point.name not in self._kinds:
                     self._kinds[point.name] = self._load(point)
             except KindError as error:
@@ -117,7 +117,10 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         # One entry found twice on the search path is no conflict.
         if len({(point.value, _package(point)) for point in points}) > 1:
             packages = ", ".join(sorted({_package(point) for point in points}))
-            raise KindError(f"{self.word} '{one_line(name)}' is offered by several packages: {packages}")
+            raise KindError(
+                f"{self.word} '{one_line(name)}' is defined by several packages: {packages}; uninstall all but one of "
+                "them"
+            )
         # All are loaded, so that a message can name what there is.
         if not points:
             self.load_all()
@@ -144,7 +147,9 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             raise KindError(f"{where} {is_a}")
         name = getattr(kind, "name", called)
         if called and name != called:
-            raise KindError(f"{where}: its kind is named '{one_line(name)}'; give entry point and kind the same name")
+            raise KindError(
+                f"{where}: the kind of this entry point is named '{one_line(name)}'; give both the same name"
+            )
         return kind
 
 

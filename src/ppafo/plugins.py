@@ -129,7 +129,7 @@ def object_of(word: str) -> Any:
     plugin = next((named[known] for known in (module, *reversed(parents)) if known in named), None)
     if plugin is None and module not in sys.modules:
         raise KindError(
-            f"module '{module}' is not allowed, because a file runs no code; if you trust the module, add "
+            f"module '{module}' is not loaded, because a file alone must not run code; if you trust the module, add "
             f"--plugin {_remedy(module)} (in Python plugins=['{_remedy(module)}'])"
         )
     loaded = sys.modules[module] if plugin is None else _imported(module, plugin.folder)
@@ -178,7 +178,10 @@ def _imported(module: str, folder: str) -> Any:
             sys.path.remove(folder)
     files = [*getattr(loaded, "__path__", ()), getattr(loaded, "__file__", None) or ""]
     if folder and not any(Path(file).is_relative_to(folder) for file in files):
-        raise KindError(f"module '{module}' of {folder} has the name of another module ({files[-1]}); rename it")
+        raise KindError(
+            f"module '{module}' of {folder} has the same name as another module ({files[-1]}); rename the module in "
+            f"{folder}"
+        )
     return loaded
 
 

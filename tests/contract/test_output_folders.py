@@ -176,7 +176,10 @@ def test_rig_adds_an_experiment_and_replaces_nothing_of_others(
     (out / "step-response.csv").write_text("mine")
     capsys.readouterr()
     assert main(["rig", "simulate", "step-response", "--out", str(out)]) == 2
-    assert "has a step-response.csv that the rig did not write" in capsys.readouterr().err
+    assert (
+        "contains 'step-response.csv', which was not written by the simulated test bench; move"
+        in capsys.readouterr().err
+    )
     assert (out / "step-response.csv").read_text() == "mine"
 
 

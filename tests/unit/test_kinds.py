@@ -90,7 +90,7 @@ def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
     install("clashing_laws", LAW.format(name="on_off", call="pid"), controllers="pid")
     (problem,) = CONTROLLERS.load_all()
     assert problem == (
-        "controller 'pid' of package 'clashing_laws': ppafo already has a kind with this name; rename the kind of the "
+        "controller 'pid' of package 'clashing_laws': ppafo already has a kind with this name; rename the kind in its "
         "package"
     )
     assert CONTROLLERS["pid"] is ours
@@ -99,7 +99,7 @@ def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
 def test_two_packages_with_one_name_are_both_named(install: Install) -> None:
     for package in ("first_laws", "second_laws"):
         install(package, LAW.format(name="on_off", call="mine"), controllers="mine")
-    with pytest.raises(KindError, match="offered by several packages: package 'first_laws', package 'second_laws'"):
+    with pytest.raises(KindError, match="defined by several packages: package 'first_laws', package 'second_laws'"):
         CONTROLLERS["mine"]
 
 
@@ -107,7 +107,7 @@ def test_two_packages_with_one_name_are_both_named(install: Install) -> None:
     ("text", "problem"),
     [
         ("KIND = 1.0\n", "is of type float, not ControllerKind"),
-        (LAW.format(name="on_off", call="another"), "its kind is named 'another'"),
+        (LAW.format(name="on_off", call="another"), "the kind of this entry point is named 'another'"),
         ("", "cannot be loaded: AttributeError"),
     ],
 )
@@ -157,7 +157,8 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
         ("beside:LAW", "has no attribute 'LAW'"),
         (
             "json.tool:main",
-            "module 'json.tool' is not allowed, because a file runs no code; if you trust the module, add --plugin",
+            "module 'json.tool' is not loaded, because a file alone must not run code; if you trust the module, add "
+            "--plugin",
         ),
         ("math:pi", "is of type float"),
     ):
@@ -259,7 +260,9 @@ def test_a_module_of_the_name_of_another_one_is_refused(tmp_path: Path, monkeypa
     monkeypatch.setattr(plugins, "_named", {})
     monkeypatch.setenv(plugins.VARIABLE, "")
     plugins.name_plugins(tmp_path / "json.py")
-    with pytest.raises(KindError, match=r"module 'json' of .* has the name of another module .*; rename it"):
+    with pytest.raises(
+        KindError, match=r"module 'json' of .* has the same name as another module .*; rename the module in"
+    ):
         METRICS["json:KIND"]
 
 

@@ -53,8 +53,8 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
         if out is not None or width is not None:
             given = f"--width {1e3 * width:g} mm" if out is None and width is not None else f"--out {out}"
             raise DataError(
-                f"{given}: only figures of runs, walks, studies and rig recordings can be drawn again, not of "
-                f"'ppafo {command}'{again}"
+                f"{given}: figures of 'ppafo {command}' cannot be drawn again, only figures of runs, walks, studies "
+                f"and recordings of the simulated test bench{again}"
             )
         return CommandOutput(f"{message}{again}", document)
     if out is not None:

@@ -48,7 +48,7 @@ def json_document(content: bytes) -> Any:
     try:
         document = json.loads(content.decode("utf-8"))
     except RecursionError as error:
-        raise ValueError("nested too deeply") from error
+        raise ValueError(f"nested deeper than {MAXIMUM_LEVELS} levels") from error
     if is_nested_too_deeply(document):
         raise ValueError(f"nested deeper than {MAXIMUM_LEVELS} levels")
     return document

@@ -82,7 +82,9 @@ class TomlKind:
         try:
             text = decoded(content)
         except UnicodeDecodeError as error:
-            raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start}){self._remedy(file)}") from error
+            raise self.error(
+                f"{file}: is not a text file in UTF-8 (byte {error.start} is invalid){self._remedy(file)}"
+            ) from error
         if not text.strip():
             raise self.error(f"{file}: is empty; 'ppafo doctor --schema {self.schema}' prints its format")
         # Before the parser, whose time grows with the square of the dots.
@@ -118,7 +120,7 @@ def _float(text: str) -> float:
     value = float(text)
     if value == 0.0 and text.lower().partition("e")[0].strip("+-0_."):
         raise tomllib.TOMLDecodeError(
-            f"{one_line(text)} is below the smallest 64-bit number and would become 0; write 0 or a larger number"
+            f"{one_line(text)} is too close to 0 for a 64-bit number and would become 0; write 0 or a larger number"
         )
     return value
 

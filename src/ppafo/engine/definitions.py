@@ -31,18 +31,18 @@ def check_is_plain(function: Any) -> None:
         if not callable(function):
             raise ProgramError(f"cannot compile {name}: it is not a function")
         if type(function).__module__ == "builtins" and type(function).__name__ == "builtin_function_or_method":
-            raise ProgramError(f"cannot compile {name}: its source text is not available")
+            raise ProgramError(f"cannot compile {name}: its source text is not available; define it in a .py file")
         raise ProgramError(f"cannot compile {name}: it must be a plain function defined with 'def'")
     if hasattr(function, "__wrapped__"):
         raise ProgramError(
-            f"{place_of(function)}: '{name}' is wrapped by a decorator, which cannot be compiled; remove it"
+            f"{place_of(function)}: '{name}' is wrapped by a decorator, which cannot be compiled; remove the decorator"
         )
     if function.__closure__:
         # A closure's value may change without a change of the function, and no text would show it.
         names = ", ".join(f"'{name}'" for name in function.__code__.co_freevars)
         raise ProgramError(
-            f"{place_of(function)}: '{name}' uses {names} of the enclosing function, which cannot be compiled; "
-            "pass it as a parameter"
+            f"{place_of(function)}: '{name}' uses {names} of the enclosing function; such variables cannot be "
+            "compiled: pass them as parameters"
         )
 
 

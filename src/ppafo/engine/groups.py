@@ -58,7 +58,7 @@ def merged(*parts: Groups) -> dict[str, Group]:
     for groups in parts:
         for name, group in groups.items():
             if name in found:
-                raise ProgramError(f"two components of a program define the group '{name}'; rename one of them")
+                raise ProgramError(f"two components of a program define the group '{name}'; rename one of the groups")
             found[name] = group
     return found
 
@@ -113,7 +113,7 @@ def check_rows(count: int, rows: Mapping[str, Any], role: Role) -> None:
     sizes = {name: len(leaf_paths(row, name)) for name, row in rows.items()}
     if count != sum(sizes.values()):
         raise ProgramError(
-            f"{role.value}: a block must have {sum(sizes.values())} rows, not {count}; rows of the program: "
+            f"{role.value}: a block must have {sum(sizes.values())} rows, not {count}; rows by group of the program: "
             + ", ".join(f"{name} {size}" for name, size in sizes.items() if size)
         )
 

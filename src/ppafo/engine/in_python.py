@@ -342,7 +342,7 @@ class _ForColumns(ast.NodeTransformer):
     def visit(self, node: ast.AST) -> Any:
         """Rewrite a node."""
         if isinstance(node, ast.If | ast.While | ast.Starred | ast.AugAssign) or not self.is_elementwise(node):
-            raise ProgramError(f"'{ast.unparse(node)}' cannot be evaluated for columns")
+            raise ProgramError(f"'{ast.unparse(node)}' cannot be evaluated for arrays of runs")
         return super().visit(node)
 
     def is_elementwise(self, node: ast.AST) -> bool:

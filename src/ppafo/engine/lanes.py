@@ -342,7 +342,7 @@ def begin_block(batch: Batch, effort: Effort = Effort.FULL) -> LaneBlock:
     """Return a block with all runs of a batch before the first step; ValueError for more runs than a block can take."""
     runs, lanes = batch.states.shape[1], lanes_of(batch.program)
     if runs > lanes:
-        raise ValueError(f"a block of {lanes} lanes cannot hold {runs} runs")
+        raise ValueError(f"a block has {lanes} lanes, one for each run, too few for {runs} runs")
     module = load_program(batch.program, effort)
     return LaneBlock(module, batch.program, batch.clock, batch.parameters, batch.states)
 

@@ -55,8 +55,8 @@ def check_net_torque() -> None:
     at_rest = [net_torque(0.0, 0.0, 0.0, angle, 0.0) for angle in TEST_ANGLES]
     if any(at_rest):
         raise ProgramError(
-            f"{place_of(net_torque)}: net_torque takes {-max(at_rest, key=abs):.4g} N m from a joint at rest, where "
-            "friction cannot balance it; subtract it in load_torque of ppafo.model.ports"
+            f"{place_of(net_torque)}: net_torque subtracts {-max(at_rest, key=abs):.4g} N m at rest, which friction "
+            "does not balance; subtract this torque in load_torque of ppafo.model.ports"
         )
 
 

@@ -147,7 +147,9 @@ def definition_of(function: FunctionType) -> Definition:
     file = sys.modules[function.__module__].__file__ if function.__module__ in sys.modules else None
     definition = _definitions(file or "").get(function.__code__.co_firstlineno)
     if definition is None:
-        raise ProgramError(f"cannot compile {function.__qualname__}: its source text is not available")
+        raise ProgramError(
+            f"cannot compile {function.__qualname__}: its source text is not available; define it in a .py file"
+        )
     return Definition(definition)
 
 

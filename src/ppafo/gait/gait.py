@@ -73,7 +73,8 @@ class GaitCurve:
     def __post_init__(self) -> None:
         if len(self.cosines) != len(self.sines) or not self.cosines:
             raise DataError(
-                f"a Fourier series needs as many cosines as sines, it has {len(self.cosines)} and {len(self.sines)}"
+                f"a Fourier series needs as many cosines as sines, not {len(self.cosines)} cosines and "
+                f"{len(self.sines)} sines"
             )
 
     @property

@@ -103,8 +103,8 @@ def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
         )
     if not low <= highest <= high:
         raise DataError(
-            f"{file}: vertical_force reaches {highest:.3g} body weights (plausible: {low:g} to {high:g}); check "
-            "the body mass and the unit (N, '-')"
+            f"{file}: vertical_force reaches {highest:.3g} body weights (plausible: {low:g} to {high:g}); check the "
+            "body mass and the unit ('N', or '-' for body weights)"
         )
 
 
@@ -177,7 +177,8 @@ def check_force(walk: MeanStride) -> None:
     if not FORCE_PEAK[0] <= peak <= FORCE_PEAK[1] or not FORCE_MEAN[0] <= mean <= FORCE_MEAN[1]:
         raise DataError(
             f"{where} has a mean of {mean:.3g} body weights (plausible: {FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g}) and a "
-            f"peak of {peak:.3g} ({FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}); check the body mass and the unit (N, '-')"
+            f"peak of {peak:.3g} (plausible: {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}); check the body mass and the unit "
+            "('N', or '-' for body weights)"
         )
 
 

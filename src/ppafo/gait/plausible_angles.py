@@ -44,9 +44,9 @@ def check_shank(walk: MeanStride) -> None:
         )
     if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
         raise DataError(
-            f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average (plausible: "
-            "above -10 deg and -50 to 10 deg; 0 is vertical, positive with the ankle in front of the knee); "
-            f"check zero and columns{_other_foot(walk)}"
+            f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average (plausible: above -10 "
+            "deg at heel strike, and -50 to 10 deg on average; 0 is vertical, positive with the ankle in front of the "
+            f"knee); check the zero and the columns of the angle{_other_foot(walk)}"
         )
 
 
@@ -77,8 +77,8 @@ def check_ankle(walk: MeanStride) -> None:
     if turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS:
         raise DataError(
             f"{where} moves into plantarflexion while the shank rotates forward: the flat foot would rotate by "
-            f"{turned:.2g} deg (RMS), with the opposite sign by {reversed_turned:.2g} deg, so the sign is reversed; "
-            f"{other_sign(walk.signs_from, 'ankle_angle.positive', 'the opposite sign about 90 deg')}"
+            f"{turned:.2g} deg (RMS), but only by {reversed_turned:.2g} deg with the opposite sign, so the sign is "
+            f"reversed; {other_sign(walk.signs_from, 'ankle_angle.positive', 'the opposite sign about 90 deg')}"
         )
     foot = standing_tilt(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:

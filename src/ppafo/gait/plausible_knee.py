@@ -200,7 +200,7 @@ def _check_knee_curve(walk: MeanStride, name: str) -> None:
     driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
     if held - driven > _HELD_BACK * travel:
         raise DataError(
-            f"{where} is {driven:.3g} m/s^2 around toe-off and {held:.3g} m/s^2 in mid-swing, opposite to walking: "
-            "the sign is reversed, or the data are of the other knee; "
+            f"{where} is {driven:.3g} m/s^2 around toe-off and {held:.3g} m/s^2 in mid-swing, while walking has the "
+            "opposite pattern: the sign is reversed, or the data are of the other knee; "
             f"{other_sign(walk.signs_from, f'the sign of knee.{name[5:]}')}"
         )

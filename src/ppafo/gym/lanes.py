@@ -36,14 +36,15 @@ class FromOutside:
     def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
         """Raise an error, because an agent acts through its environment."""
         raise ScenarioError(
-            "this scenario has no controller, because the agent of an environment gives the commands; give a controller"
+            "this scenario has no controller: it is for an environment, in which an agent gives the commands; to "
+            "simulate it without an agent, give a controller"
         )
 
 
 def episode_program(batch: Batch) -> tuple[Program, Clock]:
     """Return program and clock of a run with external commands. Raises ScenarioError for samples within a step."""
     if batch.program.samples_inside:
-        raise ScenarioError("run.output_interval: must be a whole number of run.step in an environment")
+        raise ScenarioError("run.output_interval: must be a multiple of run.step in an environment")
     return replace(batch.program, controller=None, starts_apart=True), batch.clock
 
 

@@ -70,8 +70,8 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> _
     if not set(TorqueProfile._fields) <= set(settings):
         kind = configuration.controller.kind
         raise ScenarioError(
-            f"{configuration.origin.file}: controller.kind = '{kind}' has no torque profile; use event_pid with a "
-            "proportional valve"
+            f"{configuration.origin.file}: an environment needs a torque profile, which controller.kind = '{kind}' "
+            "does not have; use controller.kind = 'event_pid' with a proportional valve"
         )
     goal = Goal(angle=0.0, profile=TorqueProfile(**{name: settings[name] for name in TorqueProfile._fields}))
     commanded = with_duration(configuration, seconds).controlled_by(FromOutside())

@@ -120,7 +120,8 @@ def fit(
     """
     if not numbers or not blocks:
         raise IdentificationError(
-            f"a fit needs at least one parameter and one block of residuals, not {len(numbers)} and {len(blocks)}"
+            f"a fit needs at least one parameter and one block of residuals, not {len(numbers)} parameters and "
+            f"{len(blocks)} blocks"
         )
     for number in numbers:
         if not (number.low <= number.start <= number.high and number.low < number.high):

@@ -181,8 +181,9 @@ class FreeDecayProblem(StrictTable):
             turned = float(angles.max() - angles.min())
             if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
                 raise IdentificationError(
-                    f"{source.name}: free-decay: 'angle' covers {turned:.4g} rad ({turned / math.tau:.3g} turns), "
-                    f"but the stops of the set are {math.degrees(high - low):.4g} deg apart: is its unit deg?"
+                    f"{source.name}: free-decay: 'angle' covers {turned:.4g} rad ({turned / math.tau:.3g} turns), but "
+                    f"the stops in the parameter set are {math.degrees(high - low):.4g} deg apart; if 'angle' is in "
+                    "degrees, give it the unit deg"
                 )
         static = number_in_si(context.parameter_set, "friction.static_torque")
         dynamic = number_in_si(context.parameter_set, "friction.dynamic_torque")
@@ -266,7 +267,10 @@ class VaneLeakProblem(StrictTable):
             names = ("angle_min", "angle_max", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
             lower, upper, per_angle, dead_1, dead_2 = context.numbers(*(f"actuator.{name}" for name in names))
             if not lower <= angle <= upper:
-                raise IdentificationError(f"{context.label}: angle = {self.angle!r} lies beyond the stops of the set")
+                raise IdentificationError(
+                    f"{context.label}: angle = {self.angle!r} lies beyond the stops in the parameter set; give an "
+                    "angle between the stops"
+                )
             # A volume that is given counts before one from the angle: its line may be another one.
             first = first or dead_1 + per_angle * (angle - lower)
             second = second or dead_2 + per_angle * (upper - angle)

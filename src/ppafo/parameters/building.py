@@ -48,7 +48,7 @@ _SAME = 1.0e-9
 """Angle difference [rad] below which two angles count as the same."""
 _COVERED = 1.01
 """Largest ratio of supply pressure to the highest pressure of a volume table [-]."""
-_BESIDE_ANOTHER = "; both supplies must be on the same side of the atmosphere"
+_BESIDE_ANOTHER = "; both supplies must be on the same side of atmospheric pressure"
 _UNUSED_VOLUME = 1.0e-6
 """Constant volume [m^3] of chamber 2 for an actuator with one chamber; no gas flows into it."""
 _NO_LEAK = Orifice(area=0.0, discharge_coefficient=1.0)
@@ -150,8 +150,8 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
     if device.supply.is_vacuum and declaration.RELIEVING_PATH in parameter_set.flags and not device.supply.relieving:
         yield (
             (declaration.RELIEVING_PATH, *SUPPLIES),
-            f"{declaration.RELIEVING_PATH} = false: a supply below the atmosphere takes gas from the chambers; set "
-            f"{declaration.RELIEVING_PATH} to true or omit the key",
+            f"{declaration.RELIEVING_PATH} = false: a supply below atmospheric pressure takes gas from the chambers; "
+            f"set {declaration.RELIEVING_PATH} to true or omit the key",
         )
     if actuator.kind != VANE and is_ordered and not problem:
         is_bad, line = growth_and_problem(device)[1]

@@ -236,8 +236,8 @@ class Device:
             with shown_in(self.shown):
                 plantar, dorsi = (shown_text(float(first(pressure)), "Pa_a", ".4g") for pressure in pressures)
             raise ParameterError(
-                f"{what} needs a supply above the atmosphere; '{self.name}' has a vacuum: supply.pressure = {plantar}, "
-                f"supply.dorsiflexion_pressure = {dorsi}{remedy}"
+                f"{what} needs a supply above atmospheric pressure; '{self.name}' has a vacuum: supply.pressure = "
+                f"{plantar}, supply.dorsiflexion_pressure = {dorsi}{remedy}"
             )
 
     def check_torque_constant(self, what: str) -> None:

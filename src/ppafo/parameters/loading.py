@@ -288,7 +288,8 @@ def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
         if negative is None:
             hint = nearest_name(words.positive, OPPOSITES)
             raise ParameterError(
-                f"{file}: joint.positive = '{words.positive}': the opposite is unknown{hint}; also give joint.negative"
+                f"{file}: joint.positive = '{words.positive}': the name of the opposite direction is unknown{hint}; "
+                "also give joint.negative"
             )
         joint = JointNames(words.name, words.positive, negative)
     return ParameterSet(

@@ -76,7 +76,7 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
     try:
         text = decoded(read_regular_file(path, MAXIMUM_BYTES_TYPED))
     except UnicodeDecodeError as error:
-        raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
+        raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start} is invalid)") from error
     except (OSError, ValueError) as error:
         raise ParameterError(f"{file}: cannot be read: {reason(error)}") from error
     columns, digits = _columns(text, file)
@@ -151,9 +151,9 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
         if name not in COLUMNS:
             if "torque" in name.lower():
                 raise ParameterError(
-                    f"{file}: column '{one_line(name)[:_LONGEST]}': the table holds volumes, not torques; "
-                    "integrate dV/dangle = dT/dpressure (T/p of a rigid chamber) over the angle, from the volumes at "
-                    "the first angle; docs/how-to/extend.md has the code under 'From torques'"
+                    f"{file}: column '{one_line(name)[:_LONGEST]}': the table must have volumes, not torques; "
+                    "integrate dV/dangle = dT/dpressure (T/p for a rigid chamber) over the angle, starting from the "
+                    "volumes at the first angle; the code is in docs/how-to/extend.md under 'From torques'"
                 )
             shown, hint = one_line(name)[:_LONGEST], nearest_name(name, COLUMNS)
             raise ParameterError(f"{file}: unknown column '{shown}'{hint}; allowed: {', '.join(COLUMNS)}")
@@ -215,7 +215,9 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
         raise ParameterError(f"{file}: has more than one line for {_point_text(*repeated)}; keep one of them")
     for pair in product(angles.tolist(), pressures.tolist()):
         if pair not in lines:
-            raise ParameterError(f"{file}: there is no line for {_point_text(*pair)}; every angle needs every pressure")
+            raise ParameterError(
+                f"{file}: there is no line for {_point_text(*pair)}; every angle needs one line for every pressure"
+            )
 
 
 def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file: str) -> None:
@@ -223,7 +225,7 @@ def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file
     if values.size > maximum:
         raise ParameterError(f"{file}: has {values.size} values of {name}; at most {maximum} are allowed")
     if values.size > 1 and float(np.diff(values).min()) < nearest:
-        raise ParameterError(f"{file}: two values of {name} are almost equal; merge or round them")
+        raise ParameterError(f"{file}: two values of {name} are almost equal; round them to one value")
 
 
 def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, resolution: float, file: str) -> None:
@@ -244,8 +246,8 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
         fall = 1e6 * (volume[row, column] - volume[row, column + 1])
         raise ParameterError(
             f"{file}: {name} decreases with pressure at {_point_text(angles[row], pressures[column + 1])}, by "
-            f"{fall:.3g} mL, more than the last digit of {1e6 * resolution:.3g} mL; round the volumes to the "
-            "resolution of the measurement"
+            f"{fall:.3g} mL; at most the last digit, {1e6 * resolution:.3g} mL, is allowed: correct the volume, or "
+            "round the volumes to the resolution of the measurement"
         )
     sign, direction = (1.0, "grow") if name == "volume_1" else (-1.0, "shrink")
     wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= -unseen)

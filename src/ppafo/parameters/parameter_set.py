@@ -226,7 +226,7 @@ def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
     if name not in parameter_set.valve_kinds:
         known = ", ".join(parameter_set.valve_kinds)
         hint = nearest_name(name, parameter_set.valve_kinds)
-        raise ParameterError(f"{parameter_set.file}: there is no valve '{name}'{hint}; it has {known}")
+        raise ParameterError(f"{parameter_set.file}: there is no valve '{name}'{hint}; available: {known}")
     return name
 
 

@@ -65,7 +65,10 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     allowed: Range = (IntegerRange(-COMMAND_STEPS, COMMAND_STEPS), ranges["state"])
     # Within it where the hull of both is no wider.
     if hull(proved.returned, allowed) != allowed:
-        raise ProgramError(f"{law.kind.name}: the command or the state can leave its range: {proved.returned}")
+        raise ProgramError(
+            f"{law.kind.name}: in fixed-point arithmetic, the command or the state can leave its allowed range: "
+            f"{proved.returned}"
+        )
     return proved
 
 

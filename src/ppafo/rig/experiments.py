@@ -82,7 +82,8 @@ def record(
     kind = load_parameter_set(device).actuator_kind
     if kind != VANE:
         raise ParameterError(
-            f"the simulated test bench supports vane actuators only, but '{one_line(device)}' has an actuator '{kind}'"
+            f"the simulated test bench supports vane actuators only, but the actuator of '{one_line(device)}' is of "
+            f"kind '{kind}'; choose a device with a vane actuator"
         )
     result = run(ExperimentRequest(preset, seed, device, valve, others, progress))
     truth = {

@@ -57,14 +57,22 @@ def _earlier(folder: Path, name: str) -> dict[str, Any]:
         try:
             document = read_json(path)
         except DataError as error:
-            raise DataError(f"{error}, so it is not overwritten") from error
+            raise DataError(f"{error}, so the file is not overwritten; choose another folder") from error
         if not isinstance(document, dict) or document.get("format") != _FORMAT:
-            raise DataError(f"{path}: was not written by the rig, so it is not overwritten")
+            raise DataError(
+                f"{path}: was not written by the simulated test bench, so it is not overwritten; choose another folder"
+            )
         recordings = document.get("recordings")
         if not isinstance(recordings, dict):
-            raise DataError(f"{path}: has no 'recordings', so it is not overwritten")
+            raise DataError(f"{path}: has no key 'recordings', so it is not overwritten; choose another folder")
     elif present:
-        raise DataError(f"{folder}: is not empty and has no recordings of the rig ({RIG_FILE}); choose another folder")
+        raise DataError(
+            f"{folder}: is not empty and contains no recordings of the simulated test bench (it has no {RIG_FILE}); "
+            "choose another folder"
+        )
     if name in present and name not in recordings:
-        raise DataError(f"{folder}: has a {name} that the rig did not write; move it or choose another folder")
+        raise DataError(
+            f"{folder}: contains '{name}', which was not written by the simulated test bench; move this file or choose "
+            "another folder"
+        )
     return dict(recordings)

@@ -183,7 +183,7 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
         path = typed.removeprefix(PREFIX)
         if path not in PATHS or not typed.startswith(PREFIX):
             hint = nearest_name(typed, [f"{PREFIX}{known}" for known in PATHS])
-            raise ParameterError(f"override '{override}': the rig has no value '{typed}'{hint}")
+            raise ParameterError(f"override '{override}': the simulated test bench has no value '{typed}'{hint}")
         with refused_as(ParameterError, f"override '{override}'", UnitError):
             value = parse_quantity(override.text, PATHS[path].unit)
         preset = preset.with_value(path, value, "override")

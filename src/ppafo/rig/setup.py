@@ -70,13 +70,13 @@ def real_device(device: Device, preset: Preset) -> Device:
     Raises ParameterError for a device with an active effect, because the rig has its own physics and would ignore the
     effect, and for a device that works on vacuum, because the supplies of the rig are pressure regulators.
     """
-    device.check_pressurised("the simulated bench", "; use the recording of a simulated run")
+    device.check_pressurised("the simulated test bench", "; use the recording of a simulated run")
     for effect in (effect for effect, is_on in switches_of(device).items() if is_on):
         zeros = {quantity.name: f"0 {quantity.unit}".strip() for quantity in effect.quantities}
         off = " and ".join(f"'{SECTION}.{effect.name}.{name}={zeros[name]}'" for name in effect.switch)
         raise ParameterError(
-            f"the simulated bench has no effect '{effect.name}': switch the effect off with {off}, or use the "
-            "recording of a simulated run"
+            f"the simulated test bench does not support the effect '{effect.name}': switch the effect off with {off}, "
+            "or use the recording of a simulated run"
         )
     declared = {quantity.name for quantity in VALVES[device.valve.kind].quantities}
     settings = dict(device.valve.settings)
@@ -106,7 +106,9 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
     # Without a velocity the rise has no place, and is none.
     share = stribeck.EFFECT.defaults(gas.species)["share"] if velocity > 0.0 else 0.0
     if droop > 0.0 and recovery <= 0.0:
-        raise ParameterError(f"preset '{preset.name}': supply.recovery_time must be above 0 s with a droop")
+        raise ParameterError(
+            f"preset '{preset.name}': supply.recovery_time must be above 0 s if supply.droop is above 0"
+        )
     return RigPhysics(
         gas_constant=constant,
         heat_capacity=heat_capacity_at_constant_volume(constant, gas.heat_capacity_ratio),
@@ -144,7 +146,8 @@ def with_line(device: Device, plant: PlantParameters, preset: Preset) -> tuple[P
         )
     if volume > 0.0 and line["area"] * line["discharge_coefficient"] <= 0.0:
         raise ParameterError(
-            f"preset '{preset.name}': line.area and line.discharge_coefficient must be above 0 with a line"
+            f"preset '{preset.name}': line.area and line.discharge_coefficient must be above 0 if line.volume is above "
+            "0"
         )
     conductance = area_conductance(
         line["area"], line["discharge_coefficient"], gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature

@@ -214,7 +214,7 @@ class _Solver:
 
     def __init__(self, rig_run: RigRun) -> None:
         if rig_run.run.program.controller is None:
-            raise SimulationError("the simulated test bench supports only controllers of the catalogue")
+            raise SimulationError("the simulated test bench supports only controllers given by controller.kind")
         self.rig_run, self.equations = rig_run, _Equations(rig_run)
         self.controller: ControllerKind = rig_run.run.program.controller
         self.decided = self.at_valve = 0.0

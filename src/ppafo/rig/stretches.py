@@ -75,7 +75,7 @@ def solve_stretch(
     for _ in range(MAXIMUM_STEPS):
         message = solver.step()
         if solver.status == "failed":
-            raise SimulationError(f"the rig's solver stopped at t = {solver.t:.6g} s: {message}")
+            raise SimulationError(f"the solver of the simulated test bench stopped at t = {solver.t:.6g} s: {message}")
         reached, event = float(solver.t), None
         # The interpolant is valid in the last step only, so it is asked for in each.
         interpolant = solver.dense_output()
@@ -94,7 +94,10 @@ def solve_stretch(
             times.append(last)
             states.append(interpolant(last) if event is not None else np.array(solver.y))
             return np.array(times), np.array(states)
-    raise SimulationError(f"the rig's solver took {MAXIMUM_STEPS} steps up to t = {solver.t:.6g} s")
+    raise SimulationError(
+        f"the solver of the simulated test bench stopped at t = {solver.t:.6g} s after {MAXIMUM_STEPS} steps; check "
+        "the values of device and preset"
+    )
 
 
 def _root(distances: Distances, number: int, interpolant: Callable[[float], Floats], start: float, end: float) -> float:

@@ -401,10 +401,11 @@ def _check_channel(recording: Recording, name: str) -> None:
     channel = recording.channels[name]
     if _NAME.fullmatch(name) is None or name == TIME:
         raise DataError(
-            f"{recording.label}: {name!r} cannot name a channel; letters, digits and _ can, except '{TIME}'"
+            f"{recording.label}: {name!r} is not a channel name; use a letter, then letters, digits or _, but not "
+            f"'{TIME}'"
         )
     if not channel.unit.strip() or not channel.unit.isprintable() or set(channel.unit) & set("[]"):
-        raise DataError(f"{recording.label}: channel '{name}' has no usable unit: {channel.unit!r}; a number has '-'")
+        raise DataError(f"{recording.label}: channel '{name}' has no usable unit: {channel.unit!r}; give '-' for none")
     if len(channel.values) != len(recording.time):
         counts = f"{len(channel.values)} values for {len(recording.time)} times"
         raise DataError(f"{recording.label}: channel '{name}' has {counts}")

@@ -262,7 +262,7 @@ def read_gas_model(reading: DocumentReader) -> GasModel | None:
     model = GasModel(**reading.section("gas_model", THERMAL_GAS))
     if model.heat_transfer_coefficient > 0.0 and value_at(reading.document, WALL_AREA) is None:
         raise ScenarioError(
-            f"{reading.file}: '{WALL_AREA}' is missing: gas takes up heat where heat_transfer_coefficient is above 0"
+            f"{reading.file}: '{WALL_AREA}' is missing, but required because heat_transfer_coefficient is above 0"
         )
     return model
 

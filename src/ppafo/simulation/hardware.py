@@ -58,7 +58,7 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
         if valve is not None and valve not in kinds and not nearest_name(valve, kinds):
             # The scenario names the valve of another device.
             raise ParameterError(
-                f"{parameter_set.file}: there is no valve '{valve}'; it has {', '.join(kinds)}: give "
+                f"{parameter_set.file}: there is no valve '{valve}'; available: {', '.join(kinds)}; give "
                 f"{override_text((f'device.valve={parameter_set.default_valve}',))}"
             )
         name = chosen_valve(parameter_set, valve)

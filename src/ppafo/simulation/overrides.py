@@ -77,8 +77,8 @@ def apply_overrides(
         names = [name for name in (*known, *declared.same) if name.startswith(section)]
         hint = nearest_name(path, names) or f"; available: {', '.join(names)}"
         raise ScenarioError(
-            f"override '{override}': with override '{scenario_overrides[deciding[-1]]}' {file} has no value "
-            f"'{path}'{hint}"
+            f"override '{override}': {file} has no value '{path}' after override "
+            f"'{scenario_overrides[deciding[-1]]}'{hint}"
         )
     for path in remaining:
         if path in declared.appended:

@@ -38,8 +38,8 @@ class SampledRun:
             # Delayed readings and gas temperatures of a walk are kept inside the compiled program alone.
             if program.late_readings or program.is_thermal:
                 raise ScenarioError(
-                    "a Python controller cannot run a walk with delayed sensors or a thermal gas model; "
-                    "use a controller kind"
+                    "a Python controller cannot run a walk with delayed sensors or a thermal gas model; use a "
+                    "controller given by controller.kind, or omit the delays and the gas model"
                 )
             self._gait_sensors = _parameter_group(batch, "gait_sensors")
         else:

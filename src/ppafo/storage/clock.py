@@ -74,7 +74,9 @@ def clock_seconds(
     stamps = [_stamp(cell, form, row) for cell, row in zip(cells, rows, strict=True)]
     zones = dict.fromkeys(re.sub(r"[+-].*", "", stamp.zone) for stamp in stamps)
     if len(zones) > 1:
-        raise DataError(f"the times are in several time zones ({', '.join(zones)}): use one time zone, or numbers")
+        raise DataError(
+            f"the times are in several time zones ({', '.join(zones)}); give all times in one time zone, or as numbers"
+        )
     seconds = np.array([stamp.seconds for stamp in stamps])
     days_in_words = [stamp.date for stamp in stamps] if dates is None else [cell.strip() for cell in dates]
     if any(days_in_words):
@@ -104,7 +106,8 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
         hour, minute, whole_seconds = first, second, 0
     else:
         raise DataError(
-            f'{row}: {shown} may be hours and minutes or minutes and seconds; give clock = "h:min" or clock = "min:s"'
+            f'{row}: {shown} may be hours and minutes or minutes and seconds; give clock = "h:min" or clock = "min:s" '
+            "in the column map"
         )
     half_of_day = (match["half"] or "").lower()
     # A leap second is the 60th; a logger that writes minutes and seconds alone may count minutes beyond 59.
@@ -144,8 +147,8 @@ def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: Dat
     since_first = [days - days[0] for days in growing]
     if len(since_first) > 1 and not np.array_equal(since_first[0], since_first[1]):
         raise DataError(
-            f"{rows[0]}: the date {words[0][:LONGEST_SHOWN]!r} is ambiguous; give "
-            'date_order = "day month" or date_order = "month day"'
+            f'{rows[0]}: the date {words[0][:LONGEST_SHOWN]!r} is ambiguous; give date_order = "day month" or '
+            'date_order = "month day" in the column map'
         )
     return growing[0]
 

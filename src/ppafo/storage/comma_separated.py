@@ -237,7 +237,7 @@ def read_csv(
             else:
                 header.append(cell)
         if not header and not any(lines[first:]):
-            raise DataError("has no header")
+            raise DataError("has no header; write the names of the columns in the first line")
         # A first column without a name is the row number that pandas writes.
         is_counted = bool(header) and not header[0].strip()
         has_rows_only = row_time is not None and not any(cell.partition("[")[0].strip() == TIME for cell in header)
@@ -249,7 +249,7 @@ def read_csv(
             )
         values = _table(header, rows, first)
         if is_counted and not np.array_equal(values[:, 0], np.arange(len(values))):
-            raise DataError("the first column has no name and is not a row number from 0; name or remove the column")
+            raise DataError("the first column has no name and no row numbers from 0; name or remove the column")
         kind = "simulated" if is_of_frame(header) else kind_of_comments(lines[:first])
         line_numbers = range(first + 2, first + 2 + len(values))
         series = list(values[:, is_counted:].T)

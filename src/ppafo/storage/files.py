@@ -44,7 +44,7 @@ def text_of(content: bytes, encoding: str = "utf-8", remedy: str = "") -> str:
         if b"\0" in content:
             # In no encoding that is offered.
             raise DataError(f"is not a text file (byte {content.index(0)} is zero)") from error
-        raise DataError(f"is not a text file in UTF-8 (byte {error.start}){remedy}") from error
+        raise DataError(f"is not a text file in UTF-8 (byte {error.start} is invalid){remedy}") from error
     # Latin-1 reads any bytes as a text: a zero gives away what is none.
     if "\0" in text:
         raise DataError(f"is not a text file (byte {text.index(chr(0))} is zero)")

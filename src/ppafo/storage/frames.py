@@ -80,7 +80,7 @@ def recording_of_frame(
             named = str(frame.index.name or "")
             if not _is_time(named):
                 known = ", ".join(map(one_line, names))
-                raise DataError(f"the table has no column and no index '{TIME} [{TIME_UNIT}]'; it has {known}")
+                raise DataError(f"the table has no column and no index '{TIME} [{TIME_UNIT}]'; available: {known}")
             names, values = [named, *names], [np.asarray(frame.index), *values]
     title = label or str(attributes.get("title", "")) or "table"
     return _recording(names, values, units, title, str(attributes.get("kind", kind)), atmosphere)
@@ -110,7 +110,7 @@ def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> R
         units |= attributes.get("units", {})
         names = [name for name in table.column_names if name != "__index_level_0__"]
         if not any(map(_is_time, names)):
-            raise DataError(f"has no column '{TIME} [{TIME_UNIT}]'; it has {', '.join(map(one_line, names))}")
+            raise DataError(f"has no column '{TIME} [{TIME_UNIT}]'; available: {', '.join(map(one_line, names))}")
         values = [table[name].to_numpy() for name in names]
         kind = str(attributes.get("kind", "measured"))
         return _recording(names, values, units, one_line(Path(path).stem), kind, atmosphere)

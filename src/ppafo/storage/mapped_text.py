@@ -198,7 +198,9 @@ def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str
                 "",
             )
         hint = "" if remedy else nearest_name(column, names)
-        raise DataError(f"{key} = {column!r}: the file has no such column{hint}; it has {shown_names(names)}{remedy}")
+        raise DataError(
+            f"{key} = {column!r}: the file has no such column{hint}; available: {shown_names(names)}{remedy}"
+        )
     if len(numbers) > 1:
         shown = " and ".join(map(str, numbers))
         raise DataError(f"{key} = {column!r}: columns {shown} have this name; give the number of one of them")

@@ -278,7 +278,7 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
             lengths[TIME] = len(clock)
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
-            raise DataError(f"all columns must have the same number of samples: {listed or 'no channel has a column'}")
+            raise DataError(f"all channels need columns of the same length: {listed or 'no channel has a column'}")
         size = next(iter(lengths.values()))
         for name, values in numbers.items():
             gaps = np.flatnonzero(~np.isfinite(values))
@@ -303,7 +303,7 @@ def _variable(key: str, column: int | str, file: _MatlabFile) -> str:
     if name not in file.columns and name not in file.texts:
         known = (*file.columns, *file.texts)
         raise DataError(
-            f"{key} = {column!r}: the file has no such variable{nearest_name(name, known)}; it has {shown_names(known)}"
-            f"{file.advice_on_objects()}"
+            f"{key} = {column!r}: the file has no such variable{nearest_name(name, known)}; available: "
+            f"{shown_names(known)}{file.advice_on_objects()}"
         )
     return name

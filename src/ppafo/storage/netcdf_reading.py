@@ -63,7 +63,7 @@ def read_netcdf(path: str | Path) -> Recording:
             if required > max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * len(content)):
                 raise DataError(
                     f"requires {required / 1e6:,.0f} MB of memory, more than {_MAXIMUM_GROWTH} times the size of the "
-                    f"file, {len(content) / 1e6:.2g} MB; it is probably damaged: write the file again"
+                    f"file ({len(content) / 1e6:.2g} MB); the file is probably damaged: write the file again"
                 )
             for name, variable in variables.items():
                 _check_is_whole(name, variable)
@@ -112,11 +112,15 @@ def _check_is_whole(name: str, variable: Any) -> None:
     size, chunks = variable.size, variable.chunks
     if chunks is None:
         if variable.id.get_storage_size() < size * variable.dtype.itemsize:
-            raise DataError(f"'{name}' has {size} values, but the file contains none of them")
+            raise DataError(
+                f"'{name}' should have {size} values, but the file contains none of them: write the file again"
+            )
         return
     chunk_count = variable.id.get_num_chunks()
     if chunk_count < math.ceil(size / chunks[0]):
-        raise DataError(f"'{name}' has {size} values, but the file contains only some of them")
+        raise DataError(
+            f"'{name}' should have {size} values, but the file contains only some of them: write the file again"
+        )
     allowed_bytes = chunks[0] * variable.dtype.itemsize + _CHECKSUM_BYTES
     for number in range(chunk_count):
         chunk = variable.id.get_chunk_info(number)
@@ -128,7 +132,9 @@ def _check_is_whole(name: str, variable: Any) -> None:
             with contextlib.suppress(zlib.error):
                 content = zlib.decompressobj().decompress(compressed, allowed_bytes + 1)
         if len(content) > allowed_bytes or chunk.size > 2 * allowed_bytes:
-            raise DataError(f"'{name}' decompresses to more than its stated size")
+            raise DataError(
+                f"'{name}' decompresses to more than its stated size: the file is damaged; write the file again"
+            )
 
 
 def _channel(name: str, variable: Any) -> Channel:
@@ -139,7 +145,9 @@ def _channel(name: str, variable: Any) -> Channel:
     values = np.asarray(variable[:], dtype=np.float64)
     for key in _GAPS:
         if key in variable.attrs and np.isin(values, np.asarray(variable.attrs[key], dtype=np.float64)).any():
-            raise DataError(f"'{name}' has missing values (attribute '{key}'); fill the gaps or cut the file there")
+            raise DataError(
+                f"'{name}' has missing values (attribute '{key}'); fill the gaps, or write only samples without gaps"
+            )
     for key, wanted in _LIMITS.items():
         if key in variable.attrs:
             limits = np.atleast_1d(np.asarray(variable.attrs[key], dtype=np.float64))

@@ -189,7 +189,7 @@ def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
             if "" in labels:
                 raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
             return number, labels
-    raise DataError(f"has nothing after '{_END}': the file is cut off")
+    raise DataError(f"has nothing after '{_END}': the file is cut off; export it again")
 
 
 _SIGNS = {

@@ -52,7 +52,7 @@ def marked_folder(command: str) -> FolderKind:
 
     def document_of(folder: Path) -> Any:
         if marking_command(folder) != command:
-            raise DataError(f"{folder}: is no result of 'ppafo {command}', as its {MARK} states; choose another folder")
+            raise DataError(f"{folder}: is not a result of 'ppafo {command}' (see its {MARK}); choose another folder")
         return read_json(folder / MARK)
 
     return FolderKind(f"result of 'ppafo {command}'", MARK, document_of)

@@ -136,11 +136,14 @@ def read_document(folder: str | Path) -> dict[str, Any]:
     if document.get("schema_version") is True or document.get("schema_version") != SCHEMA_VERSION:
         version = document.get("schema_version")
         raise DataError(
-            f"{path}: has schema_version {version!r}, this version of ppafo reads {SCHEMA_VERSION}; "
-            f"make the result again with this version"
+            f"{path}: has schema_version {version!r}, this version of ppafo reads {SCHEMA_VERSION}; run the command "
+            "that wrote this result again"
         )
     if not isinstance(document.get("recording"), dict) or not isinstance(document.get("files"), list):
-        raise DataError(f"{path}: 'recording' must be an object and 'files' a list; make the result again")
+        raise DataError(
+            f"{path}: 'recording' must be a JSON object and 'files' a JSON list; run the command that wrote this "
+            "result again"
+        )
     return document
 
 
@@ -160,7 +163,8 @@ def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
                 or not all(type(name) is str for name in stated)
             ):
                 raise DataError(
-                    f"{folder / name}: 'files' must be a list of names and '{HASHES}' an object; make the result again"
+                    f"{folder / name}: 'files' must be a JSON list of names and '{HASHES}' a JSON object; run the "
+                    "command that wrote this result again"
                 )
             document[HASHES] = dict(sorted({**hashes, **hashes_of(contents)}.items()))
             document["files"] = sorted({*stated, *contents})

@@ -117,7 +117,10 @@ def uncertainty_of(study: Study) -> Uncertainty:
             "probabilities; give a distribution, or omit this [[vary]]"
         )
     if not study.drawn:
-        raise StudyError(f"study '{study.name}': no value has a distribution; give a [[vary]] with kind = 'normal'")
+        raise StudyError(
+            f"study '{study.name}': no value has a distribution; give a [[vary]] with a distribution, such as kind = "
+            "'normal'"
+        )
     return Uncertainty(study.drawn, study.scores, study.same, study.gauge)
 
 
@@ -126,7 +129,10 @@ def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
     whole = uncertainty_of(study)
     kept = [row for row, drawn in enumerate(whole.drawn) if study.varies(drawn.path, configuration.name)]
     if not kept:
-        raise StudyError(f"study '{study.name}': no value has a distribution in configuration '{configuration.name}'")
+        raise StudyError(
+            f"study '{study.name}': no value has a distribution in configuration '{configuration.name}'; choose "
+            "another configuration, or add a [[vary]] with a distribution"
+        )
     same, scores = study.same_in(configuration.name), whole.scores
     if len(kept) == len(whole.drawn):
         return replace(whole, same=same)

@@ -182,7 +182,9 @@ def _build(
     paths = [entry.path for entry in parsed.vary]
     # Rows of channels over time are lists of one length, and bands are quantiles at one time.
     if "run.duration" in paths and (outputs.trajectories or outputs.bands):
-        raise StudyError("'run.duration' cannot vary with trajectories or bands, which need runs of equal length")
+        raise StudyError(
+            "'run.duration' cannot vary with trajectories or bands, which need runs of equal length; omit these outputs"
+        )
     repeated = first_twice(paths)
     if repeated is not None:
         raise StudyError(f"'{repeated}' is varied twice; omit one [[vary]]")
@@ -296,7 +298,8 @@ def _axis_or_drawn(
         distributions = {stated_normal(varied_path, each.scenario)[0] for each in _varying(entry, configurations)}
         if len(distributions) > 1:
             raise UnitError(
-                "the parameter sets of the configurations state different values; use 'only', or give the values"
+                "the parameter sets of the configurations state different values; limit this [[vary]] with 'only', or "
+                "give its values"
             )
         stated = distributions.pop()
         return RandomValue(
@@ -313,11 +316,14 @@ def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, Varie
             continue
         if entry.same_as not in independent:
             hint = nearest_name(entry.same_as, independent) or f"; available: {', '.join(independent) or 'none'}"
-            raise StudyError(f"vary '{entry.path}': same_as = '{entry.same_as}' does not vary independently{hint}")
+            raise StudyError(
+                f"vary '{entry.path}': same_as = '{entry.same_as}' must be the path of another [[vary]] without "
+                f"same_as{hint}"
+            )
         unit, other = varied_paths[entry.path].quantity.unit, varied_paths[entry.same_as].quantity.unit
         if unit != other:
             raise StudyError(
-                f"vary '{entry.path}': same_as = '{entry.same_as}' has the unit '{other or '-'}', but this path "
+                f"vary '{entry.path}': same_as = '{entry.same_as}' has the unit '{other or '-'}', but '{entry.path}' "
                 f"has '{unit or '-'}'; both need the same unit"
             )
         followed[entry.path] = entry.same_as

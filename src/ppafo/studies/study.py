@@ -225,8 +225,8 @@ def choose_configurations(
         if study is not None and study.only:
             path, varying = next(iter(study.only.items()))
             raise StudyError(
-                f"study '{study.name}': '{path}' varies only in {', '.join(varying)}; "
-                "compare the study's own configurations"
+                f"study '{study.name}': '{path}' varies only in {', '.join(varying)}, so the study cannot be used for "
+                "other scenarios; omit the scenarios to compare the configurations of the study"
             )
         named = configurations.values() if isinstance(configurations, Mapping) else configurations
         with at_fault("configurations"):
@@ -270,7 +270,7 @@ def configurations_with(configurations: Sequence[Configuration], overrides: Iter
     if refused:
         name = changed[0].name if changed else ""
         raise StudyError(
-            refused[0] + (f"; for '{name}' alone: {override_text([f'{name}:PATH=VALUE'])}" if name else "")
+            refused[0] + (f"; to change only '{name}', give {override_text([f'{name}:PATH=VALUE'])}" if name else "")
         )
     return tuple(changed)
 

@@ -85,7 +85,9 @@ class VariedPath:
         if isinstance(value, str):
             return _parse(value, quantity, self.atmosphere)
         if quantity.unit not in PLAIN:
-            raise UnitError(f"has no unit; give a text with a unit such as {quantity.unit}")
+            raise UnitError(
+                f"has no unit; write the number and its unit in quotes, with a unit such as {quantity.unit}"
+            )
         return float(value)
 
 
@@ -108,7 +110,7 @@ def varied_path(path: str, scenario: Scenario) -> VariedPath:
         section = path.partition(".")[0]
         near = [name for name in known if name.startswith(f"{section}.")]
         hint = nearest_name(path, known) or f"; for example {', '.join(near[:6] or list(known)[:6])}"
-        raise ScenarioError(f"scenario '{scenario.name}' has no number '{path}'{hint}")
+        raise ScenarioError(f"scenario '{scenario.name}' has no numeric value '{path}'{hint}")
     return VariedPath(path, known[path], counts_from(path, scenario.device.supply.atmospheric_pressure))
 
 
@@ -151,7 +153,8 @@ def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
     if not all(gauge):
         other = units[gauge.index(not gauge[0])]
         raise UnitError(
-            f"the atmosphere varies, so '{units[0]}' and '{other}' cannot be mixed; give gauge or absolute pressures"
+            f"the atmosphere varies, so '{units[0]}' and '{other}' cannot be mixed; give only gauge or only absolute "
+            "pressures"
         )
     return replace(varied, is_gauge=True)
 

@@ -81,5 +81,5 @@ class StudyFolder:
 def study_folder(path: str | Path) -> StudyFolder:
     """Return the folder at a path; DataError for a remote address such as a URL."""
     if is_address(path):
-        raise DataError(f"{path}: is an address; give a folder on this computer for the results")
+        raise DataError(f"{path}: is a URL; give a folder on this computer for the results")
     return StudyFolder(Path(path).absolute())

@@ -89,11 +89,11 @@ def read_manifest(folder: StudyFolder) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         raise DataError(f"{folder.path}: contains no study results ({MANIFEST} cannot be read)") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{folder.path}: {MANIFEST} is not a manifest of study results")
+        raise DataError(f"{folder.path}: {MANIFEST} does not describe a study; choose the folder of a study")
     if document.get("schema_version") != SCHEMA_VERSION:
         raise DataError(
-            f"{folder.path}: has schema_version {quote(document.get('schema_version'))}, this version of ppafo "
-            f"reads {SCHEMA_VERSION}; make the result again with this version"
+            f"{folder.path}: has schema_version {quote(document.get('schema_version'))}, this version of ppafo reads "
+            f"{SCHEMA_VERSION}; run the study again"
         )
     validate(_Stored, document, f"{folder.path}: {MANIFEST}", DataError)
     return document
@@ -194,7 +194,10 @@ class _Stored(_Part):
         """Raise ValueError for chunks that do not fit the configurations, missing units, or invalid display units."""
         names = [configuration.name for configuration in self.study.configurations]
         if len(set(names)) < len(names) or self.chunks % len(names) or self.chunks > self.runs:
-            raise ValueError(f"{self.chunks} chunks of {self.runs} runs do not fit {len(names)} configurations")
+            raise ValueError(
+                f"{self.chunks} chunks of {self.runs} runs do not match {len(names)} configurations; run the study "
+                "again"
+            )
         lost = [number.path for number in self.study.vary if number.path not in self.varied]
         if lost:
             raise ValueError(f"'{one_line(lost[0])}' varies, but has no unit in 'varied'")

@@ -306,7 +306,7 @@ def check_room(study: Study, folder: StudyFolder, agreed: bool) -> None:
             f"{folder.path}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or trajectories"
         )
     if needed > ASKED_ABOVE and not agreed:
-        raise StudyError(f"{folder.path}: {size}; give {argument_text('agreed', option='--yes')} to start it anyway")
+        raise StudyError(f"{folder.path}: {size}; give {argument_text('agreed', option='--yes')} to start the study")
 
 
 def _bytes_text(size: int) -> str:

@@ -106,17 +106,22 @@ def compile_library(source: str, library: Path, command: Sequence[str], flags: S
     folder = library.parent
     # Windows has no mounts without execution, nor the flag.
     if hasattr(os, "ST_NOEXEC") and os.statvfs(folder).f_flag & os.ST_NOEXEC:
-        raise CompilerError(f"libraries in {folder.parent} cannot be loaded (it is mounted noexec)", *OFFERED)
+        raise CompilerError(
+            f"libraries in {folder.parent} cannot be loaded, because this folder is mounted noexec; set "
+            "PPAFO_CACHE_DIR to a folder on another file system",
+            *OFFERED,
+        )
     written = folder / "program.c"
     written.write_text(source, encoding="utf-8")
     position = () if sys.platform == "win32" else ("-fPIC",)
     line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
     done, name = asked(line, scratch=folder), Path(command[0]).name
     if done.returncode in _INTERRUPTED:
-        raise SimulationError(f"{name} was interrupted")  # by the same key as this process: it works all the same
+        # By the same key as this process: the compiler works all the same.
+        raise SimulationError(f"the compiler {name} was interrupted; try again")
     if done.returncode != 0:
         # Killed, or without room for its files: the compiler itself is sound and may work the next time.
         passing = done.returncode < 0 or any(sign in done.stderr.casefold() for sign in _PASSING)
         raise CompilerError(f"{name} does not compile a model: {complaint(done)}", passing=passing)
     if not library.is_file():
-        raise CompilerError(f"{name} returned 0 but produced no library")
+        raise CompilerError(f"the compiler {name} reported success but wrote no library; check its installation")

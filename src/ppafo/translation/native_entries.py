@@ -103,11 +103,12 @@ def fill_module(module: ModuleType, library: Path, parameters: Mapping[str, Para
         # One product tells whether the compiler fuses or reorders, whatever its flags were.
         rounds_as_written = loaded[ROUNDS_AS_WRITTEN](*numbers)
     except AttributeError:
-        raise CompilerError("the library of a compiled model does not export its functions") from None
+        raise CompilerError("the library of a compiled model lacks functions of the model") from None
     if not rounds_as_written:
         raise CompilerError(
-            "the compiler fuses or reorders sums and products, so results would differ from those of other compilers "
-            "(look for -ffp-contract or -ffast-math in its wrapper or in the environment)"
+            "the compiler fuses or reorders sums and products, so results would differ from those of other compilers; "
+            "remove -ffp-contract and -ffast-math from the script that calls the compiler and from the environment "
+            "variables"
         )
     for name, (dimensions, types) in parameters.items():
         function = functions[name]

@@ -100,7 +100,7 @@ def split_number(text: str) -> tuple[float, str]:
     # float() rounds 1e-400 to 0 without a word, and 0 often means "none" in a file.
     if value == 0.0 and _NOT_ZERO.match(match.group()):
         raise UnitError(
-            f"{quote(text)} is below the smallest 64-bit number and would become 0; write 0 or a larger one"
+            f"{quote(text)} is too close to 0 for a 64-bit number and would become 0; write 0 or a larger number"
         )
     return value, unit
 

@@ -111,8 +111,8 @@ def read_unit(unit: str) -> tuple[ParsedUnit, str]:
     if len(gases) != 1:
         example = with_condition(unit, "", "air") if not gases else "L/min (ANR, air)"
         raise UnitError(
-            f"'{unit}' {'states no gas' if not gases else 'states two gases'}: write '{example}', or use another "
-            f"gas ({', '.join(MOLAR_MASSES)}) or a molar mass in kg/mol"
+            f"'{unit}' {'states no gas' if not gases else 'states two gases'}: write one gas, for example '{example}'; "
+            f"allowed: {', '.join(MOLAR_MASSES)}, or a molar mass in kg/mol"
         )
     factor = Decimal(repr(density(condition, _molar_mass(gases[0]))))
     return ParsedUnit(DECIMALS.multiply(parsed.scale, factor), Decimal(0), MASS_FLOW), ""

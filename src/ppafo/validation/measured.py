@@ -108,7 +108,7 @@ def read_all(
         # Given twice, under two names too, a recording would count twice as evidence.
         if measured.sha256 in read:
             same = read[measured.sha256].file
-            raise DataError(f"{measured.file}: the same recording as {same}; give every recording only once")
+            raise DataError(f"{measured.file}: is the same recording as {same}; give every recording only once")
         read[measured.sha256] = measured
     return list(read.values())
 
@@ -133,14 +133,15 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
             where = f"{recording.time[worst]:.6g} s (sample {worst + 1})"
             raise DataError(
                 f"{file}: '{name}' is {shown_text(recording[name][worst], recording.unit(name))} at {where}, more than "
-                f"{_MAXIMUM_RANGES:g} times what {device.name} can reach"
+                f"{_MAXIMUM_RANGES:g} times what {device.name} can reach; check the unit of the channel"
             )
     _check_pressures(recording, device, file)
     gauge = supply_gauge(recording, device)
     if gauge <= 0.0:
         owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
         raise DataError(
-            f"{file}: {owner} is not above the atmosphere, but errors of pressure are fractions of its gauge pressure"
+            f"{file}: {owner} must be above atmospheric pressure, because errors of pressure are fractions of its "
+            "gauge pressure"
         )
     # Every model would agree with a recording in which no channel changes.
     compared = [name for name in COMPARED if name in recording]

@@ -170,8 +170,8 @@ def _plan(request: Replay) -> Run:
     if run.step_count > MAXIMUM_STEPS:
         raise DataError(
             f"{request.measured.file}: {scenario.run.duration:.4g} s would take {run.step_count} steps of "
-            f"{run.step:.2g} s, but at most {MAXIMUM_STEPS} are allowed; split the recording, or give the unit "
-            "of its times if it is not seconds"
+            f"{run.step:.2g} s, but at most {MAXIMUM_STEPS} are allowed; split the recording or, if its times are not "
+            "in seconds, give their unit"
         )
     supply = request.device.supply
     plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)

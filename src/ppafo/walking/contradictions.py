@@ -129,8 +129,8 @@ def check_no_bottle(scenario: Scenario) -> None:
     """Raise ScenarioError if the walk is on a bottle, which is supported by ``ppafo walk`` alone."""
     if walk_of(scenario).bottle is not None:
         raise ScenarioError(
-            f"{scenario.name}: only 'ppafo walk' can simulate a walk with a bottle, step by step in turn with the "
-            "device; omit the bottle, or add [supply_line]"
+            f"{scenario.name}: a walk with a bottle can only be simulated by 'ppafo walk', which computes bottle and "
+            "device together, step by step; omit the bottle, or add [supply_line]"
         )
 
 

@@ -159,8 +159,8 @@ def _check_motion(kind: object, place: str) -> None:
     """Raise ScenarioError for an unknown motion, or a motion that is no walk; the message starts with ``place``."""
     if kind in VANE_MOTIONS:
         raise ScenarioError(
-            f"{place}: a walk file needs motion.kind = '{WALK}'; use 'ppafo simulate' for other scenarios, and give "
-            "'ppafo export opensim' the folder of its result"
+            f"{place}: a walk file needs motion.kind = '{WALK}'; simulate other scenarios with 'ppafo simulate' and, "
+            "for OpenSim, give 'ppafo export opensim' the result folder"
         )
     with refused_as(ScenarioError, place, KindError):
         is_known = not kind or is_walk(str(kind))

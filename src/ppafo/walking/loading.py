@@ -45,7 +45,9 @@ def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None
         override.typed == "run.duration" for override in read_overrides(overrides, ScenarioError)
     ):
         argument = argument_text("overrides", option="--set")
-        raise ScenarioError(f"{argument} run.duration and {argument_text('minutes')} are the same value; omit one")
+        raise ScenarioError(
+            f"{argument} run.duration and {argument_text('minutes')} both set the duration; omit one of them"
+        )
 
 
 @checked

@@ -124,7 +124,7 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
     scenario = replace(scenario, motion=replace(walk_of(scenario), faults=intact, broken={}))
     motion, planned = walk_of(scenario), task_sequence_of_walk(scenario)
     if motion.bottle is None:
-        raise ScenarioError(f"{scenario.name}: has no bottle")
+        raise ScenarioError(f"{scenario.name}: has no bottle; give a walk with [bottle]")
     if scenario.controller.custom is not None:
         check_no_bottle(scenario)
 
@@ -199,7 +199,7 @@ def compare_walks(
     ending = None if worn.supply is None or worn.supply.ending.kind == WALKED else worn.supply.ending
     if ending is not None and ending.time < shortest:
         raise SimulationError(
-            f"{worn.scenario.name}: the walk on its bottle ends after {ending.time:.3g} s, in its first "
+            f"{worn.scenario.name}: with its bottle, the walk ends after {ending.time:.3g} s, within the first "
             f"{SHORTEST_STRIDES} strides ({ending.message}); use a fuller, larger or warmer bottle"
         )
     # Without the device for the same time, which a bottle may have shortened.

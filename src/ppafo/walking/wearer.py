@@ -264,9 +264,9 @@ def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
         is_usable = quantity.minimum <= value <= quantity.maximum
         if not is_usable and value_at(reading.document, path) is None:
             raise ScenarioError(
-                f"{reading.file}: the subject of gait '{gait.name}' has {gait.body_mass:g} kg, so "
-                f"{path} would be {value:.3g} {quantity.unit}; must be {quantity.minimum:g} to "
-                f"{quantity.maximum:g} {quantity.unit}: give {path}"
+                f"{reading.file}: the subject of gait '{gait.name}' has a body mass of {gait.body_mass:g} kg, so "
+                f"{path} would be {value:.3g} {quantity.unit}, but it must be {quantity.minimum:g} to "
+                f"{quantity.maximum:g} {quantity.unit}; give {path}"
             )
     return Wearer(**reading.section("wearer", quantities))
 

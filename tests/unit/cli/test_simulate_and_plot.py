@@ -194,7 +194,8 @@ def test_a_mark_that_says_its_files_in_another_form_is_refused(
     assert main(["export", "figure", str(tmp_path)]) == 2
     assert (
         capsys.readouterr().err
-        == f"ppafo: {mark}: 'files' must be a list of names and 'sha256' an object; make the result again\n"
+        == f"ppafo: {mark}: 'files' must be a JSON list of names and 'sha256' a JSON object; run the command "
+        "that wrote this result again\n"
     )
     assert names(tmp_path) == ["ppafo.json", "recording.nc"]
 
@@ -233,7 +234,7 @@ def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
     assert json.loads(second)["open"] == str(tmp_path / "b" / "sets.txt")
     assert main(["export", "figure", str(tmp_path / "a"), "--out", str(tmp_path / "new.pdf")]) == 2
     message = capsys.readouterr().err
-    assert "only figures of runs, walks, studies and rig recordings can be drawn again, not of 'ppafo" in message
+    assert "figures of 'ppafo compare' cannot be drawn again, only figures of runs, walks, studies and rec" in message
     assert message.strip().endswith(again)
     assert main(["export", "figure", str(tmp_path / "a"), "--width", "84 mm"]) == 2
     assert again in capsys.readouterr().err

@@ -120,7 +120,7 @@ def test_a_file_of_another_kind_and_a_folder_are_answered_with_what_to_give(tmp_
 
 def test_a_number_that_would_become_0_is_refused() -> None:
     with pytest.raises(
-        ScenarioError, match=r"mine.toml: is not valid TOML: 1e-400 is below the smallest 64-bit number"
+        ScenarioError, match=r"mine.toml: is not valid TOML: 1e-400 is too close to 0 for a 64-bit number"
     ):
         KIND.parse(b"value = 1e-400", "mine.toml")
     assert KIND.parse(b"value = 0.0e-400", "mine.toml") == {"value": 0.0}

@@ -64,7 +64,8 @@ def test_numbers_of_all_runs_and_of_each_stand_in_rows_by_name() -> None:
 def test_a_block_with_a_row_too_few_is_refused_before_it_is_run() -> None:
     batch = plain_batch("torque-task-proportional")
     with pytest.raises(
-        ProgramError, match=r"parameters: a block must have \d+ rows, not \d+; rows of the program: timing 5, plant "
+        ProgramError,
+        match=r"parameters: a block must have \d+ rows, not \d+; rows by group of the program: timing 5, plant ",
     ):
         run_batch(replace(batch, parameters=batch.parameters[:-1]))
     check_rows(1, {"mine": Mine}, Role.STATE)

@@ -150,7 +150,7 @@ def test_batch_is_plain_data_of_rows_and_runs() -> None:
 def test_a_block_takes_no_more_runs_than_its_program_has_lanes() -> None:
     batch = batch_of(different_runs("torque-task-solenoid", 1)[0])
     wide = [np.repeat(values, lanes_of(batch.program) + 1, axis=1) for values in (batch.parameters, batch.states)]
-    with pytest.raises(ValueError, match=r"a block of .* lanes cannot hold"):
+    with pytest.raises(ValueError, match=r"a block has .* lanes, one for each run, too few for"):
         begin_block(dataclasses.replace(batch, parameters=wide[0], states=wide[1]))
 
 

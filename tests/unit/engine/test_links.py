@@ -146,8 +146,8 @@ def test_a_law_that_would_undo_another_is_refused() -> None:
     with pytest.raises(ProgramError) as caught:
         collected(FIRST, replace(SECOND, laws={place: undoing_law}))
     assert str(caught.value) == (
-        "effects 'first' and 'second' both act on place, but undoing_law of 'second' ignores the first: call place "
-        "in it, or switch one of the two effects off"
+        "effects 'first' and 'second' both act on place, but undoing_law of 'second' does not call place, so effect "
+        "'first' would be lost; call place in undoing_law, or switch one of the two effects off"
     )
 
 
@@ -199,9 +199,7 @@ def test_a_spring_in_equation_1_is_refused_with_the_place_where_friction_knows_i
 ) -> None:
     program = plan_run(load_scenario("step-response")).program
     monkeypatch.setattr(linking, "net_torque", sprung)
-    with pytest.raises(
-        ProgramError, match=r"test_links\.py:\d+: net_torque takes 1 N m from a joint at rest.*load_torque"
-    ):
+    with pytest.raises(ProgramError, match=r"test_links\.py:\d+: net_torque subtracts 1 N m at rest, .*load_torque"):
         link_program(program, Replacements())
 
 

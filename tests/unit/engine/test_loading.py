@@ -159,7 +159,8 @@ def test_a_folder_whose_libraries_cannot_be_loaded_is_reported_once_for_all_comp
     assert result_of(text("x[0, 0] - 0.5")) == 1.5
     (said,) = caplog.messages
     assert said == (
-        f"ppafo: libraries in {fresh_cache} cannot be loaded (it is mounted noexec); "
+        f"ppafo: libraries in {fresh_cache} cannot be loaded, because this folder is mounted noexec; set "
+        "PPAFO_CACHE_DIR to a folder on another file system; "
         "models are run by Python, some hundred times slower, instead for a day, or until 'ppafo doctor --clear'"
     )
 

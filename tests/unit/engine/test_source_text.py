@@ -83,8 +83,8 @@ def test_a_decorated_function_is_refused_even_where_it_hides_that_it_was(write: 
 def test_a_function_of_a_function_is_refused_by_the_names_that_it_takes_from_there(write: Write) -> None:
     module = write("def make(gain):\n    def law(x):\n        return gain * x\n\n    return law\n")
     assert refused(module.make(2.0)) == (
-        "my_law.py:2: 'make.<locals>.law' uses 'gain' of the enclosing function, which cannot be compiled; "
-        "pass it as a parameter"
+        "my_law.py:2: 'make.<locals>.law' uses 'gain' of the enclosing function; such variables cannot be "
+        "compiled: pass them as parameters"
     )
 
 

@@ -81,7 +81,7 @@ def test_a_unit_for_linux_asks_for_no_newer_c_library_than_that_of_2012(tmp_path
     ("script", "line"),
     [
         ("#!/no/such/interpreter\n", "cannot be run: no such file or directory"),
-        ("#!/bin/sh\nexit 0\n", "returned 0 but produced no library for linux64"),
+        ("#!/bin/sh\nexit 0\n", "reported success but wrote no library for linux64"),
         ("#!/bin/sh\nkill -9 $$\n", "failed to build the library for linux64: it returned -9"),
         ("#!/bin/sh\nprintf '\\377\\n' >&2\nexit 1\n", "failed to build the library for linux64: \ufffd"),
     ],

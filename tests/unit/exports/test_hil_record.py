@@ -147,9 +147,11 @@ def test_computed_samples_make_no_measurement() -> None:
 
 
 def test_where_no_sample_comes_one_line_says_what_came() -> None:
-    with pytest.raises(DataError, match=r"^no sample received within 1 s; received: 5 stray bytes$"):
+    with pytest.raises(
+        DataError, match=r"^no sample arrived within 1 s; received: 5 stray bytes; check the connection and the sender$"
+    ):
         played([b"hello"])
-    with pytest.raises(DataError, match=r"1 without a channel$"):
+    with pytest.raises(DataError, match=r"1 without a channel; check the connection and the sender$"):
         played([sample_bytes(WireSample(0, 7, 0, 0, {}))])
 
 
@@ -244,7 +246,7 @@ def test_whoever_sends_first_is_not_the_bench_unless_it_sends_a_packet(
 def test_where_the_bench_fell_silent_before_its_first_sample_strangers_are_named() -> None:
     tape = Tape([answer_bytes(Answer(0, 7, 5, 5, 5))])
     tape.strangers = 3
-    with pytest.raises(DataError, match=r"1 no sample, 3 from another sender$"):
+    with pytest.raises(DataError, match=r"1 no sample, 3 from another sender; check the connection and the sender$"):
         record(tape, "bench", None, 1.0, clock=tape.clock)
 
 

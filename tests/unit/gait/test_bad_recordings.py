@@ -393,7 +393,7 @@ def test_too_few_strides_are_refused_with_the_spans(
     path = csv_of(short, walk.time[:400])
     with pytest.raises(
         DataError,
-        match=r"has 1 whole stride covered by both angles and events .*, at least 2 are needed; give a longer",
+        match=r"has 1 whole stride covered by both angles and events .*, but at least 2 are needed; give a longer",
     ):
         import_gait([path], ImportSettings(62.0))
     assert import_gait([path], ImportSettings(62.0, least_strides=1)).gait.strides == 1

@@ -131,7 +131,8 @@ IMPLAUSIBLE = {
     ),
     "knee forward": (
         {"knee_forward": negative},
-        "knee_forward is -10.5 m/s^2 around toe-off and 7.82 m/s^2 in mid-swing, opposite to walking",
+        "knee_forward is -10.5 m/s^2 around toe-off and 7.82 m/s^2 in mid-swing, while walking has the "
+        "opposite pattern",
     ),
     "knee up": (
         {"knee_up": negative},

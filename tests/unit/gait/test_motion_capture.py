@@ -211,7 +211,7 @@ def test_of_a_standing_trial_it_is_said_alone_that_nobody_walks(sway: float, tmp
 @pytest.mark.parametrize(
     ("forward", "vertical", "said"),
     [
-        ("y", "z", "along x; change shank_angle.forward = 'y' to the walking direction, 'x' or '-x', in a gait map"),
+        ("y", "z", "along x; in a gait map, replace shank_angle.forward = 'y' by the walking direction, 'x' or '-x'"),
         ("x", "y", "is longest along 'z'; give 'z' in a gait map, also for ankle_angle"),
     ],
 )

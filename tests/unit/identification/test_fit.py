@@ -213,8 +213,8 @@ def test_as_many_samples_as_numbers_are_refused() -> None:
 @pytest.mark.parametrize(
     ("numbers", "blocks", "said"),
     [
-        ((), _BLOCKS, "a fit needs at least one parameter and one block of residuals, not 0 and 4"),
-        (_NUMBERS, (), "a fit needs at least one parameter and one block of residuals, not 6 and 0"),
+        ((), _BLOCKS, "a fit needs at least one parameter and one block of residuals, not 0 parameters and 4 blocks"),
+        (_NUMBERS, (), "a fit needs at least one parameter and one block of residuals, not 6 parameters and 0 blocks"),
         ((FitVariable("rate", 2.0, 2.0, 2.0, 2.0),), _BLOCKS, "rate: bounds 2 to 2, start 2"),
         ((FitVariable("rate", 9.0, 0.1, 5.0, 2.0),), _BLOCKS, "rate: bounds 0.1 to 5, start 9"),
     ],

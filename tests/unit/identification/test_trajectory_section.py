@@ -314,8 +314,8 @@ def test_the_published_schema_has_the_section() -> None:
         (f"{FIT}time_offset = '0 s'\n", "experiment 'step': time_offset = '0 s' must be above zero"),
         (f"{FIT}time_offset = '5 mm'\n", "time_offset = '5 mm': unit 'mm' does not fit"),
         (f"{FIT}step = '1 min'\n", "step = '1 min' must be from"),
-        (f"{FIT}start = '9 s'\n", "has 0 samples after 9 s"),
-        (f"{FIT}{STEP}", "experiment 'step' is named twice"),
+        (f"{FIT}start = '9 s'\n", "has 0 samples from the start at 9 s on"),
+        (f"{FIT}{STEP}", "experiment 'step' is given twice; rename or remove one of the two"),
         (f"{FIT}{REPLAYED}inputs = ['supply_pressure']\n", "has no scenario, so inputs must have 'command'"),
         (
             f"{FIT}{REPLAYED}".replace("task.csv", "decay.csv"),

@@ -48,7 +48,9 @@ def test_a_set_without_a_kind_has_a_vane_and_one_that_names_it_is_the_same() -> 
 
 def test_a_table_of_torques_is_told_how_volumes_follow(tmp_path: Path) -> None:
     path = measured(tmp_path, "angle [deg],pressure [kPa_g],Torque [N m]", "20,0,0")
-    with pytest.raises(ParameterError, match=r"'Torque': the table holds volumes.*dV/dangle = dT/dpressure.*extend.md"):
+    with pytest.raises(
+        ParameterError, match=r"'Torque': the table must have volumes.*dV/dangle = dT/dpressure.*extend.md"
+    ):
         read_measured_volumes(path)
 
 
@@ -114,7 +116,7 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
         ((HEADER, *(line.replace(",50,", ",-150,") for line in GOOD)), "pressure = -150 kPa_g is below a perfect vac"),
         (
             (HEADER, *GOOD[:-1], "100,50,140"),
-            "volume_1 decreases with pressure at 100 deg and 50 kPa_g, by 10 mL, more than the last digit of 1 mL",
+            "volume_1 decreases with pressure at 100 deg and 50 kPa_g, by 10 mL; at most the last digit, 1 mL, is",
         ),
         ((HEADER, "20,0,-5", *GOOD[1:]), "is negative"),
         ((HEADER, *GOOD[:3], "60,50,220", *GOOD[4:]), "must grow with the angle at the highest pressure"),
@@ -305,5 +307,5 @@ def test_the_bench_refuses_another_actuator_in_one_line(
     monkeypatch.chdir(tmp_path)
     assert main(["rig", "simulate", "step-response", "--device", "cylinder-lever", "--out", "out"]) == 2
     said = capsys.readouterr().err
-    assert "supports vane actuators only, but 'cylinder-lever' has an actuator 'cylinder'" in said
+    assert "supports vane actuators only, but the actuator of 'cylinder-lever' is of kind 'cylinder'" in said
     assert said.count("\n") == 1

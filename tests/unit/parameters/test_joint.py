@@ -43,7 +43,10 @@ def test_a_set_names_its_joint_and_the_opposite_is_known(elbow: Path) -> None:
     ("joint", "message"),
     [
         ('name = "elbow"', "'joint.positive' is missing|joint.positive"),
-        ('name = "elbow"\npositive = "flexoin"', "the opposite is unknown.*flexion.*joint.negative"),
+        (
+            'name = "elbow"\npositive = "flexoin"',
+            "the name of the opposite direction is unknown.*flexion.*joint.negative",
+        ),
         ('name = "elbow"\npositive = "flexion"\nsign = "up"', "unknown key 'joint.sign'"),
         ('name = ""\npositive = "flexion"', "joint.name"),
     ],

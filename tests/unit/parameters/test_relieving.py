@@ -81,5 +81,5 @@ def test_one_supply_below_the_atmosphere_beside_one_above_it_is_refused_in_one_l
 
 def test_an_empty_bottle_has_no_full_range_to_validate_against(tmp_path: Path) -> None:
     ppafo.simulate("step-response", [*EMPTY, "motion.ankle_torque=5 N m"]).save(tmp_path / "bench")
-    with pytest.raises(PpafoError, match="is not above the atmosphere"):
+    with pytest.raises(PpafoError, match="must be above atmospheric pressure, because"):
         ppafo.validate("ppafo2011", [tmp_path / "bench"], overrides=EMPTY)

@@ -53,7 +53,7 @@ WANTED = {
 def test_an_effect_that_the_rig_does_not_have_is_refused_before_it_records_without_it(name: str) -> None:
     with pytest.raises(
         ParameterError,
-        match=r"no effect 'silencer': .* off with 'effects\.silencer\.sonic_conductance=0 m\^3/\(s Pa\)'",
+        match=r"not support the effect 'silencer': .* off with 'effects\.silencer\.sonic_conductance=0 m\^3/\(s Pa\)'",
     ):
         record(name, "ideal-laboratory", 1, overrides=["effects.silencer.sonic_conductance=1e-8 m^3/(s Pa)"])
     record("valve-map", "ideal-laboratory", 1, overrides=["effects.silencer.sonic_conductance=0 m^3/(s Pa)"])
@@ -209,10 +209,10 @@ def test_the_truth_names_the_preset_with_overrides_and_the_device() -> None:
         ({"overrides": ["rig.friction.scatter=2"]}, "at least 0 and at most 0.5"),
         ({"overrides": ["rig.line.volume=3 s"]}, "override 'rig.line.volume=3 s'"),
         ({"overrides": ["rig.line.volume=40 cm^3"]}, "is part of each dead volume"),
-        ({"overrides": ["rig.line.area=0 m^2"]}, "must be above 0 with a line"),
+        ({"overrides": ["rig.line.area=0 m^2"]}, "must be above 0 if line.volume is above 0"),
         ({"overrides": ["friction.statik_torque=1 N m"]}, "did you mean"),
         ({"valve": "solenoyd"}, "did you mean 'solenoid'"),
-        ({"valve": "solenoid_recycling"}, "does not support valve 'solenoid_recycling'"),
+        ({"valve": "solenoid_recycling"}, "does not support a valve of kind 'solenoid_recycling'"),
     ],
 )
 def test_bad_input_is_one_line_with_the_nearest_name(words: dict[str, object], message: str) -> None:
@@ -250,7 +250,7 @@ def test_a_mistake_in_a_preset_file_is_named(before: str, after: str, message: s
 
 def test_a_foreign_rig_file_is_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / "rig.json").write_text('{"mine": 1}')
-    with pytest.raises(DataError, match="was not written by the rig"):
+    with pytest.raises(DataError, match="was not written by the simulated test bench"):
         write_rig_recording(tmp_path, record("static-torque"))
 
 

@@ -94,7 +94,7 @@ def test_a_channel_of_another_length_is_refused() -> None:
 
 @pytest.mark.parametrize("name", ["time", "Angle (deg)", "", "1st"])
 def test_a_name_that_no_file_could_hold_is_refused(name: str) -> None:
-    with pytest.raises(DataError, match="cannot name a channel"):
+    with pytest.raises(DataError, match="is not a channel name"):
         recording().with_channel(name, np.zeros(5), "N m")
 
 

@@ -265,7 +265,7 @@ def test_a_set_without_the_valve_of_the_scenario_names_the_option_that_takes_its
     text = TEXT.replace('"ppafo2011"', '"cylinder-lever"').replace('valve = "proportional"', 'valve = "solenoid"')
     message = problem_with(text.encode(), ParameterError)
     assert message.endswith(
-        "there is no valve 'solenoid'; it has proportional: give overrides=['device.valve=proportional']"
+        "there is no valve 'solenoid'; available: proportional; give overrides=['device.valve=proportional']"
     )
 
 

@@ -223,7 +223,7 @@ def test_the_reach_of_a_suction_device_is_the_one_of_a_pressure_device_turned_ro
     [
         (
             ("supply.pressure=-60 kPa_g", "supply.dorsiflexion_pressure=60 kPa_g"),
-            "both supplies must be on the same side of the atmosphere",
+            "both supplies must be on the same side of atmospheric pressure",
         ),
         ((*SUCTION, "supply.relieving=false"), "set supply.relieving to true or omit the key"),
         ((*SUCTION, "controller.kind=pid_feedforward"), "set controller.kind to one of on_off, on_off_dead_zone, pid,"),
@@ -242,10 +242,10 @@ def test_a_recording_under_suction_is_neither_validated_nor_made_by_the_bench(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = simulate(TASK, (*SUCTION, "run.duration=0.1 s")).save(tmp_path / "run")
-    with pytest.raises(PpafoError, match=r"a validation, .* needs a supply above the atmosphere"):
+    with pytest.raises(PpafoError, match=r"a validation, .* needs a supply above atmospheric pressure"):
         validate("ppafo2011", [folder], motion="locked", overrides=SUCTION)
     assert main(["rig", "simulate", "step-response", "--set", SUCTION[0], "--out", str(tmp_path / "rig")]) == 2
-    assert "the simulated bench needs a supply above the atmosphere" in capsys.readouterr().err
+    assert "the simulated test bench needs a supply above atmospheric pressure" in capsys.readouterr().err
 
 
 def test_a_suction_scenario_in_c_has_the_bits_of_python(tmp_path: Path) -> None:
@@ -257,7 +257,9 @@ def test_a_suction_scenario_in_c_has_the_bits_of_python(tmp_path: Path) -> None:
 
 
 def test_a_walk_on_a_vacuum_is_refused_in_one_line() -> None:
-    with pytest.raises(PpafoError, match=r"^solenoid: \[device\]: a walk, .* needs a supply above the atmosphere"):
+    with pytest.raises(
+        PpafoError, match=r"^solenoid: \[device\]: a walk, .* needs a supply above atmospheric pressure"
+    ):
         load_walk("solenoid", SUCTION)
 
 

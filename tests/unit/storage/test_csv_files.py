@@ -73,7 +73,7 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("\n\n", "has no header"),
         ("# only a remark\n", "has no header"),
         ("time [s],angle [rad]\n", "has a header but no samples"),
-        (b"\x89HDF\r\n\x1a\n\xff\xfe", r"not a text file in UTF-8 \(byte 0\)"),
+        (b"\x89HDF\r\n\x1a\n\xff\xfe", r"not a text file in UTF-8 \(byte 0 is invalid\)"),
         (b"time [s]\x00\n0\n", "not a text file"),
         ("time [s],angle [rad]\n0,1\n1,2", "cut off"),
         ("time [s],angle [rad]\n0,1\n1\n", "line 3 has 1 values for 2 columns"),

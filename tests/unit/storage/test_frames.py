@@ -58,7 +58,7 @@ def test_other_channels_need_a_unit() -> None:
     [
         (
             lambda: pandas.DataFrame({"pressure_1 [Pa]": TIME}),
-            r"no column and no index 'time \[s\]'; it has pressure_1",
+            r"no column and no index 'time \[s\]'; available: pressure_1",
         ),
         (
             lambda: frame(**{"pressure_1 [bar_g]": np.where(TIME == 0.0, np.nan, FALL)}),

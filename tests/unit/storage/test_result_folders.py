@@ -210,7 +210,10 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path, monkeypatch:
         ("[" * 100_000, "is not JSON"),
         ("[]", "does not belong to a ppafo result"),
         ('{"format": "ppafo result", "schema_version": 99}', "has schema_version 99, this version of ppafo reads 1"),
-        ('{"format": "ppafo result", "schema_version": 1}', "'recording' must be an object and 'files' a list"),
+        (
+            '{"format": "ppafo result", "schema_version": 1}',
+            "'recording' must be a JSON object and 'files' a JSON list",
+        ),
     ],
 )
 def test_an_unusable_document_is_one_line_that_names_it(tmp_path: Path, content: str, message: str) -> None:

@@ -69,13 +69,13 @@ def test_path_follows_only_where_it_is_to() -> None:
     [
         (
             {"same_as": "actuator.dead_volume_3"},
-            "does not vary independently, did you mean 'actuator.dead_volume_1'",
+            "must be the path of another \\[\\[vary\\]\\] without same_as, did you mean 'actuator.dead_volume_1'",
         ),
-        ({"same_as": "actuator.dead_volume_2"}, "does not vary independently"),
+        ({"same_as": "actuator.dead_volume_2"}, "must be the path of another \\[\\[vary\\]\\] without same_as"),
         ({"same_as": 3}, "same_as"),
-        ({"path": "supply.pressure"}, "has the unit 'm\\^3', but this path has 'Pa_a'"),
+        ({"path": "supply.pressure"}, "has the unit 'm\\^3', but 'supply.pressure' has 'Pa_a'"),
         ({"path": "actuator.dead_volume_1"}, "varied twice"),
-        ({"path": "actuator.dead_volume_4"}, "has no number 'actuator.dead_volume_4'"),
+        ({"path": "actuator.dead_volume_4"}, "has no numeric value 'actuator.dead_volume_4'"),
         ({"median": "2 cm^3"}, "unknown key"),
         ({"only": ["three"]}, "there is no configuration 'three'"),
     ],

@@ -30,7 +30,7 @@ CONTRADICTIONS = [
     ({"kind": "uniform", "minimum": "1 mm", "maximum": "2 mm^2"}, "a unit like 'm^2' is needed"),
     (
         {"kind": "uniform", "minimum": 1.0, "maximum": "2 mm^2"},
-        "has no unit; give a text with a unit such as m^2",
+        "has no unit; write the number and its unit in quotes, with a unit such as m^2",
     ),
     ({"kind": "normal", "mean": "10 mm^2", "standard_deviation": "-1 mm^2"}, "standard_deviation = '-1 mm^2' must be"),
     ({"kind": "normal", "mean": "10 mm^2", "standard_deviation": "0 mm^2"}, "must be above 0"),
@@ -83,8 +83,8 @@ def test_a_standard_deviation_of_a_temperature_has_no_offset(varying: Callable[.
         ("valve.aera", "did you mean 'valve.area'?"),
         ("suply.pressure", "did you mean 'supply.pressure'?"),
         ("reference.levl", "did you mean 'reference.level'?"),
-        ("reported.c1", "has no number 'reported.c1'"),
-        ("controller.kind", "has no number 'controller.kind'"),
+        ("reported.c1", "has no numeric value 'reported.c1'"),
+        ("controller.kind", "has no numeric value 'controller.kind'"),
     ],
 )
 def test_unknown_paths_are_refused_with_the_nearest(varying: Callable[..., Any], path: str, expected: str) -> None:
@@ -94,7 +94,7 @@ def test_unknown_paths_are_refused_with_the_nearest(varying: Callable[..., Any],
 def test_a_path_must_exist_in_every_configuration_that_varies_it(varying: Callable[..., Any]) -> None:
     gain = {"path": "controller.proportional_gain", "kind": "list", "values": ["0.1 1/(N m)"]}
     document = varying(gain, CD)
-    assert "scenario 'torque-task-solenoid' has no number 'controller.proportional_gain'" in refused(document)
+    assert "scenario 'torque-task-solenoid' has no numeric value 'controller.proportional_gain'" in refused(document)
     document["vary"][0]["only"] = ["proportional"]
     assert load_study(document).only == {"controller.proportional_gain": ("proportional",)}
     document["vary"][0]["only"] = ["proportinal"]

@@ -120,7 +120,7 @@ OBEYS = '#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\n'
 BROKEN = {
     "no interpreter": ("#!/no/such/interpreter\n", "cannot be run: no such file or directory"),
     "no program": ("\0\1\2", "cannot be run: exec format error"),
-    "no library": (f"{OBEYS}exit 0\n", "returned 0 but produced no library"),
+    "no library": (f"{OBEYS}exit 0\n", "reported success but wrote no library"),
     "half a library": (
         f'{OBEYS}for word; do [ "$last" = -o ] && printf half > "$word"; last="$word"; done\n',
         "the library of a compiled model cannot be loaded: .*file too short",
@@ -128,7 +128,7 @@ BROKEN = {
     "another library": (
         f'{OBEYS}for word; do last="$own"; [ "$flag" = -o ] && own="$word"; flag="$word"; done\n'
         'echo "int x;" | exec REAL -shared -fPIC -xc - -o "$own"\n',
-        "does not export its functions",
+        "lacks functions of the model",
     ),
     "killed": (f"{OBEYS}kill -9 $$\n", "does not compile a model: it returned -9"),
     "no utf-8": ("#!/bin/sh\nprintf '\\377\\n' >&2\nexit 1\n", "does not compile a model: \ufffd"),

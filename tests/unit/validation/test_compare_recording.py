@@ -261,7 +261,7 @@ def test_the_start_is_averaged_over_the_rest_before_the_first_command(agree: Agr
 def test_only_what_was_recorded_is_compared_and_the_rest_of_the_start_is_asked_for(step: Step, agree: Agree) -> None:
     device, recording = step
     lean = only(recording, "angle", "command")
-    with pytest.raises(DataError, match=r"r\.csv: there is no channel 'pressure_1' to start from"):
+    with pytest.raises(DataError, match=r"r\.csv: there is no channel 'pressure_1' for the initial state"):
         agree(lean, device)
     start = {"pressure_1": float(recording["pressure_1"][0]), "pressure_2": float(recording["pressure_2"][0])}
     agreement = agree(lean, device, initial=start)

@@ -39,12 +39,14 @@ def test_a_kind_that_is_not_there_is_refused_with_those_that_are() -> None:
 
 
 def test_the_motion_of_a_vane_is_none_of_a_walk() -> None:
-    with pytest.raises(ScenarioError, match=r"a walk file needs motion\.kind = 'walk'; use 'ppafo simulate'"):
+    with pytest.raises(
+        ScenarioError, match=r"a walk file needs motion\.kind = 'walk'; simulate other scenarios with 'ppafo simulate'"
+    ):
         load_walk("proportional", ["motion.kind=free"])
 
 
 def test_a_shipped_scenario_without_a_walk_is_told_from_a_name_that_is_unknown() -> None:
-    with pytest.raises(ScenarioError, match=r"'locked': .*'ppafo export opensim' the folder of its result"):
+    with pytest.raises(ScenarioError, match=r"'locked': .*give 'ppafo export opensim' the result folder"):
         load_walk("torque-task-solenoid")
     with pytest.raises(ScenarioError, match="there is no walk 'torque-task-other'"):
         load_walk("torque-task-other")

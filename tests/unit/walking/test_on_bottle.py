@@ -275,5 +275,5 @@ def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_ti
     ending = small.supply.ending._replace(kind="empty", time=3.1, message="the bottle is empty")
     ended = replace(small, supply=replace(small.supply, ending=ending))
     monkeypatch.setitem(unwrap(compare_walks).__globals__, "walk", lambda *_, **__: ended)
-    with pytest.raises(SimulationError, match=r"ends after 3\.1 s, in its first 5 strides \(the bottle is empty\)"):
+    with pytest.raises(SimulationError, match=r"ends after 3\.1 s, within the first 5 strides \(the bottle is empty\)"):
         compare_walks(small.scenario)

@@ -46,7 +46,7 @@ def named_gas_uses(uses: Sequence[GasUse]) -> dict[str, GasUse]:
     named: dict[str, GasUse] = {}
     for use in uses:
         if any(use is other or (isinstance(use, str | Path) and str(use) == str(other)) for other in named.values()):
-            raise ParameterError("the same recording is given twice")
+            raise ParameterError("the same recording is given twice; give each recording only once")
         if isinstance(use, Recording):
             label = use.label
         else:
@@ -76,8 +76,9 @@ def endurance_of_gas_use(
             species = override.text if override.text in SPECIES else "NAME"
             again = override_text([f"{SPECIES_PATH}={species}"])
             raise ParameterError(
-                f"override '{override}': a bottle has no value '{override.typed}'; its gas is set in the bottle file, "
-                f"the gas of the device in the scenario: repeat the run of {name} with {again} and give its folder"
+                f"override '{override}': a bottle has no value '{override.typed}'; the gas of a bottle is set in the "
+                f"bottle file, the gas of the device in the scenario: to change it, repeat the run of {name} with "
+                f"{again} and give the new result folder"
             )
     gas = walk_gas(use) if isinstance(use, WalkResult) else None
     if isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
@@ -102,9 +103,9 @@ def endurance_of_gas_use(
         molar_mass, fluid = gas_data.get("molar_mass") if isinstance(gas_data, dict) else None, full.fluid.name
         if isinstance(molar_mass, float) and not is_of_bottle(molar_mass, full):
             raise DataError(
-                f"{run}: the device uses gas of {1000.0 * molar_mass:.4g} g/mol, but bottle '{full.name}' "
-                f"contains {fluid}; choose a bottle of that gas (ppafo bottle --list), or simulate with "
-                f"gas.species={fluid}"
+                f"{run}: the device uses gas of {1000.0 * molar_mass:.4g} g/mol, but bottle '{full.name}' contains "
+                f"{fluid}; choose a bottle with the gas of the device (ppafo bottle --list), or simulate the device "
+                f"with gas.species={fluid}"
             )
     endurance = follow_bottle(full, demand_of_recording(recording, stride_time), schedule)
     return replace(endurance, is_of_recording=stride_time is None, device_units=units)

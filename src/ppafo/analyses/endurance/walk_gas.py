@@ -143,7 +143,7 @@ def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
     source, name = configuration.get("file"), str(configuration.get("name", "walk"))
     with refused_as(DataError, f"{file}: the walk cannot be repeated", PpafoError):
         if not (isinstance(content, dict) and isinstance(overrides, list) and isinstance(source, str | None)):
-            raise DataError("'configuration' has no [motion] of a walk")
+            raise DataError("'configuration' does not describe a walk; repeat the walk with 'ppafo walk'")
         folder = Path() if source is None else Path(source).parent
         changes = read_overrides(map(str, overrides), ScenarioError)
         return scenario_of(ScenarioRequest(name, source, folder, content, changes), WALKING)

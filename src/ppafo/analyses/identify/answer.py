@@ -115,7 +115,9 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
     Both recordings have the same times.
     """
     if not np.array_equal(measurement.time, model.time):
-        raise DataError(f"{model.label}: its times differ from the times of {measurement.label}")
+        raise DataError(
+            f"{model.label}: its times differ from {measurement.label}; give both recordings the same times"
+        )
     panels: list[Panel] = []
     for name in (name for name in _CHANNELS if name in measurement):
         kind, style = _CHANNELS[name]

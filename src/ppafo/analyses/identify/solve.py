@@ -140,7 +140,7 @@ def _sources(
     """
     atmosphere = atmospheric_pressure(parameter_set)
     if path.is_dir():
-        raise IdentificationError(f"{path}: is a folder and cannot be hashed; give the recording in the folder")
+        raise IdentificationError(f"{path}: is a folder, not a recording; give the recording in the folder")
     is_text = path.suffix.lower() in TEXT_SUFFIXES and not (path.parent / RUN_FILE).exists()
     if columns is None and row_time is not None and is_text:
         return (source_of(path, read_csv(path, atmosphere=atmosphere, row_time=row_time)),)

@@ -80,8 +80,8 @@ def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], 
     rows = {name: float(outcome.states[row, 0]) for name, row in state_row_numbers(run).items()}
     if rows["result.failure_time"] < NEVER_FAILED or not all(map(np.isfinite, rows.values())):
         raise SimulationError(
-            f"{scenario.name}: the run diverges before {steps * run.step:g} s; give an earlier "
-            f"{argument_text('at')}, and see 'ppafo simulate'"
+            f"{scenario.name}: the run diverges before {steps * run.step:g} s; give an earlier {argument_text('at')}, "
+            "or see the cause with 'ppafo simulate'"
         )
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
     if run.program.angle is not None:

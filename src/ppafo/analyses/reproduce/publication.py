@@ -53,7 +53,8 @@ def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
     result = walk(load_walk(name, overrides), minutes=MINUTES)
     if not (result.status.is_completed and result.is_helped):
         raise SimulationError(
-            f"walk '{name}' is no evidence for a claim, which needs assistance in most strides: {result.status.message}"
+            f"walk '{name}' cannot be used for a claim, which needs a complete walk with assistance in most strides: "
+            f"{result.status.message}"
         )
     return result
 
@@ -184,7 +185,9 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> _PublishedClaim:
     # What is published has to agree with itself: else the range was typed wrongly.
     if entry.published is not None and not low <= entry.published <= high:
         name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
-        raise ScenarioError(f"{where}: published = {entry.published:g} is outside {name} = {limit:g}; widen the range")
+        raise ScenarioError(
+            f"{where}: published = {entry.published:g} is not within {name} = {limit:g}; widen the range"
+        )
     computation = COMPUTATIONS[entry.computation]
     with refused_as(ScenarioError, f"{where}.unit", UnitError):
         # Only for what it raises: here the place in the file is known.

@@ -92,7 +92,7 @@ def sensitivity(
     by = METHODS[method or ("sobol" if used.scores is None else "shapley")]
     requested = tuple(metrics) or chosen.outputs.metrics
     if not requested:
-        raise StudyError(f"study '{chosen.name}' stores no metric; name the metric to analyse")
+        raise StudyError(f"the outputs of study '{chosen.name}' have no metric; name the metric to analyse")
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
     settings = SensitivitySettings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
     tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)

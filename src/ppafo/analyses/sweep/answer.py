@@ -210,5 +210,7 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     has_same_names = names == described.configurations.keys() == described.completed_by_configuration.keys()
     metrics = document["metrics"].keys()
     if not has_same_names or any(table.keys() != metrics for table in described.configurations.values()):
-        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}; run the study again")
+        raise DataError(
+            f"{whose}: the configurations and metrics are not the same as in {MANIFEST}; run the study again"
+        )
     return finding_of(StudyResults(stored, document, summary))

@@ -396,13 +396,14 @@ def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario:
         uncertainty = uncertainty_of(study).with_noise_of([scenario])
         if study.only:
             raise StudyError(
-                f"'{next(iter(study.only))}' varies only in some configurations of the study; choose a study "
-                "without 'only'"
+                f"'{next(iter(study.only))}' varies only in some configurations of the study, but must vary in all of "
+                "them; choose a study whose [[vary]] tables have no 'only'"
             )
     both = next((path for path in uncertainty.paths if path in searched), None)
     if both is not None:
         raise StudyError(
-            f"robust: study '{study.name}' draws '{both}', which is also searched; omit its [[vary]] or [[search]]"
+            f"robust: study '{study.name}' draws '{both}', which is also searched; omit the [[vary]] or the [[search]] "
+            f"of '{both}'"
         )
     share = robust.share if robust.measure == "quantile" else None
     return Spread(uncertainty, study.name, robust.draws, study.sample.seed, robust.deviations, share)

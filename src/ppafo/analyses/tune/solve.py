@@ -296,8 +296,8 @@ def _scales(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
             scale = abs(float(problem.bad_end(before.judged[goal.metric], goal.weight > 0.0)[0]))
         if not np.isfinite(scale) or scale == 0.0:
             raise StudyError(
-                f"tuning '{problem.name}': objective '{goal.metric}' is {scale:g} before tuning and cannot serve "
-                "as scale; set scale = 'VALUE UNIT'"
+                f"tuning '{problem.name}': objective '{goal.metric}' is {scale:g} before tuning, which cannot be its "
+                "scale; set scale = 'VALUE UNIT' in this objective"
             )
         scales[goal.metric] = scale
     return scales

@@ -70,7 +70,7 @@ def rig_record(
     >>> rig_record(port="udp:127.0.0.1:49317", patience=0.2, out=Path("bench.csv"))  # no bench sends there
     Traceback (most recent call last):
     ...
-    ppafo.errors.DataError: no sample received within 0.2 s; received: nothing
+    ppafo.errors.DataError: no sample arrived within 0.2 s; received: nothing; check the connection and the sender
     """
     from ppafo.cli import output
     from ppafo.errors import DataError

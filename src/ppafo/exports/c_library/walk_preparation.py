@@ -81,8 +81,8 @@ def check_can_be_exported(configuration: Scenario) -> None:
         )
     if walk_of(configuration).bottle is not None:
         raise ScenarioError(
-            f"{configuration.name}: a walk with a bottle cannot be exported, because Python steps bottle and "
-            "device in turn; omit the bottle, or add [supply_line]"
+            f"{configuration.name}: a walk with a bottle cannot be exported, because only Python computes bottle and "
+            "device together, step by step; omit the bottle, or add [supply_line]"
         )
 
 

@@ -67,7 +67,7 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
         if done.returncode != 0:
             raise ProgramError(f"{command[0]} failed to build the library for {name}: {complaint(done)}")
         if not library.is_file():
-            raise ProgramError(f"{command[0]} returned 0 but produced no library for {name}; {_REMEDY}")
+            raise ProgramError(f"{command[0]} reported success but wrote no library for {name}; {_REMEDY}")
         return library.read_bytes()
 
 

@@ -286,7 +286,9 @@ def record(
             raise KeyboardInterrupt("interrupted before the first sample; no file was written")
         others = [*collector.ignored.items(), ("from another sender", port.strangers)]
         came = wire.described_refusals(reader.refused, others)
-        raise DataError(f"no sample received within {patience:g} s; received: {came}")
+        raise DataError(
+            f"no sample arrived within {patience:g} s; received: {came}; check the connection and the sender"
+        )
     recording, lost = collector.recording(label)
     return CollectedRecording(recording, lost, reader.refused, collector.ignored, port.strangers, ended, is_stopped())
 

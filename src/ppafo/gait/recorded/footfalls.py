@@ -188,8 +188,8 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
         middle = first + (lowest - first) // 2
         if lowest - middle < 2 or smooth.values[lowest] > _DEEPEST:
             raise DataError(
-                f"{shank.file}: no toe-off was found: the shank does not lean back before the swing after "
-                f"{smooth.time[first]:g} s; give a vertical force, or correct the sign of the shank angle"
+                f"{shank.file}: no toe-off was found: after {smooth.time[first]:g} s, the shank does not lean forward "
+                "far enough before the swing; give a vertical force, or correct the sign of the shank angle"
             )
         off = middle + int(np.argmin(rate[middle:lowest]))
         strides.append(Stride(*(float(smooth.time[sample]) for sample in (first, off, last))))

@@ -223,11 +223,11 @@ def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[
         filled = f"fill the gaps ({setting_text('longest_gap', needed, f'{needed:g} s')})"
         remedy = filled if needed <= LONGEST_FILLED else f"the longest gap of {longest:.3g} s cannot be filled"
         raise DataError(
-            f"{walk['shank_angle'].file}: has {count} without missing samples, at least {least} are needed; "
+            f"{walk['shank_angle'].file}: has {count} without missing samples, but at least {least} are needed; "
             f"{remedy}{(', give' if fewer else ', or give')} a longer recording{fewer}"
         )
     raise DataError(
-        f"{walk['shank_angle'].file}: has {count} covered by both angles and events ({events}; {spans}), at least "
+        f"{walk['shank_angle'].file}: has {count} covered by both angles and events ({events}; {spans}), but at least "
         f"{least} are needed; give a longer recording{fewer}"
     )
 

@@ -72,7 +72,7 @@ def cut_table(
     rejected.
     """
     if table.time.size < 3:
-        raise DataError(f"{table.file}: has only {table.time.size} rows; a stride needs several tens")
+        raise DataError(f"{table.file}: has only {table.time.size} rows, too few for a stride; give a longer recording")
     low = float(table.time[0] if start is None else start)
     high = float(table.time[-1] if end is None else end)
     steps = np.diff(table.time)

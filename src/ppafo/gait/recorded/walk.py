@@ -157,9 +157,9 @@ def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -
     # Less than a tenth of a second of flat foot may be a pause of the swing.
     if np.count_nonzero(flat) < _LEAST_FLAT * recorded.rate:
         raise DataError(
-            f"{columns.table.file}: the neutral ankle angle is unknown, because the line from {mapped.heel!r} to "
-            f"{mapped.toe!r} never rests while the shank leans forward; give the angle in ankle_angle.terms of a "
-            "gait map"
+            f"{columns.table.file}: the neutral ankle angle is unknown, because the foot (from {mapped.heel!r} to "
+            f"{mapped.toe!r}) is never at rest while the shank leans forward; give columns of the ankle angle in "
+            "ankle_angle.terms of a gait map"
         )
     sign, neutral = mapped.sign_and_neutral()
     angle = _RIGHT_ANGLE + lean - (values - float(np.median(values[flat]))) - sign * neutral
@@ -199,7 +199,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
         leans = float(np.nanmax(lean) - np.nanmin(lean))
     if leans >= low:
         raise DataError(
-            f"{message}, but of {leans:.2g} deg along {across}; change shank_angle.forward = {mapped.forward!r} to the "
-            f"walking direction, {across!r} or '-{across}', in a gait map, also for ankle_angle"
+            f"{message}, but of {leans:.2g} deg along {across}; in a gait map, replace shank_angle.forward = "
+            f"{mapped.forward!r} by the walking direction, {across!r} or '-{across}', also for ankle_angle"
         )
     raise DataError(f"{message}: give a recording of walking")

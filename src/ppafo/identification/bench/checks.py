@@ -45,9 +45,15 @@ def check_sources(
                 zero = ' (at atmospheric pressure: { constant = "0 kPa_g" })' if known.unit == "Pa" else ""
                 derived = ', or derive it: direction.of = "pressure_difference", with a threshold and a window'
                 raise IdentificationError(
+<<<<<<< HEAD
+                    f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; the "
+                    f"file has {', '.join(recording.names) or 'only time'}; a column map can assign a column to "
+                    f"'{name}'{derived if name == 'direction' else ''}"
+=======
                     f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
                     f"the file has {', '.join(recording.names) or 'only time'}; a column map can assign it{zero}"
                     f"{derived if name == 'direction' else ''}"
+>>>>>>> round
                 )
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
             worst = int(np.argmax(np.abs(values)))
@@ -68,7 +74,8 @@ def check_sources(
             if recording[name][low] <= 0.0:
                 raise IdentificationError(
                     f"{source.name}: {procedure}: '{name}' is {source.shown(name, recording[name][low])} at sample "
-                    f"{low + 1}, which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
+                    f"{low + 1}, which is impossible for an absolute pressure; give gauge pressures in psi_g, bar_g or "
+                    "kPa_g"
                 )
             check_not_alone(source, procedure, name)
 
@@ -117,7 +124,7 @@ def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> in
     gap = longest_gap(part.time)
     if gap is not None:
         raise IdentificationError(
-            f"{source.name}: {procedure}: gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s "
-            f"(sample {skipped + gap.index + 1}); give start or end to exclude the gap"
+            f"{source.name}: {procedure}: gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s (sample "
+            f"{skipped + gap.index + 1}); give a start or an end that excludes the gap"
         )
     return skipped

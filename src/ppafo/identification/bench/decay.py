@@ -68,8 +68,9 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     last = first + int(back[0]) if back.size else part.time.size
     if last - first < MINIMUM_SAMPLES:
         raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: only {last - first} samples lie between the highest speed and the end or the "
-            f"first reversal, {MINIMUM_SAMPLES} are needed; record longer, or give start and end"
+            f"{source.name}: {PROCEDURE}: only {last - first} samples lie between the highest speed and the first "
+            f"reversal (or the end), but {MINIMUM_SAMPLES} are needed; record longer, or give a start and an end of "
+            "the decay"
         )
     rows = slice(first, last)
     angle = part[ANGLE][rows]
@@ -78,8 +79,8 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
         if is_at_limit(angle, plateau):
             raise IdentificationError(
                 f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
-                f"{plateau.count} samples, from sample {before + plateau.first + 1}, and was still moving "
-                f"before: the sensor is saturated or the vane is at a stop; give end"
+                f"{plateau.count} samples, from sample {before + plateau.first + 1}, although the vane still moved "
+                "before: the sensor is saturated or the vane is at a stop; give an end before this sample"
             )
     time, velocity = part.time[rows], None
     if VELOCITY in part:

@@ -80,9 +80,9 @@ def open_valve_flow(
     upstream, flow, ratio = readings.upstream, readings.flow, readings.downstream / readings.upstream
     if law == "iso6358" and (np.ptp(ratio) < _SPAN or ratio.max() < _SUBSONIC):
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow: pressure ratios over a range "
-            f"of at least {_SPAN:g} and above {_SUBSONIC:g}, not {ratio.min():.3g} to {ratio.max():.3g}; "
-            "measure more pressures, or check the units of the pressures"
+            f"{sources[0].name}: {PROCEDURE}: C and b need readings with choked and with subsonic flow: the pressure "
+            f"ratios must cover a range of at least {_SPAN:g} and reach {_SUBSONIC:g}, but lie between "
+            f"{ratio.min():.3g} and {ratio.max():.3g}; measure at more pressures, or check the units of the pressures"
         )
     # Beside a laminar gap the critical ratio decides whether the opening is an orifice.
     opening = Opening(gas, law, area or 1.0, critical_ratio if law == "both" else None)

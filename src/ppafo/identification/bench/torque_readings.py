@@ -152,8 +152,8 @@ def _check_separable(
         why = f"{percentage(_SAME_LEVEL, 2)} of the highest" if width > zero_of_pressure else "[bench] zero_of_pressure"
         raise IdentificationError(
             f"{', '.join(source.name for source in sources)}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} "
-            f"different pressures or more, not {levels}; pressures closer than {shown:.3g} {unit} ({why}) are one: "
-            "add recordings at other pressures"
+            f"different pressures or more, not {levels}; pressures closer than {shown:.3g} {unit} ({why}) count as "
+            "one: add recordings at other pressures"
         )
 
 

@@ -163,8 +163,8 @@ def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, areas: Floats, 
     half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())
     if not half > 0.0:
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the valve has more than half of its largest flow at command 0; check the "
-            "zero of channel 'command', or leave that reading out"
+            f"{sources[0].name}: {PROCEDURE}: at command 0, the valve has more than half of its largest flow; check "
+            "the zero of channel 'command', or omit the reading at command 0"
         )
     shut = size[np.abs(areas) < _SHUT * largest]
     # Inside the bounds, so that the search can go either way.
@@ -237,11 +237,14 @@ def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> F
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", drivers, np.ones(sweep.flow.size, dtype=bool))
     shape = np.abs(orifice_shape(sweep.upstream, sweep.downstream, gas.heat_capacity_ratio))
     if not shape.any():
-        raise IdentificationError(f"{sources[0].name}: {PROCEDURE}: both pressures are equal in all readings")
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE}: both pressures are equal in all readings, so nothing drives a flow; "
+            "check the pressure channels"
+        )
     areas = np.where(shape > 0.0, sweep.flow / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
     if float(sweep.command @ areas) <= 0.0:
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: flow into chamber 1 falls with the command; "
-            f"reverse the sign of 'mass_flow' or 'command'"
+            f"{sources[0].name}: {PROCEDURE}: the flow into chamber 1 falls as the command rises; reverse the sign of "
+            "'mass_flow' or 'command'"
         )
     return np.asarray(areas)

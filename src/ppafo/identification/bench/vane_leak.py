@@ -62,7 +62,7 @@ _START, _RELAXED_BY = "start of {}, decay {}", "relaxation of {}, decay {}"
 """Names of the variables for initial pressure [Pa] and relative error after filling [-], by channel and decay."""
 _RELAXED, _MOST_RELAXED = 5.0, 0.02
 """Usual ratio of recording length to relaxation time [-], and largest relative pressure error from relaxation [-]."""
-_REMEDY = "{}, or give start and end; gas may leak elsewhere, or exchange heat with the walls"
+_REMEDY = "{}, or give a start and an end; gas may leak elsewhere, or exchange heat with the walls"
 
 
 def vane_leak(
@@ -228,8 +228,8 @@ def closed_chambers(source: RecordingSource, start: float | None, end: float | N
             if plateau.first < EDGE and stands_out(part[name], plateau):
                 raise IdentificationError(
                     f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
-                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and changes only then: the "
-                    f"sensor is saturated, or the chamber was not yet closed; give start"
+                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and changes only afterwards: "
+                    "the sensor is saturated, or the chamber was not yet closed; give a start after this sample"
                 )
     pair = part["pressure_1"], part["pressure_2"]
     edge = max(1, min(EDGE, len(part) // 10))
@@ -241,8 +241,9 @@ def closed_chambers(source: RecordingSource, start: float | None, end: float | N
     last = int(low[0]) if low.size else difference.size
     if last < MINIMUM_SAMPLES:
         raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: only {last} samples lie between start and equal pressures, "
-            f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
+            f"{source.name}: {PROCEDURE}: only {last} samples lie between the start and equal pressures, but "
+            f"{MINIMUM_SAMPLES} are needed; record at a higher sample rate, or give a start at which the pressures "
+            "differ"
         )
     time = part.time[:last] - part.time[0]
     return _ClosedChambers(time=time, first=first[:last], second=second[:last], fuller=fuller, number=number)

@@ -88,7 +88,7 @@ def check_experiment(experiment: FittedExperiment) -> None:
     for name, use in (*((name, "") for name in experiment.channels), *((name, " to follow") for name in inputs)):
         if name not in recording:
             have = ", ".join(recording.names)
-            raise IdentificationError(f"{where}: {recording.label} has no channel '{name}'{use}; it has {have}")
+            raise IdentificationError(f"{where}: {recording.label} has no channel '{name}'{use}; available: {have}")
     scenario, has_torque = experiment.scenario, EXTERNAL_TORQUE in inputs
     motion, follows = vane_motion(scenario), {ANGLE} & set(inputs) & set(experiment.channels)
     is_python = scenario.controller.is_outside and COMMAND not in inputs
@@ -152,8 +152,8 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
     before = recording.time <= experiment.start + _FITS
     if not before.any():
         raise IdentificationError(
-            f"{where}: {recording.label} has no sample up to {experiment.start:g} s for the initial state; "
-            "give a later start"
+            f"{where}: {recording.label} has no sample at or before {experiment.start:g} s, from which the initial "
+            "state is read; give a later start"
         )
     time = recording.time[before]
     rest = {name: value_at_rest(time, recording[name][before], at_end=True) for name in recording.names}

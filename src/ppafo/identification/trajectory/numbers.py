@@ -166,8 +166,8 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     paths = {full_path(parameter.path, scenario) for scenario in scenarios}
     if len(paths) > 1:
         raise IdentificationError(
-            f"{parameter.path} refers to {' and '.join(sorted(paths))} in these experiments; give one of these "
-            "paths, with its recordings"
+            f"{parameter.path} refers to {' and '.join(sorted(paths))} in these experiments and cannot be fitted as "
+            "one parameter; give one of these paths, and in recordings the experiments that have it"
         )
     path = paths.pop()
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]
@@ -180,7 +180,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
         if channel in experiment.inputs:
             raise IdentificationError(
                 f"{parameter.name}: the run of experiment '{experiment.label}' uses the recorded '{channel}', so this "
-                "parameter has no effect; omit the parameter or the input"
+                f"parameter has no effect; omit the parameter, or remove '{channel}' from the inputs"
             )
     start = parameter.start
     if start is None:

@@ -54,4 +54,4 @@ def _refuse_twice(kind: str, names: list[str]) -> None:
     """Raise IdentificationError for a duplicated name; ``kind`` is the noun for the message."""
     twice = first_twice(names)
     if twice is not None:
-        raise IdentificationError(f"{kind} '{twice}' is named twice")
+        raise IdentificationError(f"{kind} '{twice}' is given twice; rename or remove one of the two")

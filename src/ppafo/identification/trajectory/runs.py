@@ -94,8 +94,8 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
     time = np.maximum(recording.time[inside] - experiment.start, 0.0)
     if time.size < MINIMUM_SAMPLES:
         raise IdentificationError(
-            f"{where}: {recording.label} has {time.size} samples after {experiment.start:g} s, "
-            f"but needs at least {MINIMUM_SAMPLES}"
+            f"{where}: {recording.label} has {time.size} samples from the start at {experiment.start:g} s on, but "
+            f"needs at least {MINIMUM_SAMPLES}; give an earlier start or a longer recording"
         )
     channels = [
         FitChannel(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
@@ -282,8 +282,8 @@ def run_with(prepared: _PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
             )
     if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(
-            f"{where}: the fit switched an effect on or off, which changes the model; give a start and a lower "
-            "bound above 0"
+            f"{where}: the fit changed a parameter of an effect to or from 0, which changes the model; give this "
+            "parameter a start and a lower bound above 0"
         )
     planned, _ = scenario.motion.motion_kind.plan(scenario)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.

@@ -197,9 +197,9 @@ def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:
             # run of it.
             if port in last and not any(law.__globals__.get(name) is port for name in law.__code__.co_names):
                 raise ProgramError(
-                    f"effects '{last[port].name}' and '{effect.name}' both act on {port.__name__}, but "
-                    f"{law.__name__} of '{effect.name}' ignores the first: call {port.__name__} in it, or switch one "
-                    "of the two effects off"
+                    f"effects '{last[port].name}' and '{effect.name}' both act on {port.__name__}, but {law.__name__} "
+                    f"of '{effect.name}' does not call {port.__name__}, so effect '{last[port].name}' would be lost; "
+                    f"call {port.__name__} in {law.__name__}, or switch one of the two effects off"
                 )
             # A law that calls its port gets what stood there before it.
             found[law, port] = found.get(port, port)

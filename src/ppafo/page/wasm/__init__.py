@@ -246,7 +246,7 @@ def build(text: str) -> bytes:
         if done.returncode != 0:
             raise ProgramError(f"ziglang failed to build the WebAssembly module: {complaint(done)}")
         if not made.is_file():
-            raise ProgramError("ziglang returned 0 but produced no module")
+            raise ProgramError("ziglang reported success but wrote no WebAssembly module; reinstall ziglang")
         return made.read_bytes()
 
 

@@ -274,7 +274,7 @@ def _part(file: str, group: str, name: str, parsed: Any, wrong: list[PpafoError]
     for key in parsed.unknown:
         if key not in declared:
             hint = nearest_name(key, declared)
-            text = f"there is no figure '{key}'{hint}; available: {', '.join(declared)}"
+            text = f"there is no value '{key}'{hint}; available: {', '.join(declared)}"
             wrong.append(ParameterError(f"{where}.unknown: {text}"))
         if key in figures:
             wrong.append(ParameterError(f"{where}.unknown: '{key}' has a value in this part; omit it from unknown"))
@@ -288,7 +288,7 @@ def _part(file: str, group: str, name: str, parsed: Any, wrong: list[PpafoError]
         shown = f"{where}.{key} = {figure.value:g} {figure.unit}"
         # A guess without its reason cannot be checked by the next reader.
         if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
-            reason = f"give the reason for a figure with origin '{figure.origin}'"
+            reason = f"give the reason for a value with origin '{figure.origin}'"
             wrong.append(ParameterError(f"{where}.{key}.note is missing; {reason}"))
         # Data sheets give gauge pressures at sea level.
         with noted_in(wrong):

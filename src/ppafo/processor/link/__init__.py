@@ -20,7 +20,8 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
     period = round(scenario.controller.period * MICROSECONDS)
     if abs(period / MICROSECONDS - scenario.controller.period) > 1.0e-9 * scenario.controller.period:
         raise ScenarioError(
-            f"{scenario.name}: controller.period = {scenario.controller.period:.9g} s: must be whole microseconds"
+            f"{scenario.name}: controller.period = {scenario.controller.period:.9g} s: must be a whole number of "
+            "microseconds"
         )
     source = scenario.origin.file or scenario.name
     settings = (word for override in scenario.origin.overrides for word in ("--set", override))

@@ -84,9 +84,9 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
             # Declared are the numbers of both forms: those of the device's own are left.
             own = [f"{section}.{quantity.name}" for quantity in ORIFICE]
             raise ScenarioError(
-                f"{base.name}: the device has {' and '.join(path for path in own if path not in form)}; to vary "
-                f"{' or '.join(path for path in form if path in values)} instead, vary {' and '.join(missing)} too, or "
-                f"set {' and '.join(form)} first"
+                f"{base.name}: the device is given by {' and '.join(path for path in own if path not in form)}; to "
+                f"vary {' or '.join(path for path in form if path in values)} instead, also vary "
+                f"{' and '.join(missing)}, or first set {' and '.join(form)}"
             )
     # An adiabatic scenario need not say its area, and runs that take up heat would go on as if they had none.
     gas, heat_varies = base.gas_model, "gas_model.heat_transfer_coefficient" in values

@@ -160,8 +160,8 @@ def _meter_batch(plain: Batch, members: Members, request: OutputRequest) -> _Met
     # Runs of one batch may have other steps, but traces are rows of one array.
     if request.bands and np.abs(stride * interval - request.every).max() > _SAME_INTERVAL * request.every:
         raise ScenarioError(
-            f"traces every {request.every:.6g} s: must be a multiple of run.output_interval in every run, not only of "
-            f"{interval.max():.6g} s; change run.output_interval"
+            f"traces every {request.every:.6g} s need one run.output_interval for all runs, a divisor of "
+            f"{request.every:.6g} s, not {interval.min():.6g} to {interval.max():.6g} s; change run.output_interval"
         )
     traced = sorted({*read_from_traces, *request.bands})
     # Bands alone need the samples at which they are shown, metrics of traces every one.

@@ -54,5 +54,5 @@ def check_absolute(recording: Recording, atmosphere: float, file: str) -> None:
         if recording[name][lowest] < _SMALLEST_ABSOLUTE * atmosphere:
             raise DataError(
                 f"{file}: '{name}' is {recording[name][lowest]:.6g} Pa absolute at {recording.time[lowest]:.6g} s "
-                f"(sample {lowest + 1}), far below the atmosphere; is it a gauge pressure ('{name} [psi_g]')?"
+                f"(sample {lowest + 1}), far below atmospheric pressure; is it a gauge pressure ('{name} [psi_g]')?"
             )

@@ -61,7 +61,7 @@ def start_of(
         if name not in values and name in recording:
             values[name] = value_at_rest(recording.time[:count], recording[name][:count])
         elif name in remedies and name not in values:
-            raise DataError(f"{file}: there is no channel '{name}' to start from; {remedies[name]}")
+            raise DataError(f"{file}: there is no channel '{name}' for the initial state; {remedies[name]}")
     angle = float(between_stops(np.array([values[ANGLE]]), device, file)[0])
     return ReplayStart(angle, values.get("angular_velocity", 0.0), values["pressure_1"], values["pressure_2"])
 

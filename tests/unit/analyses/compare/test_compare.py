@@ -211,7 +211,9 @@ def test_an_override_that_one_configuration_lacks_names_it_and_the_way_to_anothe
         compare(given, overrides=["controller.proportional_gain=1 1/(N m)"])
     assert str(caught.value).startswith("configuration 'torque-task-solenoid': override 'controller.proportional_gain")
     assert "did you mean" not in str(caught.value)
-    assert "for 'torque-task-proportional' alone: overrides=['torque-task-proportional:PATH=" in str(caught.value)
+    assert "to change only 'torque-task-proportional', give overrides=['torque-task-proportional:PATH=" in str(
+        caught.value
+    )
     with pytest.raises(StudyError, match="there is no configuration 'solenoid', did you mean 'torque-task-solenoid'"):
         compare(given, overrides=["solenoid:valve.area=5 mm^2"])
 

@@ -272,9 +272,9 @@ def test_a_run_that_follows_is_a_condition_of_its_own(tmp_path: Path) -> None:
 def test_a_number_of_the_other_form_of_an_orifice_names_the_form_and_the_scenario_once() -> None:
     """The cylinder's valve is given by a sonic conductance."""
     message = (
-        r"^cylinder-servo: the device has valve\.sonic_conductance and valve\.critical_ratio; "
+        r"^cylinder-servo: the device is given by valve\.sonic_conductance and valve\.critical_ratio; "
         r"to vary valve\.area instead, "
-        r"vary valve\.discharge_coefficient too, or set valve\.area and valve\.discharge_coefficient first$"
+        r"also vary valve\.discharge_coefficient, or first set valve\.area and valve\.discharge_coefficient$"
     )
     with pytest.raises(StudyError, match=message):
         find("cylinder-servo", vary="valve.area=1..5 mm^2", such_that="rms_angle_error <= 3 deg", grid=3)

@@ -308,7 +308,7 @@ def test_a_study_whose_draws_were_changed_in_python_is_refused(small_results: St
 
 
 def test_a_foreign_or_newer_manifest_is_refused(small: Any, tmp_path: Path) -> None:
-    for text, expected in (("{}", "is not a manifest of study results"), ("{", "cannot be read")):
+    for text, expected in (("{}", "does not describe a study; choose the folder of a study"), ("{", "cannot be read")):
         (tmp_path / "study.json").write_text(text, encoding="utf-8")
         with pytest.raises(DataError, match=expected):
             sweep(small, out=tmp_path)
@@ -325,7 +325,7 @@ def test_more_disk_than_there_is_is_refused_before_anything_is_written(
 
 def test_a_large_study_asks_for_consent(small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store, "ASKED_ABOVE", 1000)
-    with pytest.raises(StudyError, match="give agreed to start it anyway"):
+    with pytest.raises(StudyError, match="give agreed to start the study"):
         sweep(small, out=tmp_path / "out")
     assert sweep(small, out=tmp_path / "out", agreed=True).found.summary["completed"] == 32
 
@@ -386,7 +386,7 @@ def test_the_log_has_a_line_for_every_session_and_nothing_else_tells_the_time(sm
 
 
 def test_results_at_an_address_are_refused(small: Any) -> None:
-    with pytest.raises(DataError, match=r"s3://bucket/study: is an address; give a folder on this computer"):
+    with pytest.raises(DataError, match=r"s3://bucket/study: is a URL; give a folder on this computer"):
         sweep(small, out="s3://bucket/study")
 
 

@@ -224,7 +224,7 @@ def test_a_file_that_makes_no_sense_is_one_line(changes: dict[str, Any], text: s
 
 def test_a_goal_that_is_zero_before_needs_a_scale() -> None:
     document = changed(objective=[{"metric": "mechanical_work"}])
-    with pytest.raises(StudyError, match="'mechanical_work' is 0 before tuning and cannot serve as scale; set"):
+    with pytest.raises(StudyError, match="'mechanical_work' is 0 before tuning, which cannot be its scale; set"):
         tune(document)
 
 

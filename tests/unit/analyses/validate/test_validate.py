@@ -190,7 +190,9 @@ def test_a_recording_given_twice_is_refused_under_another_name_too(
     for second in (copy, bench / "step.csv"):
         assert main([*SET, str(bench / "step.csv"), str(second)]) == 2
         said = capsys.readouterr().err
-        assert said == f"ppafo: {second}: the same recording as {bench / 'step.csv'}; give every recording only once\n"
+        assert (
+            said == f"ppafo: {second}: is the same recording as {bench / 'step.csv'}; give every recording only once\n"
+        )
 
 
 def test_a_small_residual_of_which_no_cause_is_known_is_a_remark_and_a_large_one_is_not(tmp_path: Path) -> None:

@@ -140,7 +140,7 @@ def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: FittedExperi
     ("name", "values", "unit", "message"),
     [
         ("command", 1.5, "-", "'command' is 1.5 at 0 s .sample 1.; it must be from -1 to 1"),
-        ("supply_pressure", 2.0e4, "Pa", "far below the atmosphere"),
+        ("supply_pressure", 2.0e4, "Pa", "far below atmospheric pressure"),
     ],
 )
 def test_an_input_that_cannot_be_is_refused(

@@ -140,8 +140,8 @@ def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
 def _profile_of_table(table: ProfileSection, where: str) -> tuple[Floats, Floats]:
     if len(table.time) != len(table.torque) or len(table.time) < 2:
         raise StudyError(
-            f"{where}: time has {len(table.time)} entries and torque {len(table.torque)}; both need the same "
-            "number, two or more"
+            f"{where}: time has {len(table.time)} entries and torque has {len(table.torque)}; both need the same "
+            "number of entries, at least two"
         )
     series = []
     for texts, unit, name in ((table.time, "s", "time"), (table.torque, _TORQUE, "torque")):
@@ -317,7 +317,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     lowest, highest = pressures
     if not atmosphere < lowest < highest:
         raise StudyError(
-            f"{file}: pressure.lowest = '{document.pressure.lowest}': must be above the atmosphere and below "
+            f"{file}: pressure.lowest = '{document.pressure.lowest}': must be above atmospheric pressure and below "
             f"pressure.highest = '{document.pressure.highest}'"
         )
     use = document.use

@@ -52,8 +52,8 @@ def shelf_of(catalogue: str | Path) -> AvailableParts:
     groups["valves"] = {name: part for name, part in groups["valves"].items() if part.kind in WALKS}
     if not groups["valves"]:
         raise StudyError(
-            f"{argument_text('catalogue', str(catalogue))}: has no valve that a walk supports; "
-            f"supported kinds: {', '.join(WALKS)}"
+            f"{argument_text('catalogue', str(catalogue))}: has no valve that can be used in a walk; supported kinds: "
+            f"{', '.join(WALKS)}"
         )
     is_own = Path(catalogue).suffix == ".toml"
     return AvailableParts(

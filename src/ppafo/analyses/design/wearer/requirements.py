@@ -109,7 +109,7 @@ def check_requirements(requirements: DesignRequirements) -> None:
         if not (low or 0.0) <= value <= (high or 0.0)
     }
     if not requirements.pressure > STANDARD_ATMOSPHERE:
-        problems["pressure"] = " must be above the atmosphere, for example '50 psi_g'"
+        problems["pressure"] = " must be above atmospheric pressure, for example '50 psi_g'"
     if not 0.0 < requirements.torque < _STRONGEST:
         text, most = TORQUE.text(requirements.torque), TORQUE.text(_STRONGEST)
         problems["torque"] = f" {text}: must be above 0 and below {most}"

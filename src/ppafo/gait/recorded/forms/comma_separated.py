@@ -34,7 +34,7 @@ def _recognises(path: str | Path) -> bool:
 def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of the package's column names and signs; raises DataError for a left foot."""
     if side != "right":
-        raise DataError(f"a CSV file without a gait map has one foot, read as right; omit {setting_text('side')}")
+        raise DataError(f"a CSV file without a gait map is read as the right foot; omit {setting_text('side')}")
     return Convention(package_map())
 
 
@@ -69,9 +69,9 @@ def read_plain_csv(path: str | Path) -> MotionTable:
         at = 0
     if names[at].lower() not in _TIMES:
         raise DataError(
-            f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; give at "
-            "least two strides over time, with shank and ankle angle, instead of one mean stride over percent of the "
-            f"stride; loads also need {setting_text('body_mass')}"
+            f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; a mean stride "
+            "over percent of the stride cannot be read: give at least two strides over time, with shank and ankle "
+            f"angle; loads also need {setting_text('body_mass')}"
         )
     if "" in names[at:]:
         raise DataError(f"{path}: a column has no name; name every column")

@@ -251,7 +251,7 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
         known = ", ".join(repr(unit) for unit in _FACTORS[kind])
         raise DataError(
             f"{table.file}: column {name!r} reaches {peak:.4g} ({stated or 'no unit'}), which is implausible for a "
-            f"{kind} of walking; give its unit in a gait map: {known}"
+            f"{kind} in walking; give the unit of the column in a gait map: {known}"
         )
     was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file states no unit"
     return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'}, from its magnitude: {was}"]

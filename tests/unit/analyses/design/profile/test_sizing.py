@@ -276,7 +276,7 @@ def test_simulated_repetitions_are_covered_to_a_whole_sample(folder: Path) -> No
         ('"0.4 N m"', '"0 %"', "must be above 0"),
         ('time = ["0 s", "0.3 s"', 'time = ["0.1 s", "0.3 s"', "must start at '0 s' and increase"),
         ('time = ["0 s", "0.3 s"', 'time = ["0 s", "0.7 s"', "must start at '0 s' and increase"),
-        ('time = ["0 s", "0.3 s"', 'time = ["0 s"', "time has 4 entries and torque 5"),
+        ('time = ["0 s", "0.3 s"', 'time = ["0 s"', "time has 4 entries and torque has 5"),
         (
             '"4 N m", "4 N m"',
             '"0 N m", "0 N m"',
@@ -284,7 +284,7 @@ def test_simulated_repetitions_are_covered_to_a_whole_sample(folder: Path) -> No
         ),
         ('"4 N m", "4 N m"', '"4 N", "4 N m"', "unit 'N' does not fit"),
         ("[use]", 'recording = "a.csv"\n[use]', "give either a recording, or both time and torque"),
-        ("[use]", '[pressure]\nlowest = "-3 psi_g"\n[use]', "must be above the atmosphere and below"),
+        ("[use]", '[pressure]\nlowest = "-3 psi_g"\n[use]', "must be above atmospheric pressure and below"),
         ("[use]", "[usage]", "unknown key 'usage', did you mean 'use'?"),
         ("torque-task-proportional", "step-response", "scenario 'step-response' has no reference"),
         ("torque-task-proportional", "torque-task-proportionel", "there is no scenario 'torque-task-proportionel'"),
