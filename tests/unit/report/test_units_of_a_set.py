@@ -97,8 +97,12 @@ def test_the_unit_of_a_controller_setting_or_a_sensor_is_of_that_number_alone(tm
     shipped = resources.files("ppafo.scenarios").joinpath("swing-foot-angle.toml").read_text(encoding="utf-8")
     file.write_text(shipped.replace('error_limit = "2 deg"', 'error_limit = "0.035 rad"'), encoding="utf-8")
     assert ppafo.load_scenario(file).device.shown["rad"] == "deg"
-    found = ppafo.find("swing-foot-angle", vary="controller.tolerance=0.005..0.02 rad", such_that="follows", grid=3)
-    assert re.search(r"^controller.tolerance = 0.005 rad .* [\d.]+ deg there", found.said[0])
+    wave = ["motion.kind=free", "reference.kind=sine", "reference.amplitude=20 deg", "run.duration=3 s"]
+    ranged = {"vary": "controller.tolerance=0.005..0.02 rad", "such_that": "follows", "grid": 3, "overrides": wave}
+    said = ppafo.find("swing-foot-angle", **ranged).said
+    assert said[0].startswith("controller.tolerance = 0.005 rad is the lowest value")
+    assert "largest error" in said[1]
+    assert "(2 deg allowed)" in said[1]
     varied = {"path": "controller.tolerance", "kind": "list", "values": ["0.005 rad", "0.01 rad"]}
     configurations = [{"name": "foot", "scenario": "swing-foot-angle"}]
     study = load_study({"schema_version": 1, "name": "foot", "configurations": configurations, "vary": [varied]})

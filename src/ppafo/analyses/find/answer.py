@@ -129,18 +129,16 @@ def _verdict(outcome: FindResult, kind: Kind) -> str:
     if index is None:
         # The nearest one says whether a wider range could.
         row = int(np.searchsorted(tried["value"], outcome.nearest))
-        metric = "" if outcome.verdicts else f"{nearest}{of_condition.text(tried['judged'][row])} at "
-        return (
-            f"no {path} from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])} {meets}; "
-            f"the nearest is {metric}{kind.text(tried['value'][row])}"
-        )
+        there = "" if outcome.verdicts else f"{nearest}{of_condition.text(tried['judged'][row])} at "
+        ends = f"from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}"
+        return f"no {path} {ends} {meets}; the nearest is {there}{kind.text(tried['value'][row])}"
     value = float(tried["value"][index])
     # Beyond it the condition may be met by a loop that does not follow its reference.
     follows = " and follows its reference" if _not_followed(outcome) and not is_verdict else ""
     lead = f"{path} = {kind.text(value)} is the {wanted} value that {meets}{follows}"
     # Verdicts have the number that decided, in a line of their own.
-    metric = f": {condition.metric} is {of_condition.text(float(tried['metric'][index]))} there"
-    there = "" if outcome.verdicts else metric
+    number = of_condition.text(float(tried["metric"][index]))
+    there = "" if outcome.verdicts else f": {condition.metric} is {number} there"
     if neighbour is None:
         return f"{lead}, at the end of the range{there}; a wider range may have a {further} value"
     return f"{lead}{there} (bracketed to {kind.change(abs(value - neighbour), '.1g')})"

@@ -228,10 +228,6 @@ def outermost(
         return search
     value = search.nearest if index is None else float(search.tried["value"][index])
     values = [value] if neighbour is None else [value, neighbour]
-    return replace(search, verdicts=tuple((value, _verdict_at(base, path.path, value)) for value in values))
-
-
-def _verdict_at(base: Scenario, path: str, value: float) -> str:
-    """Return the verdict of ``simulate`` on the run at a value [SI], with the number that decided."""
-    result = simulate(with_overrides(base, [f"{path}={value!r} {SI}"]))
-    return result.following if result.tracking is None else result.tracking.found
+    results = [simulate(with_overrides(base, [f"{path.path}={each!r} {SI}"])) for each in values]
+    said = [result.following if result.tracking is None else result.tracking.found for result in results]
+    return replace(search, verdicts=tuple(zip(values, said, strict=True)))

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from operator import methodcaller
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -154,13 +155,8 @@ def _histogram(results: StudyResults, metric: str) -> Panel:
         for (name, values), colour in zip(values_by_name.items(), COLOURS, strict=False):
             marks.append(Mark("bars", edges, np.histogram(values, edges)[0], label=name, colour=colour))
     kind = metric_kind(results, metric)
-
-    def set_ticks(axes: "Axes") -> None:
-        axes.set_yticks([])
-        if filled and high == low:
-            axes.set_xticks(kind.values(np.array([low])))
-
-    return Panel(kind, Kind(), marks, then=set_ticks)
+    only = {"xticks": kind.values(np.array([low]))} if filled and high == low else {}
+    return Panel(kind, Kind(), marks, then=methodcaller("set", yticks=[], **only))
 
 
 def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -> Panel:

@@ -86,7 +86,7 @@ def search_panels(
     costs_of_starts.append(Mark("level", y=before.objective, label="before", colour=BLACK, style=thin))
 
     def scale(axes: "Axes") -> None:
-        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.locator_params(axis="x", integer=True)
         # Below a decade a logarithmic axis has no tick that reads as a number.
         if axes.dataLim.ymax > _DECADE * axes.dataLim.ymin > 0.0:
             axes.set_yscale("log")

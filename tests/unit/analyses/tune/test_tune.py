@@ -57,12 +57,12 @@ def test_gains_are_found_that_are_better_and_can_be_pasted() -> None:
     figure = finding.plot("search", width="84 mm")
     figure.canvas.draw()
     costs, places = figure.axes
-    legend, locator = costs.get_legend(), costs.xaxis.get_major_locator()
+    legend = costs.get_legend()
     assert legend is not None
     assert legend.get_window_extent().x1 <= figure.bbox.x1
     # Four steps from 0 to 10 would be of 2.5 generations.
-    locator.set_params(nbins=4)
-    assert all(tick == round(tick) for tick in locator.tick_values(0.0, 10.0))
+    costs.locator_params(axis="x", nbins=4)
+    assert all(tick == round(tick) for tick in costs.xaxis.get_major_locator().tick_values(0.0, 10.0))
     assert [label.get_text() for label in places.get_yticklabels()] == ["Proportional gain", "Integral gain"]
 
 
