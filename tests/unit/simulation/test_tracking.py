@@ -411,9 +411,12 @@ def test_an_angle_whose_joint_lacks_torque_is_told_the_pressure_with_which_it_fo
     assert "of the time the actuator gives all the torque that it can" in verdict.cause
     # At the crest the spring asks for 10 N m/rad times 20 deg, 3.5 N m, and the actuator has 2.2 N m.
     assert torque_reach(scenario.device, math.radians(78.0))[1] < 10.0 * math.radians(20.0)
-    changed = [text.partition("=")[0] for text in verdict.mended]
-    assert {"supply.pressure", "supply.dorsiflexion_pressure"} <= {*changed}
-    assert simulate("cylinder-servo", [*task, *verdict.mended]).tracking is None
+    # Five bar and four times the stiffness leave a fifth of the error, as a further run shows.
+    given = ast.literal_eval(re.findall(r"overrides=(\[.*?\])", verdict.tried)[0])
+    assert {text.partition("=")[0] for text in given} > {"supply.pressure", "supply.dorsiflexion_pressure"}
+    again = settled_task(scenario, simulate("cylinder-servo", [*task, *given]).recording)
+    assert again.error < 0.25 * verdict.error
+    assert f"an RMS error of {math.degrees(again.error):.3g} deg is left" in verdict.tried
 
 
 def test_a_smooth_wave_of_a_torque_has_a_limit_on_its_largest_error() -> None:

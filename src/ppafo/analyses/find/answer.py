@@ -1,6 +1,6 @@
 """Report of a threshold: sentences, a table and a figure."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,8 +62,11 @@ class Threshold:
     tried: list[FindSample]
 
 
-def finding_of(outcome: FindResult) -> Finding[Threshold]:
-    """Return a search as a finding: sentences, table of intervals that meet the condition, metric over value."""
+def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Threshold]:
+    """Return a search as a finding: sentences, table of intervals that meet the condition, metric over value.
+
+    ``overrides`` are those with which the value was searched.
+    """
     wanted = "highest" if outcome.highest else "lowest"
     path, condition, tried = outcome.path, outcome.condition, outcome.tried
     # In the unit of the range that was given.
@@ -73,7 +76,9 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
     remarks = list(_remarks(outcome, kind))
     # In more digits than are shown, so that the value that is pasted meets the condition.
-    used = "" if index is None else override_text([f"{path.path}={kind.text(float(tried['value'][index]), '.9g')}"])
+    others = [text for text in overrides if text.partition("=")[0].strip() != path.path]
+    value = "" if index is None else f"{path.path}={kind.text(float(tried['value'][index]), '.9g')}"
+    used = override_text([*others, value]) if value else ""
     return Finding(
         name="find",
         kicker="Search",

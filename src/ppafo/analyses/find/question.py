@@ -81,5 +81,6 @@ def find(
     ranged = vary.rpartition("..")[2] if vary.strip().startswith(LEVELS) else ""
     given = units_of_texts((ranged, such_that.rpartition("=")[2]))
     with shown_in({**base.device.shown, **given}):
-        found = finding_of(outermost(base, vary, such_that, highest, grid, threads, progress))
+        outcome = outermost(base, vary, such_that, highest, grid, threads, progress)
+        found = finding_of(outcome, base.origin.overrides)
         return replace(found, overrides=changes_in(base))
