@@ -102,7 +102,7 @@ def test_the_jitter_of_one_commanded_pressure_is_no_range_of_pressures() -> None
     source = planted.static()
     pressure = source.recording["pressure_difference"]
     jitter = 5.0e5 + 1.2e4 * (pressure / pressure.max())
-    with pytest.raises(IdentificationError, match=r"not 1; pressures closer than 7\.4.* psi \(10 %.*are one"):
+    with pytest.raises(IdentificationError, match=r"not 1; pressures closer than 7\.4.* psi \(10 %.*count as one"):
         static_torque((changed(source, "pressure_difference", jitter),))
 
 
