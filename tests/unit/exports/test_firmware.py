@@ -82,7 +82,7 @@ def test_a_state_with_a_wider_range_is_not_proved(name: str, low: int, high: int
 
 def test_a_state_that_may_leave_a_narrower_range_is_not_proved() -> None:
     law = FIXED_LAWS["pid_fixed_point"]
-    with pytest.raises(ProgramError, match="can leave its range"):
+    with pytest.raises(ProgramError, match="can leave its allowed range"):
         proof(replace(law, state_ranges={**law.state_ranges, "error": (-1000, 1000)}))
 
 

@@ -186,7 +186,7 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> _PublishedClaim:
     if entry.published is not None and not low <= entry.published <= high:
         name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
         raise ScenarioError(
-            f"{where}: published = {entry.published:g} is not within {name} = {limit:g}; widen the range"
+            f"{where}: published = {entry.published:g} is outside {name} = {limit:g}; widen the range"
         )
     computation = COMPUTATIONS[entry.computation]
     with refused_as(ScenarioError, f"{where}.unit", UnitError):
