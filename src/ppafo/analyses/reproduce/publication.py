@@ -185,9 +185,7 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> _PublishedClaim:
     # What is published has to agree with itself: else the range was typed wrongly.
     if entry.published is not None and not low <= entry.published <= high:
         name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
-        raise ScenarioError(
-            f"{where}: published = {entry.published:g} is outside {name} = {limit:g}; widen the range"
-        )
+        raise ScenarioError(f"{where}: published = {entry.published:g} is outside {name} = {limit:g}; widen the range")
     computation = COMPUTATIONS[entry.computation]
     with refused_as(ScenarioError, f"{where}.unit", UnitError):
         # Only for what it raises: here the place in the file is known.

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 
 _FEWEST_SAMPLES, _SAMPLES_ADVISED = 8, 100
 """Smallest number of samples of a recording for a verdict, and number of samples that a remedy gives it."""
+_QUIET = 0.2
+"""Command reversals per second at the end of a run, divided by those of the whole run, below which a loop is quiet."""
 _MOST_DOUBLINGS = 11
 """Number of durations that are looked at for a reference that rests, each twice the one before."""
 
@@ -146,6 +148,9 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
     if settled.turns and turning <= 1.0:
         per_second = settled.turns / settled.duration
     overshoots, is_of_walk = failure == "overshoots", stride_time > 0.0
+    # A loop that is quiet at the end reversed before the part whose error is stated.
+    is_over = turning > 1.0 and settled.reversals < _QUIET * per_second
+    interval = "second of the whole run" if is_over else "second"
     switches, largest = only_switches(scenario, scenario.law), float(largest_deviation(settled))
     is_within = is_task and not switches and settled.error <= largest_error(settled, switches)
     is_worst = is_within and not settled.rests and settled.worst > largest
@@ -157,7 +162,7 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         missing=settled.missing,
         moved=settled.peak if overshoots else settled.moved,
         reversals=per_second * (stride_time if is_of_walk else 1.0),
-        per="stride" if is_of_walk else "second",
+        per="stride" if is_of_walk else interval,
         cause=cause.text,
         advice=cause.advice,
         remedies=cause.remedies,
