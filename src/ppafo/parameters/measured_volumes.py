@@ -107,7 +107,7 @@ def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]
     """
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
     if not lines:
-        raise ParameterError(f"{file}: is empty; its header is 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
+        raise ParameterError(f"{file}: is empty; its first line must be 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
     for separator, name in ((";", "semicolons"), ("\t", "tabs")):
         if separator in lines[0][1] and "," not in lines[0][1]:
             raise ParameterError(f"{file}: columns must be separated by commas, not {name}")

@@ -173,7 +173,7 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
                 if "gas" in path.split(".")
                 else nearest_name(path, PATHS)
             )
-            raise ParameterError(f"override '{override}': a bottle has no value '{path}'{of_file}")
+            raise ParameterError(f"override '{override}': a bottle has no parameter '{path}'{of_file}")
         with refused_as(ParameterError, f"override '{override}'", UnitError):
             value, unit = split_quantity(override.text)
         # A new form of the filling replaces the old one: two forms would contradict each other.
