@@ -76,8 +76,8 @@ def endurance_of_gas_use(
             species = override.text if override.text in SPECIES else "NAME"
             again = override_text([f"{SPECIES_PATH}={species}"])
             raise ParameterError(
-                f"override '{override}': a bottle has no parameter '{override.typed}'; the gas of a bottle is set in the "
-                f"bottle file, the gas of the device in the scenario: to change it, repeat the run of {name} with "
+                f"override '{override}': a bottle has no parameter '{override.typed}'; the gas of a bottle is set in "
+                f"the bottle file, the gas of the device in the scenario: to change it, repeat the run of {name} with "
                 f"{again} and give the new result folder"
             )
     gas = walk_gas(use) if isinstance(use, WalkResult) else None

@@ -206,7 +206,9 @@ def test_a_gas_set_at_a_bottle_is_told_to_repeat_the_run(typed: str) -> None:
     ) as caught:
         endurance(staircase(1e-3, 1.0, 0.2), overrides=[f"{typed}=air"])
     assert "repeat the run of walk with overrides=['gas.species=air']" in str(caught.value)
-    with pytest.raises(ParameterError, match=f"a bottle has no parameter '{typed}'; choose the gas by the name or file"):
+    with pytest.raises(
+        ParameterError, match=f"a bottle has no parameter '{typed}'; choose the gas by the name or file"
+    ):
         endurance(gas_per_stride="0.4 g", overrides=[f"{typed}=air"])
 
 

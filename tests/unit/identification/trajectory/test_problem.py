@@ -185,7 +185,9 @@ def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: Fitted
     clipped = np.minimum(values + 300.0 * random.standard_normal(values.size), level)
     recording = experiment.recording.with_channel("pressure_1", clipped, "Pa")
     without = dataclasses.replace(experiment, recording=recording, noise={"angle": 1e-3, "pressure_2": 500.0})
-    with pytest.raises(IdentificationError, match=r"stays at its largest value for .* the sensor is probably saturated"):
+    with pytest.raises(
+        IdentificationError, match=r"stays at its largest value for .* the sensor is probably saturated"
+    ):
         prepare(without, {})
 
 
@@ -196,5 +198,7 @@ def test_a_channel_that_is_at_its_limit_from_the_third_sample_on_is_not_one_with
     values[2:] = values.max() + 1e5
     recording = experiment.recording.with_channel("pressure_1", values, "Pa")
     without = dataclasses.replace(experiment, recording=recording, noise={"angle": 1e-3, "pressure_2": 500.0})
-    with pytest.raises(IdentificationError, match=r"stays at its largest value for .* the sensor is probably saturated"):
+    with pytest.raises(
+        IdentificationError, match=r"stays at its largest value for .* the sensor is probably saturated"
+    ):
         prepare(without, {})
