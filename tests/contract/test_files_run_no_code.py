@@ -317,7 +317,7 @@ def test_every_function_that_opens_such_a_file_takes_modules() -> None:
 
 def test_a_set_is_audited_with_the_module_that_the_person_names(folder: Path) -> None:
     (folder / "given.toml").write_text(SET, encoding="utf-8")
-    with pytest.raises(PpafoError, match="module 'evil' is not allowed"):
+    with pytest.raises(PpafoError, match="module 'evil' is not loaded"):
         ppafo.audit("given.toml")
     # It holds a controller, which is no valve: it was asked.
     with pytest.raises(PpafoError, match="is of type ControllerKind, not ValveKind"):

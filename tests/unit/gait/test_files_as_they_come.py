@@ -346,7 +346,10 @@ def test_a_plain_table_with_opensims_names_is_read(
     ("text", "message"),
     [
         ("frame,shank\n1,2\n", "the first column must be 'time', not 'frame'"),
-        ("percent [%],a [deg]\n0,1\n", "not 'percent'; give at least two strides over time"),
+        (
+            "percent [%],a [deg]\n0,1\n",
+            "not 'percent'; a mean stride over percent of the stride cannot be read: give at least two strides",
+        ),
         ("time,a,\n0,1,2\n", "a column has no name"),
         ("time,a\n0,1,2\n", "line 2 has 3 values for 2 columns"),
         ("time,a\n0,one\n", "line 2"),

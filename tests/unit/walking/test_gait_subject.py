@@ -106,7 +106,9 @@ def test_a_stated_body_mass_wins_and_the_difference_is_said(tmp_path: Path) -> N
 
 
 def test_a_subject_who_cannot_wear_the_device_is_refused_with_the_key(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"so wearer\.body_mass would be 6 kg; must be 10 to 300 kg: give wearer"):
+    with pytest.raises(
+        ScenarioError, match=r"so wearer\.body_mass would be 6 kg, but it must be 10 to 300 kg; give wearer"
+    ):
         load_walk("solenoid", gait=gait_file(tmp_path, 6.0))
 
 

@@ -280,7 +280,7 @@ def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others()
 
 
 def test_a_duration_is_given_once_in_python_too() -> None:
-    with pytest.raises(ScenarioError, match=r"overrides run\.duration and minutes are the same value"):
+    with pytest.raises(ScenarioError, match=r"overrides run\.duration and minutes both set the duration"):
         walk_with_and_without(NAME, minutes=0.2, overrides=["run.duration = 30 s"])
 
 

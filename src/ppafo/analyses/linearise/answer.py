@@ -35,7 +35,7 @@ DURATION, INTERVAL = 1.0, 1.0e-3
 SHARES = tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
 """Step heights of the command divided by the steady command [-]: three decades."""
 _FULL = 0.99
-"""Gauge pressure of a chamber divided by that of its supply, above which the chamber counts as full [-]."""
+"""Ratio of gauge pressures, chamber to supply, above which the chamber counts as full [-]."""
 _LARGEST_COMMAND = 0.7
 """Steady command [-] above which the largest step comes too close to full opening, which is 1."""
 
