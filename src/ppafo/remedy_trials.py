@@ -58,8 +58,8 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     ]
     for trial, left in judged:
         if left is None:
-            told = f"with {trial.remedy.text} it follows, as a further run shows"
-            return replace(verdict, cause=trial.cause, tried=told, mended=trial.remedy.overrides if is_of_file else ())
+            text = f"with {trial.remedy.text} it follows, as a further run shows"
+            return replace(verdict, cause=trial.cause, tried=text, mended=trial.remedy.overrides if is_of_file else ())
     of_cause = [(trial.remedy, left.error) for trial, left in judged if left and trial.cause == verdict.cause]
     return replace(verdict, tried=_remainder_text(verdict, of_cause))
 

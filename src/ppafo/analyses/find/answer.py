@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.analyses.find.solve import FOLLOWS, FindResult
+from ppafo.parameters.overrides import over
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric, of_path
 from ppafo.report.panels import Mark, Panel
@@ -76,9 +77,9 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
     remarks = list(_remarks(outcome, kind))
     # In more digits than are shown, so that the value that is pasted meets the condition.
-    others = [text for text in overrides if text.partition("=")[0].strip() != path.path]
-    value = "" if index is None else f"{path.path}={kind.text(float(tried['value'][index]), '.9g')}"
-    used = override_text([*others, value]) if value else ""
+    used = ""
+    if index is not None:
+        used = override_text(over(overrides, [f"{path.path}={kind.text(float(tried['value'][index]), '.9g')}"]))
     return Finding(
         name="find",
         kicker="Search",

@@ -223,7 +223,7 @@ def outermost(
             break
         search = search.with_values(base, np.linspace(value, neighbour, _PARTS + 1)[1:-1], seeds, False)
         index, neighbour = search.found
-    # Under noise one run tells nothing of the mean over the streams.
+    # With noise a single run does not represent the mean over the noise streams.
     if condition.text != FOLLOWS or seeds.size:
         return search
     value = search.nearest if index is None else float(search.tried["value"][index])

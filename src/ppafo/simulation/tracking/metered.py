@@ -103,8 +103,8 @@ def tracking_excess(
         # On the ramp every loop is behind, and what lies beyond reach may not have been asked for yet.
         beyond = np.where(settled.ends_on_ramp, 0.0, shortfall(scenario))
         allowed = LARGEST_SHARE * settled.wanted
-        # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does. The
-        # mean error of a wave tells nothing of its peaks.
+        # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error.
+        # The mean error of a wave does not show its peaks.
         cut = np.where(settled.rests, 0.0, beyond / allowed)
         missing = np.where(beyond > 0.0, np.fmax(np.abs(settled.missing) / allowed, cut), 0.0)
     known = np.isfinite(numbers["settled_error"])

@@ -285,7 +285,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     # An error at the cut peaks of a wave reverses more often than the wave, and is no oscillation.
     if is_task and turning <= 1.0 and failure in (None, "oscillates") and cuts_wave(case):
         case = case._replace(failure="does not follow")
-    # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
+    # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error.
     elif failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
         case = case._replace(failure="does not follow" if torque_beyond_reach(case) is not None else None)
     return case, turning, reversals / recording.duration, stride_time

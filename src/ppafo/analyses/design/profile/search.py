@@ -237,7 +237,7 @@ def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
 
 
 def _limit_of_pressure(problem: SizingProblem, tried: Trial) -> Limit | None:
-    """Return the limit of a valve if its lowest feasible pressure alone tells it; None if it does not.
+    """Return the limit of a valve that follows from its lowest feasible pressure; None if it needs further trials.
 
     There is no limit if the lowest requested pressure works ('pressure').
     """
