@@ -68,6 +68,8 @@ class StepText:
     states: dict[str, Any] = field(init=False)
     parameters: dict[str, Any] = field(init=False)
     of_step: dict[str, Any] = field(init=False)
+    rows: dict[str, Any] = field(init=False)
+    """Classes of all groups that have rows."""
     composed: dict[FunctionType, ComposedFunction] = field(default_factory=dict)
     placeholders: dict[str, Any] = field(default_factory=dict)
     given: set[str] = field(default_factory=set)
@@ -79,6 +81,7 @@ class StepText:
         """Look up the groups of the program, and link the functions of its components."""
         self.states, self.parameters = self.parts.state_rows(), self.parts.parameter_rows()
         self.of_step = self.parts.step_rows()
+        self.rows = {**self.parameters, **self.states, **self.of_step, **self.further}
         link_program(self.parts, self.collector.replacements)
         self.module = StepModule(
             collector=self.collector,
@@ -88,11 +91,6 @@ class StepText:
             effects_of=lambda called: self.composed[called].effects,
             add_called=self.add_called,
         )
-
-    @property
-    def rows(self) -> Mapping[str, Any]:
-        """Classes of all groups that have rows."""
-        return {**self.parameters, **self.states, **self.of_step, **self.further}
 
     def phase(self, function: PlainFunction, known: Mapping[str, Any] | None = None) -> ComposedFunction:
         """Add a function called by the loop over steps; the function returns the groups that later phases may read.

@@ -124,9 +124,8 @@ class Definition:
             is_nested = any(isinstance(inner, _COMPREHENSIONS) for inner in ast.walk(node))
             self.codes[id(node)] = compile(expression, "<parts>", "eval"), is_nested
         code, is_nested = self.codes[id(node)]
-        # Evaluated is the text of a function that Python has loaded, with its own globals, as a call of it would: calls
-        # and generators too, so that no smaller evaluator would do. No file, setting or argument comes in as text.
-        # What stands in a comprehension sees no local names before Python 3.12.
+        # The text is that of a function which Python has loaded, with its own globals; no file, setting or argument
+        # comes in as text. Before Python 3.12 a comprehension does not see local names: they become globals.
         return eval(code, {**scope, **known}) if is_nested else eval(code, scope, known)
 
 
@@ -269,13 +268,13 @@ class Reduction:
 
     def with_reduced_operands(self, node: ast.expr) -> ast.expr:
         """Return an expression with reduced operands."""
-        made = copy(node)
+        reduced = copy(node)
         for name, value in ast.iter_fields(node):
             if isinstance(value, ast.expr):
-                setattr(made, name, self.visit(value))
+                setattr(reduced, name, self.visit(value))
             elif isinstance(value, list):
-                setattr(made, name, [self.visit(item) if isinstance(item, ast.expr) else item for item in value])
-        return made
+                setattr(reduced, name, [self.visit(item) if isinstance(item, ast.expr) else item for item in value])
+        return reduced
 
     def condition(self, node: ast.expr) -> ast.expr:
         """Return a reduced condition, which is a constant if known."""
@@ -295,17 +294,16 @@ class Reduction:
 
     def of_boolop(self, node: ast.BoolOp) -> ast.expr:
         """Return ``and`` or ``or`` with known operands evaluated."""
-        ends, made = isinstance(node.op, ast.Or), list[ast.expr]()
-        for item in node.values:
-            value = self.condition(item)
-            if not isinstance(value, ast.Constant):
-                made.append(value)
-            elif bool(value.value) is ends:
-                # What stands before it has no effect but its value.
-                return value
-        if not made:
-            return ast.Constant(not ends)
-        return made[0] if len(made) == 1 else ast.BoolOp(node.op, made)
+        deciding, unknown = isinstance(node.op, ast.Or), list[ast.expr]()
+        for operand in map(self.condition, node.values):
+            if not isinstance(operand, ast.Constant):
+                unknown.append(operand)
+            elif bool(operand.value) is deciding:
+                # Operands before it have no effect but their value.
+                return operand
+        if not unknown:
+            return ast.Constant(not deciding)
+        return unknown[0] if len(unknown) == 1 else ast.BoolOp(node.op, unknown)
 
     def of_unaryop(self, node: ast.UnaryOp) -> ast.expr:
         """Return a reduced sign or negation."""
@@ -321,32 +319,31 @@ class Reduction:
 
     def of_subscript(self, node: ast.Subscript) -> ast.expr:
         """Return a group by its name, an element of a history, or an item."""
-        name = self.group_path(node)
-        if name:
-            group, *way = name.split(".")
+        path = self.group_path(node)
+        if path:
+            group, *fields = path.split(".")
             read: ast.expr = self.group_read(group)
-            for step in way:
-                read = ast.Attribute(read, step, ast.Load())
+            for name in fields:
+                read = ast.Attribute(read, name, ast.Load())
             return read
         history = self.group_path(node.value)
-        if history in HISTORIES:
-            places = [self.visit(index) for index in _indices(node)]
-            return ast.Subscript(
-                self.group_read(history), ast.Tuple([*places, ast.Name(NUMBER, ast.Load())], ast.Load()), ast.Load()
-            )
-        return self.with_reduced_operands(node)
+        if history not in HISTORIES:
+            return self.with_reduced_operands(node)
+        indices = [*map(self.visit, _indices(node)), ast.Name(NUMBER, ast.Load())]
+        return ast.Subscript(self.group_read(history), ast.Tuple(indices, ast.Load()), ast.Load())
 
     def group_path(self, node: ast.expr) -> str:
         """Return the group, or the path in a group, of ``lane.GROUP`` or ``lane["GROUP"]``; empty otherwise."""
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "lane":
-            return node.attr
-        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "lane":
-            name = node.slice.value if isinstance(node.slice, ast.Constant) else self.value_of(node.slice)
-            if not isinstance(name, str):
+        match node:
+            case ast.Attribute(value=ast.Name(id="lane"), attr=name):
+                return name
+            case ast.Subscript(value=ast.Name(id="lane"), slice=index):
+                path = index.value if isinstance(index, ast.Constant) else self.value_of(index)
+                if isinstance(path, str):
+                    return path
                 raise self.refuse(
                     node, f"'{ast.unparse(node)}': the name of the group must be known when the program is generated"
                 )
-            return name
         return ""
 
     def group_read(self, name: str) -> ast.expr:
@@ -472,12 +469,12 @@ class Reduction:
         if isinstance(test, ast.Constant):
             return self.block(node.body if test.value else node.orelse)
         before = set(self.groups_set)
-        body, first = self.block(node.body), self.groups_set
+        body, set_in_body = self.block(node.body), self.groups_set
         self.groups_set = set(before)
         otherwise = self.block(node.orelse)
-        for name in sorted((first ^ self.groups_set) - before):
+        for name in sorted((set_in_body ^ self.groups_set) - before):
             self.effects.reads[name] = None
-        self.groups_set |= first
+        self.groups_set |= set_in_body
         return [ast.If(test, body or [ast.Pass()], otherwise)]
 
     def unrolled(self, node: ast.For) -> list[ast.stmt]:
@@ -520,12 +517,11 @@ class Reduction:
         row = self.module.rows.get(group_of_name(name))
         if isinstance(reduced, ast.IfExp) and row is not None and not is_number(row):
             # A choice between rows becomes a row of choices between numbers, for which no compiler makes a branch.
-            pairs = zip(self.numbers_of(row, reduced.body), self.numbers_of(row, reduced.orelse), strict=True)
+            numbers = zip(self.numbers_of(row, reduced.body), self.numbers_of(row, reduced.orelse), strict=True)
             test = reduced.test
-            reduced = self.row_of(row, (ast.IfExp(test, yes, other) for yes, other in pairs))
-        if isinstance(reduced, ast.Name) and reduced.id == name.id:
-            return []
-        return [ast.Assign([name], reduced)]
+            reduced = self.row_of(row, (ast.IfExp(test, chosen, other) for chosen, other in numbers))
+        is_unchanged = isinstance(reduced, ast.Name) and reduced.id == name.id
+        return [] if is_unchanged else [ast.Assign([name], reduced)]
 
     def crosses(self, target: ast.Tuple, value: ast.Tuple) -> bool:
         """Return whether any of several values reads a target of the same assignment."""
@@ -585,12 +581,12 @@ class Reduction:
         """Yield the expressions of the numbers of a row, nested or not, in order."""
         if is_number(kind):
             yield row
-        for way, inside in members(kind):
-            yield from self.numbers_of(inside, self.member_of(row, way))
+        for access, inside in members(kind):
+            yield from self.numbers_of(inside, self.member_of(row, access))
 
-    def member_of(self, owner: ast.expr, way: str) -> ast.expr:
-        """Return the expression of a field or item of a NamedTuple or tuple; a value if these are known."""
-        key = int(way[1:-1]) if way[0] == "[" else way[1:]
+    def member_of(self, owner: ast.expr, access: str) -> ast.expr:
+        """Return the expression of ``.FIELD`` or ``[INDEX]`` of a row; a value if the row is known."""
+        key = int(access[1:-1]) if access[0] == "[" else access[1:]
         if isinstance(owner, ast.Name) and owner.id in self.module.placeholders:
             value = self.module.placeholders[owner.id]
             return self.expression_of(value[key] if isinstance(key, int) else getattr(value, key))

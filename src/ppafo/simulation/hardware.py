@@ -2,7 +2,7 @@
 
 import functools
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ from ppafo.parameters.graph import Graph
 from ppafo.parameters.overrides import CHOSEN_VALVE, Override, check_valve, one_path, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
     PATHS_THAT_SET_UNITS,
-    Entry,
     atmospheric_pressure,
     chosen_units,
     chosen_valve,
@@ -37,7 +36,7 @@ _PARTS_WITH_UNITS = ("initial", "motion", "controller.peak_torque", "reference")
 class Hardware:
     """Parameter set with all overrides applied, name of its selected valve, and links between its numbers.
 
-    ``replaced`` is a sentence on values of the scenario that replace those of a set other than its own, else "".
+    ``replaced`` is a sentence on values of the scenario that replace those of another set or valve, else "".
     """
 
     parameter_set: ParameterSet
@@ -47,73 +46,77 @@ class Hardware:
 
 
 def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: tuple[Override, ...]) -> Hardware:
-    """Return the parameter set with the overrides of the file, then those of the caller."""
+    """Return the parameter set with the overrides of the file, then those of the caller.
+
+    Values of the file that replace those of another set or valve are logged. Raises ParameterError for unusable values.
+    """
     section, in_file = reading.document["device"], request.content.get("device", {})
     valve = section.get("valve")
     try:
         of_file = read_overrides(section.get("overrides", ()))
         check_valve(of_file, in_file.get("valve"), f"device.valve = '{in_file.get('valve')}'")
-        parameter_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
-        kinds = parameter_set.valve_kinds
-        if valve is not None and valve not in kinds and not nearest_name(valve, kinds):
-            # The scenario names the valve of another device.
-            raise ParameterError(
-                f"{parameter_set.file}: there is no valve '{valve}'; available: {', '.join(kinds)}; give "
-                f"{override_text((f'device.valve={parameter_set.default_valve}',))}"
-            )
-        name = chosen_valve(parameter_set, valve)
-        is_own = section["set"] == in_file.get("set")
-        of_file = _overrides_for(of_file, parameter_set, is_own)
-        of_valve = [item for item in of_file if item.typed.startswith(CHOSEN_VALVE) and valve != in_file.get("valve")]
-        entries = {one_path(path, name): entry for path, entry in parameter_set.numbers.items()}
-        owner, replacing = (f"valve '{name}'", of_valve) if is_own else (section["set"], of_file)
-        replaced = _replaced_text(entries, owner, replacing, overrides)
-        parameter_set = with_overrides(parameter_set, of_file, valve)
+        plain_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
+        valve_name = _valve_in(plain_set, valve)
+        owner, replacing = "", tuple[Override, ...]()
+        if section["set"] != in_file.get("set"):
+            of_file = _without_second_chamber(of_file, plain_set)
+            owner, replacing = section["set"], of_file
+        elif valve != in_file.get("valve"):
+            owner = f"valve '{valve_name}'"
+            replacing = tuple(item for item in of_file if item.typed.startswith(CHOSEN_VALVE))
+        overridden = {override.typed for override in overrides}
+        in_force = [item for item in replacing if item.typed not in overridden]
+        replaced = _replaced_text(plain_set, valve_name, owner, in_force) if in_force else ""
+        set_of_file = with_overrides(plain_set, of_file, valve)
         if replaced:
             _warn_once(f"ppafo: {reading.file}: {replaced}")
     except ParameterError as error:
         raise device_error(reading, error) from error
-    before = atmospheric_pressure(parameter_set) if overrides else None
-    changed = with_overrides(parameter_set, overrides, valve)
-    return Hardware(changed, name, links_of_set(changed, {override.typed for override in overrides}, before), replaced)
+    before = atmospheric_pressure(set_of_file) if overrides else None
+    changed = with_overrides(set_of_file, overrides, valve)
+    return Hardware(changed, valve_name, links_of_set(changed, overridden, before), replaced)
 
 
-def _overrides_for(of_file: tuple[Override, ...], parameter_set: ParameterSet, is_own: bool) -> tuple[Override, ...]:
-    """Return the file's overrides that apply to a parameter set; ``is_own`` is true for the set that the file names."""
-    if is_own or not parameter_set.has_one_chamber:
-        return of_file
-    return tuple(item for item in of_file if item.typed not in OF_SECOND_CHAMBER)
+def _valve_in(parameter_set: ParameterSet, valve: str | None) -> str:
+    """Return the name of the selected or default valve. Raises ParameterError, with a remedy, if there is none."""
+    kinds = parameter_set.valve_kinds
+    if valve is not None and valve not in kinds and not nearest_name(valve, kinds):
+        # Not a misspelt name: the scenario names the valve of another device.
+        raise ParameterError(
+            f"{parameter_set.file}: there is no valve '{valve}'; available: {', '.join(kinds)}; give "
+            f"{override_text((f'device.valve={parameter_set.default_valve}',))}"
+        )
+    return chosen_valve(parameter_set, valve)
 
 
-def _replaced_text(
-    numbers: Mapping[str, Entry], name: str, of_file: Sequence[Override], overrides: tuple[Override, ...]
-) -> str:
-    """Sentence on values of the scenario file that replace values of the set or valve ``name``; "" without any."""
-    given = {override.typed for override in overrides}
-    replaced = [item for item in of_file if item.typed not in given]
-    if not replaced:
-        return ""
-    entries = [(item.typed, numbers.get(item.typed)) for item in replaced]
-    kept = [f"{path}={entry.value:.12g} {entry.unit}".rstrip() for path, entry in entries if entry is not None]
-    keeping = f"; {override_text(kept)} restores the replaced values" if kept else ""
-    return f"values of the scenario replace values of {name}: {', '.join(map(str, replaced))}{keeping}"
+def _without_second_chamber(overrides: tuple[Override, ...], parameter_set: ParameterSet) -> tuple[Override, ...]:
+    """Return the overrides of a file that apply to another set than its own, which may have one chamber only."""
+    missing = OF_SECOND_CHAMBER if parameter_set.has_one_chamber else ()
+    return tuple(item for item in overrides if item.typed not in missing)
+
+
+def _replaced_text(plain_set: ParameterSet, valve: str, owner: str, replacing: Sequence[Override]) -> str:
+    """Sentence on overrides of a scenario file that replace values of ``owner``, with overrides that restore them."""
+    entries = {one_path(path, valve): entry for path, entry in plain_set.numbers.items()}
+    replaced = [(item.typed, entries[item.typed]) for item in replacing if item.typed in entries]
+    restoring = [f"{path}={entry.value:.12g} {entry.unit}".rstrip() for path, entry in replaced]
+    remedy = f"; {override_text(restoring)} restores the replaced values" if restoring else ""
+    return f"values of the scenario replace values of {owner}: {', '.join(map(str, replacing))}{remedy}"
 
 
 _warn_once = functools.lru_cache(maxsize=64)(logger.warning)
 
 
 def parameter_set_of(origin: Origin) -> ParameterSet:
-    """Return the parameter set of a scenario's device, with the overrides of its file and then those of the caller.
-
-    Raises ParameterError if the set can no longer be read.
-    """
+    """Return the parameter set of a scenario's device with its overrides. ParameterError if it cannot be read."""
     folder = Path() if origin.file is None else Path(origin.file).parent
     in_file = origin.content.get("device", {})
+    plain_set = load_parameter_set(set_name(origin.parameter_set, folder))
     of_file = read_overrides(in_file.get("overrides", ()))
+    if origin.parameter_set != in_file.get("set"):
+        of_file = _without_second_chamber(of_file, plain_set)
     of_caller = [override for override in read_overrides(origin.overrides) if is_of_device(override.typed)]
-    parameter_set = load_parameter_set(set_name(origin.parameter_set, folder))
-    of_file = _overrides_for(of_file, parameter_set, origin.parameter_set == in_file.get("set"))
-    return with_overrides(with_overrides(parameter_set, of_file, origin.valve), of_caller, origin.valve)
+    return with_overrides(with_overrides(plain_set, of_file, origin.valve), of_caller, origin.valve)
 
 
 def set_name(name: str, folder: Path) -> str:
@@ -128,19 +131,16 @@ def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
         device = build_device(hardware.parameter_set, hardware.valve, hardware.links)
     except ParameterError as error:
         raise device_error(reading, error) from error
-    written = chosen_units(_texts([value_at(reading.document, part) for part in _PARTS_WITH_UNITS]))
+    written = chosen_units(_leaves([value_at(reading.document, part) for part in _PARTS_WITH_UNITS]))
     levels = [path for path in sorted(reading.overridden) if path.startswith(PATHS_THAT_SET_UNITS)]
     overridden = units_of_texts(value_at(reading.document, path) for path in levels)
     return replace(device, units={**device.units, **written, **overridden})
 
 
-def _texts(values: Iterable[Any]) -> Iterator[Any]:
-    """Yield the values of nested tables and lists in order."""
-    for value in values:
-        if isinstance(value, Mapping | list):
-            yield from _texts(value.values() if isinstance(value, Mapping) else value)
-        else:
-            yield value
+def _leaves(value: Any) -> list[Any]:
+    """Return the values of nested tables and lists in order."""
+    inner = list(value.values()) if isinstance(value, Mapping) else value
+    return [leaf for item in inner for leaf in _leaves(item)] if isinstance(inner, list) else [value]
 
 
 def device_error(reading: DocumentReader, error: ParameterError) -> ParameterError:
