@@ -53,12 +53,11 @@ def benefit_sentence(comparison: WalkComparison) -> str:
     both = numbers.keys() & without.keys()
     is_closer = "angle_difference" in both and without["angle_difference"] > numbers["angle_difference"]
     lifts = not drags and (drags_without or is_closer)
+    verdict = "the device helps" if has_work else "the device helps in swing alone"
     if reasons or not (has_work or lifts):
         verdict = "the device does not help"
     elif drags:
         verdict = "the device helps in push-off but not in swing"
-    else:
-        verdict = "the device helps" if has_work else "the device helps in swing alone"
     clauses = ", ".join([*_compared(numbers, without), *reasons])
     needs_remedy = not reasons and walk_of(worn.scenario).bottle is None and (drags or not has_work)
     return f"{verdict}, against the same walk without it: {clauses}{_remedied(worn, drags) if needs_remedy else ''}"
@@ -89,10 +88,8 @@ def _remedied(worn: WalkResult, drags: bool) -> str:
             toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
             if again.status.is_completed and again.is_helped and work > 0.0 and (toes >= 0.0 or not drags):
                 changed = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
-                return (
-                    f"; {cause}: with {changed}, toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}, "
-                    "simulated in another walk"
-                )
+                gain = f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}"
+                return f"; {cause}: with {changed}, {gain}, simulated in another walk"
     return f"; {cause}, and {advice}"
 
 
@@ -108,13 +105,10 @@ def _cause(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...]
         # A stiffer hold alone comes before one with more pressure: the valve may fill the chamber too slowly.
         changes = [*stiffer, *({**hold, **levels} for hold in stiffer[-2:] for levels in raised[:3])]
         largest = remedy(scenario, stiffer[-1]).overrides[-1].replace("=", " = ", 1)
-        cause = (
-            f"the ankle is not lifted enough, as the controller requests {_TORQUE.text(requested)} at the lowest toes, "
-            f"where the actuator gives {_TORQUE.text(available)}"
-        )
-        advice = (
-            f"larger settings up to `{largest}`, alone and with more supply pressure, were simulated and do not suffice"
-        )
+        torques = f"{_TORQUE.text(requested)} at the lowest toes, where the actuator gives {_TORQUE.text(available)}"
+        cause = f"the ankle is not lifted enough, as the controller requests {torques}"
+        tried = "alone and with more supply pressure, were simulated and do not suffice"
+        advice = f"larger settings up to `{largest}`, {tried}"
     else:
         changes = raised
         cause = "the ankle is not lifted enough" if drags else "the torque opposes the motion"
@@ -137,10 +131,7 @@ def _raised_pressures(scenario: Scenario) -> list[dict[str, float]]:
 
 
 def _lifting_torques(worn: WalkResult) -> tuple[float, float]:
-    """Return the dorsiflexion torques [N m] at the lowest toes in mid-swing: requested, and largest of the actuator.
-
-    Both are 0 without a request. The smaller torque limits the height of the toes.
-    """
+    """Return the dorsiflexion torques [N m] at the lowest toes: requested, and of the actuator; 0 without a request."""
     if "reference" not in worn.averages:
         return 0.0, 0.0
     timing = gait_timing(walk_of(worn.scenario).gait)
@@ -156,7 +147,6 @@ def _stiffer_holds(worn: WalkResult, requested: float, available: float) -> list
     A limit that cuts the request is raised to the torque [N m] that the actuator gives.
     """
     settings, path = worn.scenario.controller.settings, "controller.hold_stiffness"
-    is_cut = requested >= _NEARLY * float(settings["largest_torque"])
-    limit = {"controller.largest_torque": available} if is_cut else {}
+    limit = {"controller.largest_torque": available} if requested >= _NEARLY * settings["largest_torque"] else {}
     stiffness = max(float(settings["hold_stiffness"]), declared_numbers(worn.scenario)[path].default or 0.0)
     return [*([limit] if limit else []), *({**limit, path: factor * stiffness} for factor in _STIFFER)]
