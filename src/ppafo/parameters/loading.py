@@ -238,6 +238,9 @@ def parameter_file() -> type[BaseModel]:
     return _file_model(tuple(valves.items()), tuple(actuators.items()), device_effects())
 
 
+# A dotted path names a valve: a dot or a blank in its name would make it another path.
+_VALVE_NAME = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+_VALVE_KEYS = Field(json_schema_extra={"additionalProperties": False})
 _JOINT_WORDS = Annotated[str, Field(pattern=r"^[a-z][a-z ]{0,39}$")]
 _JOINT = table(
     "JointNames",
@@ -272,10 +275,13 @@ def _file_model(
     effects: tuple[Effect, ...],
 ) -> type[BaseModel]:
     """Return the validation model of a file; sections other than the valves are optional: a set may be incomplete."""
-    valve_reports = _section("ReportedOfAValve", declaration.REPORTED_OF_A_VALVE)
+    valve_report = _section("ReportedOfAValve", declaration.REPORTED_OF_A_VALVE)
     reported = {
         declaration.REPORTED_FORMULA: optional(TextEntry, "exponent inside C1, a formula in k"),
-        "valves": optional(_by_valve_name(valve_reports), "reported values of the valves, by valve name"),
+        "valves": optional(
+            Annotated[GenericAlias(dict, (_VALVE_NAME, valve_report)), _VALVE_KEYS],
+            "reported values of the valves, by valve name",
+        ),
     }
     effect_sections = {
         effect.name: optional(_section(f"{effect.name.capitalize()}Effect", effect.quantities), effect.summary)
@@ -300,7 +306,10 @@ def _file_model(
         for name, kind in valves
     ]
     optional_sections = {name: optional(model, f"section {name}") for name, model in sections.items()}
-    by_valve = (_by_valve_name(one_of(valve_tables)), Field(min_length=1, description="valves by name"))
+    by_valve = (
+        Annotated[GenericAlias(dict, (_VALVE_NAME, one_of(valve_tables))), _VALVE_KEYS],
+        Field(min_length=1, description="valves by name"),
+    )
     return table("ParameterFile", _HEAD | optional_sections | {"valves": by_valve})
 
 
@@ -325,13 +334,6 @@ def _section(name: str, quantities: tuple[Quantity, ...], /, **keys: Any) -> Any
     return table(re.sub(r"\W", "_", name, flags=re.ASCII), entries | keys)
 
 
-def _by_valve_name(model: Any) -> Any:
-    # A dotted path names a valve: a dot or a blank in its name would make it another path.
-    valve_name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
-    keys = Field(json_schema_extra={"additionalProperties": False})
-    return Annotated[GenericAlias(dict, (valve_name, model)), keys]
-
-
 def parameter_set_toml(parameter_set: ParameterSet) -> str:
     """Return the TOML text of a set: header, citation, all values with provenance, accepted contradictions."""
     keys = ("name", "title", "default_valve", "completed_by", "parent", "notes")
@@ -344,22 +346,17 @@ def parameter_set_toml(parameter_set: ParameterSet) -> str:
     if parameter_set.actuator_kind != VANE:
         file = {"file": parameter_set.actuator_file} if parameter_set.actuator_file else {}
         lines += table_lines("actuator", {"kind": parameter_set.actuator_kind, **file})
-    lines += _entry_lines(parameter_set)
-    for finding, reason in parameter_set.accepted.items():
-        lines += ("", "[[accepted]]", *assignments({"finding": finding, "reason": reason}))
-    return "\n".join(lines) + "\n"
-
-
-def _entry_lines(parameter_set: ParameterSet) -> Iterator[str]:
-    """Yield the TOML lines of all values, section by section in the order in which the sections first occur."""
-    entries = parameter_set.entries()
+    # Section by section, in the order in which the sections first occur.
+    entries, kinds_to_write = parameter_set.entries(), dict(parameter_set.valve_kinds)
     sections = list(dict.fromkeys(path.rpartition(".")[0] for path in entries))
-    kinds_to_write = dict(parameter_set.valve_kinds)
     for path in sorted(entries, key=lambda path: sections.index(path.rpartition(".")[0])):
         valve = path.split(".")[1] if path.startswith("valves.") else ""
         if valve in kinds_to_write:
-            yield from table_lines(f"valves.{valve}", {"kind": kinds_to_write.pop(valve)})
-        yield from table_lines(path, entries[path].model_dump(exclude_defaults=True))
+            lines += table_lines(f"valves.{valve}", {"kind": kinds_to_write.pop(valve)})
+        lines += table_lines(path, entries[path].model_dump(exclude_defaults=True))
     # A valve of which nothing but its kind is known has a table all the same.
     for valve, kind in kinds_to_write.items():
-        yield from table_lines(f"valves.{valve}", {"kind": kind})
+        lines += table_lines(f"valves.{valve}", {"kind": kind})
+    for finding, reason in parameter_set.accepted.items():
+        lines += ("", "[[accepted]]", *assignments({"finding": finding, "reason": reason}))
+    return "\n".join(lines) + "\n"
