@@ -20,7 +20,7 @@ from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
 from ppafo.simulation.document import ScenarioRequest, kind_at
 from ppafo.simulation.motion_kind import is_walk
-from ppafo.simulation.overrides import apply_overrides, over_layer
+from ppafo.simulation.overrides import over_layer, override_document
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import nearest_name
 
@@ -166,7 +166,7 @@ def _changed_tables(scenario: Scenario) -> Iterator[str]:
     request = of_vanes.request_again(scenario.origin)
     declared = _layout(request.content).declared
     given, changed = (
-        apply_overrides(request.content, overrides, request.file, declared) for overrides in ((), request.overrides)
+        override_document(request.content, overrides, request.file, declared) for overrides in ((), request.overrides)
     )
     if changed.device:
         device = changed.document.setdefault("device", {})

@@ -23,7 +23,7 @@ from ppafo.report.setting_names import REFERENCE_LEVELS, label_of
 from ppafo.report.style import PAGE_LOOKS
 from ppafo.simulation.declaration import PRESSURE_WORDS
 from ppafo.simulation.document import value_at
-from ppafo.simulation.overrides import apply_overrides, is_of_device
+from ppafo.simulation.overrides import is_of_device, override_document
 from ppafo.simulation.profiles import limits_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import conversion, from_si, parse_quantity, split_quantity, to_si
@@ -81,7 +81,7 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
     # The file of a scenario or walk with the overrides in it; overrides of the device stay overrides.
     scenario, settings = simulated.scenario, []
     overridden = read_overrides(described["overrides"], ScenarioError)
-    changed = apply_overrides(described["document"], overridden, described["name"], declared_content(scenario))
+    changed = override_document(described["document"], overridden, described["name"], declared_content(scenario))
     for stated in described["settings"]:
         entry = _in_given_unit(stated, value_at(changed.document, stated["key"]))
         display = entry["display"]

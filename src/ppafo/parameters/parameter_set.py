@@ -152,7 +152,7 @@ _SPEAKING = {
     "rad": ("actuator.angle_max", "actuator.angle_min"),
 }
 """Paths of the values whose unit sets the display unit of a quantity, by SI unit."""
-LEVELS = (
+PATHS_THAT_SET_UNITS = (
     "reference.",
     "motion.",
     "initial.",

@@ -33,7 +33,7 @@ from ppafo.simulation.declaration import (
     line_quantities,
     reference_settings,
 )
-from ppafo.simulation.default_gains import loop_terms
+from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.document import (
     REFERENCE_OF,
     DocumentReader,
@@ -194,7 +194,7 @@ def _control(
         controlled, leg is not None, is_locked, reference.kind, "" if path is None else path.kind
     )
     lines = None if supply_line is None else supply_line.row(device.supply)
-    terms = nominal_terms(device, lines) | loop_terms(device, CONTROLLERS[kind], signals, controlled)
+    terms = nominal_terms(device, lines) | default_gain_terms(device, CONTROLLERS[kind], signals, controlled)
     sources = {f"sensors.{quantity.name}": getattr(sensors, quantity.name) for quantity in SENSORS}
     sources |= numbers_of_lines(lines) | {PERIOD_PATH: period}
     sources |= {f"reference.{name}": number for name, number in reference.settings.items()}

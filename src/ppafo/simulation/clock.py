@@ -10,7 +10,7 @@ from ppafo.parameters.overrides import read_overrides
 from ppafo.simulation.declaration import PERIOD, RATE, RUN
 from ppafo.simulation.document import DocumentReader, value_at
 from ppafo.simulation.motion_kind import RunTimes
-from ppafo.simulation.overrides import apply_overrides
+from ppafo.simulation.overrides import override_document
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
 
@@ -156,7 +156,7 @@ def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> RunTi
 
 def time_texts(base: Scenario) -> TimeTexts:
     """Return the times as written in the scenario file, or as numbers if the scenario was changed after loading."""
-    document = apply_overrides(base.origin.content, read_overrides(base.origin.overrides), base.name).document
+    document = override_document(base.origin.content, read_overrides(base.origin.overrides), base.name).document
     texts = {
         section: {name: value for name, value in document[section].items() if f"{section}.{name}" in TIMES}
         for section in ("run", "controller")

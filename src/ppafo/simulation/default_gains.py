@@ -152,7 +152,7 @@ def loop_and_joint(
     return loop, parts.joint_of(settings, stops, around, signals, travel)
 
 
-def loop_terms(
+def default_gain_terms(
     device: Device, law: ControllerKind, seen: LawSignals, controlled: str = TORQUE
 ) -> dict[str, LinkFunction]:
     """Return the functions for default gains, by the names of ``control.torque_loop`` and ``angle_loop``.

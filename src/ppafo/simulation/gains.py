@@ -11,7 +11,7 @@ from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import LinkFunction, acting
 from ppafo.parameters.overrides import other_forms
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, SLOPE_GAINS, loop_terms
+from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, SLOPE_GAINS, default_gain_terms
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.units.shown import in_units, shown_text, written_text
@@ -60,7 +60,7 @@ class Gains:
 
 def terms_of(scenario: Scenario, law: ControllerKind) -> dict[str, LinkFunction]:
     """Return the functions of the device that determine the default gains of a scenario's controller, by name."""
-    return loop_terms(scenario.device, law, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
+    return default_gain_terms(scenario.device, law, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
 
 
 def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:

@@ -14,7 +14,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
 from ppafo.parameters.overrides import CHOSEN_VALVE, Override, check_valve, one_path, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
-    LEVELS,
+    PATHS_THAT_SET_UNITS,
     Entry,
     atmospheric_pressure,
     chosen_units,
@@ -129,7 +129,7 @@ def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
     except ParameterError as error:
         raise device_error(reading, error) from error
     written = chosen_units(_texts([value_at(reading.document, part) for part in _PARTS_WITH_UNITS]))
-    levels = [path for path in sorted(reading.overridden) if path.startswith(LEVELS)]
+    levels = [path for path in sorted(reading.overridden) if path.startswith(PATHS_THAT_SET_UNITS)]
     overridden = units_of_texts(value_at(reading.document, path) for path in levels)
     return replace(device, units={**device.units, **written, **overridden})
 

@@ -26,7 +26,7 @@ from ppafo.simulation.declaration import (
 )
 from ppafo.simulation.document import DocumentReader, ScenarioRequest, value_at
 from ppafo.simulation.numbers import check_parts
-from ppafo.simulation.overrides import OverriddenDocument, apply_overrides
+from ppafo.simulation.overrides import OverriddenDocument, override_document
 from ppafo.simulation.scenario import (
     Origin,
     Scenario,
@@ -143,11 +143,11 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     if request.overrides:
         _check_layout(request.content, request.file, layout, may_have_gaps=True)
     try:
-        changed = apply_overrides(request.content, request.overrides, request.file, declared)
+        changed = override_document(request.content, request.overrides, request.file, declared)
     except ScenarioError:
         # A kind that is not known has no values: where one is given, it is the mistake.
         kinds = [override for override in request.overrides if override.typed.endswith(".kind")]
-        chosen = apply_overrides(request.content, kinds, request.file, declared)
+        chosen = override_document(request.content, kinds, request.file, declared)
         _check_layout(chosen.document, request.file, layout, of_kinds_alone=True)
         raise
     # Overrides may name kinds that the file does not.

@@ -43,7 +43,7 @@ class OverriddenDocument:
     kept: str
 
 
-def apply_overrides(
+def override_document(
     document: Mapping[str, Any], overrides: Iterable[Override], file: str, declared: DeclaredContent = OF_A_VANE
 ) -> OverriddenDocument:
     """Return a changed copy of a document; ``file`` is the document's name in messages.

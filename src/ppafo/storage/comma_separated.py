@@ -200,7 +200,7 @@ def csv_bytes(recording: Recording) -> bytes:
     return buffer.getvalue().encode()
 
 
-def _separator_of(header: str) -> str:
+def _delimiter_of(header: str) -> str:
     # A unit may contain a semicolon: a tab or a semicolon separates only where all cells then are columns.
     return next((mark for mark in "\t;" if mark in header and all(map(_HEADER.fullmatch, header.split(mark)))), ",")
 
@@ -227,7 +227,7 @@ def read_csv(
         lines = text.splitlines()
         first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
         head = next(islice(lines, first, None), "")
-        mark = _separator_of(head)
+        mark = _delimiter_of(head)
         rows: Iterator[list[str]] = csv.reader(islice(lines, first, None), delimiter=mark, strict=True)
         header: list[str] = []
         for cell in next(rows, []):

@@ -13,7 +13,7 @@ from ppafo.errors import PpafoError, StudyError, UnitError, at_fault, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import CONTROLLED
-from ppafo.parameters.parameter_set import LEVELS, chosen_units
+from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, chosen_units
 from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
@@ -190,7 +190,7 @@ class Study:
 
     def shown_for(self, scenario: Scenario) -> dict[str, str]:
         """Return the display unit by SI unit for a scenario: the units given in the study, else the device's units."""
-        given = (f"0 {unit}" for path, unit in self.given.items() if path.startswith(LEVELS))
+        given = (f"0 {unit}" for path, unit in self.given.items() if path.startswith(PATHS_THAT_SET_UNITS))
         return {**scenario.device.shown, **chosen_units(given)}
 
     def same_in(self, configuration: str) -> dict[str, str]:

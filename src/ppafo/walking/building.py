@@ -21,7 +21,7 @@ from ppafo.parameters.plant import venting_valve
 from ppafo.simulation.assumptions import assumed_lines
 from ppafo.simulation.building import origin_of, read_gas_model, read_supply_line
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
-from ppafo.simulation.default_gains import loop_terms
+from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.document import DocumentReader, ScenarioRequest, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, read_followers
 from ppafo.simulation.hardware import read_device, read_hardware
@@ -210,7 +210,7 @@ def _control(
         PRESSURE_LAG: LinkFunction(("sensors.pressure_bandwidth",), lag_of_sensor),
         FORCE_LAG: LinkFunction(("sensors.force_bandwidth",), lag_of_sensor),
         **nominal_terms(device, lines),
-        **loop_terms(device, law, IN_WALK),
+        **default_gain_terms(device, law, IN_WALK),
     }
     present = {f"sensors.{name}": number for name, number in sensors.items()}
     present |= numbers_of_lines(lines) | {PERIOD_PATH: seconds}

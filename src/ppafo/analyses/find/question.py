@@ -70,7 +70,7 @@ def find(
     from ppafo.analyses.find.answer import finding_of
     from ppafo.analyses.find.solve import outermost
     from ppafo.loading import scenario_or_load
-    from ppafo.parameters.parameter_set import LEVELS, units_of_texts
+    from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, units_of_texts
     from ppafo.simulation.numbers import changes_in
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.study import with_overrides
@@ -78,7 +78,7 @@ def find(
     base = with_overrides(scenario_or_load(scenario), overrides)
     warn_of_coarse_pairs([base])
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
-    ranged = vary.rpartition("..")[2] if vary.strip().startswith(LEVELS) else ""
+    ranged = vary.rpartition("..")[2] if vary.strip().startswith(PATHS_THAT_SET_UNITS) else ""
     given = units_of_texts((ranged, such_that.rpartition("=")[2]))
     with shown_in({**base.device.shown, **given}):
         outcome = outermost(base, vary, such_that, highest, grid, threads, progress)

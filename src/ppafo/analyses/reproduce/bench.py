@@ -18,7 +18,7 @@ from ppafo.progress import Report, report_nothing
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import quantities
-from ppafo.simulation.overrides import apply_overrides
+from ppafo.simulation.overrides import override_document
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 
 _NOT_OF_THE_PAPER = ("assumed", "derived")
@@ -55,7 +55,7 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
     merged: dict[tuple[str, str, str], AssumedValue] = {}
     for name, scenario in scenarios.items():
         origin = scenario.origin
-        changed = apply_overrides(origin.content, read_overrides(origin.overrides), scenario.name)
+        changed = override_document(origin.content, read_overrides(origin.overrides), scenario.name)
         written = read_overrides(origin.content["device"].get("overrides", ()))
         file_set = with_overrides(load_parameter_set(origin.parameter_set), written, origin.valve)
         in_force = with_followers(with_overrides(file_set, changed.device, origin.valve))

@@ -24,7 +24,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import OF_A_VANE
 from ppafo.simulation.document import value_at
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.overrides import apply_overrides, deciding_kinds, is_of_device, unknown_value
+from ppafo.simulation.overrides import deciding_kinds, is_of_device, override_document, unknown_value
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 from ppafo.wording import count_of
@@ -288,7 +288,7 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     kinds = [path for path in by_path if path.endswith(".kind")]
     for path in sorted(by_path, key=lambda path: (path not in kinds, path.count("."), path)):
         documents = {
-            name: apply_overrides(load_scenario(name).origin.content, earlier, name).document
+            name: override_document(load_scenario(name).origin.content, earlier, name).document
             for name, earlier in applied.items()
         }
         known = tuple(dict.fromkeys(known for document in documents.values() for known in OF_A_VANE.paths(document)))

@@ -174,7 +174,7 @@ def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str
     return Section(columns=columns_of(head, rows), said=[completed], left=2)
 
 
-def write_report(results: StudyResults) -> None:
+def write_sweep_report(results: StudyResults) -> None:
     """Write figure, page and summary into the folder of the results.
 
     No file contains the path of the folder, so the same study gives the same bytes anywhere.

@@ -87,14 +87,14 @@ def sweep_into_folder(
         if unused:
             example = f"{argument_text('statistic', 'mean')} {argument_text('metric', 'rms_error')}"
             raise StudyError(f"{unused[0]}: needs a statistic, for example {example}")
-        from ppafo.analyses.sweep.answer import write_report
+        from ppafo.analyses.sweep.answer import write_sweep_report
         from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
 
         chosen = study_of(study, overrides, draws, seed)
         target = out or Path("out") / chosen.name
         try:
             swept = sweep(chosen, threads=threads, out=target, agreed=agreed, progress=progress)
-            write_report(swept.found)
+            write_sweep_report(swept.found)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(INTERRUPTED if is_begun(chosen, target) else INTERRUPTED_AT_ONCE) from None
         return swept

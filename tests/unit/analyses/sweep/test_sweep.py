@@ -133,7 +133,7 @@ def test_interruption_after_the_last_chunk_says_that_the_chunks_are_kept(
     def interrupted(*words: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("ppafo.analyses.sweep.answer.write_report", interrupted)
+    monkeypatch.setattr("ppafo.analyses.sweep.answer.write_sweep_report", interrupted)
     assert swept(study, tmp_path / "out") == 130
     assert "finished chunks are kept" in capsys.readouterr().err
     assert list((tmp_path / "out" / "runs").iterdir())

@@ -20,7 +20,7 @@ from ppafo.control.torque_loop import PROPORTIONAL_GAIN
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part, rated_pressure
 from ppafo.signals.recording import Floats
-from ppafo.simulation.default_gains import loop_terms
+from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.law_signals import IN_SCENARIO
 from ppafo.simulation.numbers import number_at
@@ -167,7 +167,9 @@ class Trials:
         ``columns`` replace numbers of the device by path.
         """
         scenario = self.problem.scenario
-        term = loop_terms(scenario.device, CONTROLLERS[scenario.controller.kind], IN_SCENARIO)[PROPORTIONAL_GAIN]
+        term = default_gain_terms(scenario.device, CONTROLLERS[scenario.controller.kind], IN_SCENARIO)[
+            PROPORTIONAL_GAIN
+        ]
         return term.number(lambda path: columns[path] if path in columns else number_at(scenario, path))
 
 
