@@ -22,7 +22,7 @@ from ppafo.simulation.document import ScenarioRequest, kind_at
 from ppafo.simulation.motion_kind import is_walk
 from ppafo.simulation.overrides import over_layer, override_document
 from ppafo.simulation.scenario import Scenario
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 
 def list_all_scenarios() -> tuple[str, ...]:
@@ -77,8 +77,7 @@ def load_scenario(
     if path.suffix != ".toml" and not path.is_file() and not path.is_dir():
         known = list_all_scenarios()
         raise ScenarioError(
-            f"there is no scenario or walk '{label(name)}'{nearest_name(name, known)}; available: {', '.join(known)}, "
-            "or give a .toml file"
+            f"there is no scenario or walk '{label(name)}'{known_names(name, known)}, or give a .toml file"
         )
     document = of_vanes.FILE.parse(FILE.read(path), label(name))
     given = read_overrides(overrides, ScenarioError)

@@ -63,6 +63,12 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
     return f", did you mean '{near[0]}'?" if near else ""
 
 
+def known_names(name: str, known: Iterable[str]) -> str:
+    """Return the end of a refusal of an unknown name: the nearest known name, and all known names."""
+    names = list(known)
+    return f"{nearest_name(name, names)}; available: {', '.join(names) or 'none'}"
+
+
 def _likeness(name: str, word: str) -> float:
     return difflib.SequenceMatcher(None, name, word).ratio()
 

@@ -9,12 +9,11 @@ from ppafo.errors import DataError
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_units
 from ppafo.rig.folder import RIG_FILE
-from ppafo.storage.owned_folder import MARK, marking_command, read_json
+from ppafo.storage.owned_folder import MARK, entries_of, marking_command, read_json
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import NETCDF_FILE, RUN_FILE
 from ppafo.study.manifest import MANIFEST
 from ppafo.units.shown import shown_in
-from ppafo.wording import reason
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,10 +27,7 @@ def names_in(folder: Path) -> list[str]:
     """Return the sorted names of the files and folders in a folder."""
     if not folder.is_dir():
         raise DataError(f"{folder}: is not a folder")
-    try:
-        return sorted(entry.name for entry in folder.iterdir())
-    except OSError as error:
-        raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
+    return sorted(entry.name for entry in entries_of(folder))
 
 
 def draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ppafo.errors import ArgumentError, UnitError
+from ppafo.errors import ArgumentError, UnitError, refused_as
 from ppafo.units import SI, number_text, parse_quantity, split_number
 from ppafo.units.shown import units_beside
 
@@ -123,10 +123,8 @@ def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]
             description, units = EXAMPLES[si_unit]
             examples = " or ".join(f"'{text.strip()} {unit}'" for unit in units)
             raise ArgumentError(f"{text}: {description} needs a unit: {examples}")
-        try:
+        with refused_as(ArgumentError, text, UnitError):
             value = parse_quantity(text, si_unit)
-        except UnitError as error:
-            raise ArgumentError(f"{text}: {error}") from error
         if value not in allowed:
             raise ArgumentError(f"{text}: must be {allowed.words(si_unit)}")
         return NumberWithUnit(value, split_number(text)[1]) if si_unit in _SHOWN_AS_GIVEN else value

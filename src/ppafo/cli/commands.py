@@ -8,7 +8,7 @@ from types import FunctionType
 from ppafo.cli.command_line import Command, CommandGroup, UsageError
 from ppafo.kinds import Kinds, is_installed, package_of
 from ppafo.plugins import name_modules_in
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 _ANALYSES, _BENCH, _DEVICE = "ppafo.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
 _EXPORTS, _WALKING = "ppafo.cli.verbs.exports", "ppafo.cli.verbs.walking"
@@ -180,7 +180,7 @@ def check_words(words: list[str]) -> None:
     name_modules_in(word)
     if word not in COMMANDS and word not in OTHERS:
         known = tuple(dict.fromkeys((*COMMANDS, *OTHERS)))
-        raise UsageError(f"there is no command '{word}'{nearest_name(word, known)}; available: {', '.join(known)}")
+        raise UsageError(f"there is no command '{word}'{known_names(word, known)}")
     command = COMMANDS.get(word)
     # A group alone is a mistake, unless its help is asked for, which the parser prints.
     if isinstance(command, CommandGroup) and "-h" not in words and "--help" not in words:
@@ -190,8 +190,7 @@ def check_words(words: list[str]) -> None:
         if action is None:
             raise UsageError(f"{word}: give one of {', '.join(actions)}; see 'ppafo {word} --help'")
         if action not in actions:
-            hint = nearest_name(action, actions)
-            raise UsageError(f"there is no 'ppafo {word} {action}'{hint}; available: {', '.join(actions)}")
+            raise UsageError(f"there is no 'ppafo {word} {action}'{known_names(action, actions)}")
 
 
 def list_commands() -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 from ppafo.cli.output import CommandOutput, listing
 from ppafo.errors import DataError
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 _FOLDER = resources.files("ppafo") / "examples"
 
@@ -45,8 +45,7 @@ def write_example(name: str, folder: Path) -> CommandOutput:
 
     examples = load_examples()
     if name not in examples:
-        hint = nearest_name(name, examples)
-        raise DataError(f"there is no example '{name}'{hint}; available: {', '.join(examples)}")
+        raise DataError(f"there is no example '{name}'{known_names(name, examples)}")
     example = examples[name]
     if os.path.lexists(folder):
         raise DataError(f"{folder}: already exists; remove it or choose another with --out")

@@ -11,7 +11,7 @@ from ppafo.arguments import File, Name, Word
 from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError
 from ppafo.kinds import kind_at
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import known_names, one_line
 
 _SUFFIX = ".toml"
 _SCHEMAS = {"set": "parameters"}
@@ -109,7 +109,7 @@ def new(
         return list_examples() if name is None else write_example(name, out or Path(name))
     known = (*KINDS, EXAMPLE)
     if kind not in known:
-        raise DataError(f"there is no kind of file '{kind}'{nearest_name(kind, known)}; available: {', '.join(known)}")
+        raise DataError(f"there is no kind of file '{kind}'{known_names(kind, known)}")
     if name is None or not _NAME.fullmatch(name):
         given = "is missing; it" if name is None else f"{one_line(name)}:"
         raise DataError(f"NAME {given} must consist of letters, digits, - and _; give a path with --out")

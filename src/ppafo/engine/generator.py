@@ -12,7 +12,16 @@ from ppafo.engine.definitions import emitted_name
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
 from ppafo.engine.program import Program
-from ppafo.engine.reduction import HISTORIES, NUMBER, Effects, Reduction, definition_of, names_in, uses_of_group
+from ppafo.engine.reduction import (
+    HISTORIES,
+    NUMBER,
+    Effects,
+    Reduction,
+    StepModule,
+    definition_of,
+    names_in,
+    uses_of_group,
+)
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import PlainFunction
@@ -63,12 +72,22 @@ class StepText:
     placeholders: dict[str, Any] = field(default_factory=dict)
     given: set[str] = field(default_factory=set)
     """Groups of intermediate values that the phases composed so far have set."""
+    module: StepModule = field(init=False, repr=False)
+    """This collection as functions of the step are reduced for it."""
 
     def __post_init__(self) -> None:
         """Look up the groups of the program, and link the functions of its components."""
         self.states, self.parameters = self.parts.state_rows(), self.parts.parameter_rows()
         self.of_step = self.parts.step_rows()
         link_program(self.parts, self.collector.replacements)
+        self.module = StepModule(
+            collector=self.collector,
+            parts=self.parts,
+            rows=self.rows,
+            placeholders=self.placeholders,
+            effects_of=lambda called: self.composed[called].effects,
+            add_called=self.add_called,
+        )
 
     @property
     def rows(self) -> Mapping[str, Any]:
@@ -97,10 +116,6 @@ class StepText:
         if is_step_function(called):
             return self._composed(called, known, is_phase=False).name
         return self.collector.add_inside(inside, called)
-
-    def effects_of(self, called: FunctionType) -> Effects:
-        """Return the groups that an added function of the step reads and sets."""
-        return self.composed[called].effects
 
     def add_inside(self, function: FunctionType, called: Any) -> str:
         """Add a function called inside another, unless it is a composed step; return its name in the module."""
@@ -148,7 +163,7 @@ class StepText:
         Groups of these functions become names. Their ``parts`` are other parts than the parts of the step.
         """
         plain = [function for function in functions if isinstance(function, FunctionType)]
-        reduced = [(function, Reduction(self, function, {"parts": parts}).reduced()) for function in plain]
+        reduced = [(function, Reduction(self.module, function, {"parts": parts}).reduced()) for function in plain]
         local = {name.id for _, tree in reduced for name in names_in(tree) if isinstance(name.ctx, ast.Store)}
         found: list[ast.stmt] = []
         for function, tree in reduced:
@@ -171,7 +186,7 @@ class StepText:
                     f"phase '{function.__name__}' is called with different 'parts' in one step; use the same 'parts'"
                 )
             return composed
-        reduction = Reduction(self, function, known)
+        reduction = Reduction(self.module, function, known)
         tree, effects = reduction.reduced(), reduction.effects
         if is_phase:
             # What nothing has rows for lives in this phase.

@@ -1,13 +1,12 @@
 """Storage of the numbers of a step in the generated loop: rows of ``x`` for many runs, local names for one run.
 
-The generator of the loop (``loop_text.py``) uses this storage for each phase call, each condition over all runs, and
-each function of ``lanes``.
+The generator of the loop (``loop_text.py``) asks either storage for the text of each phase call, each condition over
+all runs, and each function of ``lanes``.
 """
 
 import ast
 from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
-from types import FunctionType
 from typing import NamedTuple, TypeAlias
 
 from ppafo.engine.entries import indent, parse_expression
@@ -26,9 +25,9 @@ class Call(NamedTuple):
 
     def text(self, number: str) -> str:
         """Text of the call for one run, with the groups passed to the phase."""
-        handed = [number if name == NUMBER else name for name in self.phase.handed]
+        groups = [number if name == NUMBER else name for name in self.phase.handed]
         own = [self.arguments[name] for name in self.phase.effects.takes]
-        return f"{self.phase.name}({', '.join([*handed, *own])})"
+        return f"{self.phase.name}({', '.join([*groups, *own])})"
 
     @property
     def returned(self) -> str:
@@ -43,16 +42,15 @@ class Call(NamedTuple):
     def stored(self, slot: Slot, number: str) -> str:
         """Expression of the history element that the phase sets, for one run."""
         arguments = {name: parse_expression(text) for name, text in self.arguments.items()}
-        places = [ast.unparse(with_arguments(index, arguments)) for index in slot.places]
-        return f"{slot.history}[{', '.join([*places, number])}]"
+        indices = [ast.unparse(with_arguments(index, arguments)) for index in slot.places]
+        return f"{slot.history}[{', '.join([*indices, number])}]"
 
 
 class RowsOfLanes:
     """Row of ``x`` for each number of a program: state, parameters, intermediate values of a step and of its parts.
 
     With a single array for all numbers, the compiler knows that rows do not overlap. If waiting is rare, the rows from
-    ``aside`` on contain the saved data of waiting runs: state, remainder of the step, and values from the previous
-    step.
+    ``aside`` on contain the saved numbers of waiting runs: state, remainder of the step, values of the previous step.
     """
 
     def __init__(self, step: StepText, lanes: int = 0) -> None:
@@ -61,13 +59,13 @@ class RowsOfLanes:
         self.state_at = row_numbers(step.states)
         self.parameter_at = row_numbers(step.parameters, len(self.state_at))
         self.step_at = row_numbers(step.of_step, len(self.state_at) + len(self.parameter_at))
-        numbered = self.state_at | self.parameter_at | self.step_at
-        self.cells = {path: f"x[{row}, lane]" for path, row in numbered.items()}
-        self.aside = len(numbered)
-        # What was left of the step comes first: it says which lanes wait.
+        row_at = self.state_at | self.parameter_at | self.step_at
+        self.cells = {path: f"x[{row}, lane]" for path, row in row_at.items()}
+        self.aside = len(row_at)
+        # Paths of the saved numbers; behind the state comes the remainder, which is 0 for a run that does not wait.
         handed = [path for path in self.step_at if path.startswith(HANDED)]
-        self.kept = [*self.state_at, "remaining", *handed] if step.parts.parts_are_rare else []
-        self.count = self.aside + len(self.kept)
+        self.saved = [*self.state_at, "remaining", *handed] if step.parts.parts_are_rare else []
+        self.count = self.aside + len(self.saved)
         # Arrays that contain numbers, besides the arrays of the loop over steps.
         self.arrays: frozenset[str] = frozenset()
 
@@ -81,16 +79,16 @@ class RowsOfLanes:
         effects, rows = call.phase.effects, self.step.rows
         if not effects.results:
             return []
+        loaded = {group: rows[group] for group in call.phase.handed if group in rows}
         lines = [
-            f"{group} = {row_expression(rows[group], group, self.cells, self.step.collector.add)}"
-            for group in call.phase.handed
-            if group in rows
+            f"{group} = {row_expression(row, group, self.cells, self.step.collector.add)}"
+            for group, row in loaded.items()
         ]
         lines.append(f"{call.returned} = {call.text('lane')}")
         for group, fields in effects.groups.items():
             for path in leaf_paths(rows[group], group):
-                changes = fields is None or path.split(".")[1].partition("[")[0] in fields
-                if changes and path in self.cells:
+                is_changed = fields is None or path.split(".")[1].partition("[")[0] in fields
+                if is_changed and path in self.cells:
                     lines.append(f"{self.cells[path]} = {call.result(group)}{path.removeprefix(group)}")
         return lines + [f"{call.stored(slot, 'lane')} = {call.result(name)}" for name, slot in effects.slots.items()]
 
@@ -114,26 +112,21 @@ class RowsOfLanes:
                 f"        record[{arguments[0]}, row, lane] = x[row, lane]",
             ]
         states = len(self.state_at)
-        cells = [(self.cells[path], f"x[{self.aside + index}, lane]") for index, path in enumerate(self.kept)]
-        # Behind the state: first what was left of the step, then what it was handed.
-        beside = cells[states:]
+        numbers = [(self.cells[path], f"x[{self.aside + index}, lane]") for index, path in enumerate(self.saved)]
+        remaining, *handed = numbers[states:]
         if method == "set_aside":
             copied = over_rows(states, f"x[{self.aside} + row, lane] = x[row, lane]")
-            return [*copied, *_for_each_lane(f"{aside} = {cell}" for cell, aside in beside)]
-        # A lane whose step was done when it was set aside has waited since.
-        goes_on = f"x[{self.aside + states}, lane] > 0.0"
+            return [*copied, *_for_each_lane(f"{saved} = {cell}" for cell, saved in (remaining, *handed))]
+        # A lane whose step was complete when it was set aside takes its saved numbers back.
+        goes_on = f"{remaining[1]} > 0.0"
         copied = over_rows(states, f"x[row, lane] = x[row, lane] if {goes_on} else x[{self.aside} + row, lane]")
-        lines = [f"{cell} = {cell} if {goes_on} else {aside}" for cell, aside in beside[1:]]
+        lines = [f"{cell} = {cell} if {goes_on} else {saved}" for cell, saved in handed]
         return [*copied, *(_for_each_lane(lines) if lines else [])]
 
     def value(self, method: str, arguments: Sequence[str]) -> str:
         """Expression for a sample query: ``traces`` (whether it is traced) or ``slot`` (its index in the trace)."""
         index, trace_every = arguments
         return f"{index} % {trace_every} == 0" if method == "traces" else f"{index} // {trace_every} % trace.shape[0]"
-
-    def heading(self, function: FunctionType) -> list[ast.stmt]:  # noqa: ARG002 - a protocol
-        """Return no statements, because this text is not meant for readers."""
-        return []
 
 
 class RowsOfRun:
@@ -170,17 +163,13 @@ class RowsOfRun:
         text = ast.unparse(self.with_cells(condition))
         return [], f"not {text}" if is_none else text
 
-    def action(self, method: str, arguments: Sequence[str]) -> list[str]:  # noqa: ARG002 - a protocol
+    def action(self, method: str, arguments: Sequence[str]) -> list[str]:  # noqa: ARG002 - as for many runs
         """Return an empty statement, because a single run records nothing and does not wait."""
         return ["pass"]
 
-    def value(self, method: str, arguments: Sequence[str]) -> str:  # noqa: ARG002 - a protocol
+    def value(self, method: str, arguments: Sequence[str]) -> str:  # noqa: ARG002 - as for many runs
         """Constant result of a query on a sample: every sample is traced, at the first index of the trace."""
         return "True" if method == "traces" else "0"
-
-    def heading(self, function: FunctionType) -> list[ast.stmt]:
-        """The first line of the function's docstring."""
-        return [ast.Expr(ast.Constant((function.__doc__ or "").split("\n")[0]))]
 
 
 Rows: TypeAlias = RowsOfLanes | RowsOfRun

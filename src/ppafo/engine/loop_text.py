@@ -41,7 +41,7 @@ class LoopText:
         (self.rows, self.step), *others = steps.items()
         self.steps, self.function = steps, function
         assert isinstance(function, FunctionType), "it is no other callable"
-        self.reduction = Reduction(self.step, function, known or {})
+        self.reduction = Reduction(self.step.module, function, known or {})
         local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record", *self.rows.arrays})
         names = FunctionNames(local, local, self.step.placeholders, {"now": Now})
         self.composer = Composer(function, self.step.collector, names, self.step.add_inside)
@@ -189,7 +189,10 @@ class LoopText:
             for name, value in zip(names[2:], map(self.expression, node.args[2:]), strict=True)
             if not isinstance(value, ast.Name) or value.id != name
         ]
-        return [*begin, *self.rows.heading(function), *inner.lines()]
+        if isinstance(self.rows, RowsOfRun):
+            # The text for one run has readers.
+            begin.append(ast.Expr(ast.Constant((function.__doc__ or "").split("\n")[0])))
+        return [*begin, *inner.lines()]
 
 
 def _is_lanes(node: ast.expr) -> bool:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from types import CodeType, FunctionType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from ppafo.engine.composer import ModuleText, is_step_function
 from ppafo.engine.plain_python import parse_module, refusal
@@ -73,30 +73,24 @@ class Effects:
         return [*self.groups, *self.slots]
 
 
-class _StepModule(Protocol):
-    """Step functions of the module for which a function of the step is reduced."""
+class StepModule(NamedTuple):
+    """Module of one program, for which functions of the step are reduced.
 
-    @property
-    def collector(self) -> ModuleText:
-        """Text of the module."""
+    Attributes:
+        collector: text of the module
+        parts: components of the device
+        rows: classes of all groups that have rows
+        placeholders: known values in reduced functions, by their placeholder names
+        effects_of: groups that an added function of the step reads and sets
+        add_called: adds a function called by another function, with its known arguments; returns its name in the module
+    """
 
-    @property
-    def parts(self) -> Any:
-        """Components of the device."""
-
-    @property
-    def rows(self) -> Mapping[str, Any]:
-        """Classes of all groups that have rows."""
-
-    def add_called(self, inside: FunctionType, called: FunctionType, known: Mapping[str, Any]) -> str:
-        """Add a function called by another function, with its known arguments; return its name in the module."""
-
-    @property
-    def placeholders(self) -> dict[str, Any]:
-        """Known values in reduced functions, by their placeholder names."""
-
-    def effects_of(self, called: FunctionType) -> Effects:
-        """Return the groups that an added function of the step reads and sets."""
+    collector: ModuleText
+    parts: Any
+    rows: Mapping[str, Any]
+    placeholders: dict[str, Any]
+    effects_of: Callable[[FunctionType], Effects]
+    add_called: Callable[[FunctionType, FunctionType, Mapping[str, Any]], str]
 
 
 _COMPREHENSIONS = ast.GeneratorExp | ast.ListComp | ast.SetComp | ast.DictComp
@@ -178,7 +172,7 @@ def _definitions(file: str) -> dict[int, ast.FunctionDef]:
 class Reduction:
     """Reduction of one function; ``known`` are names with known values, in addition to ``parts``."""
 
-    def __init__(self, module: _StepModule, function: FunctionType, known: Mapping[str, Any]) -> None:
+    def __init__(self, module: StepModule, function: FunctionType, known: Mapping[str, Any]) -> None:
         self.module, self.function = module, function
         self.definition = definition_of(function)
         self.scope: dict[str, Any] = function.__globals__
@@ -204,11 +198,12 @@ class Reduction:
         used = {name.id for line in tree.body for name in names_in(line)}
         parameters = [name for name in self.parameters if name != "lane" and name not in self.known and name in used]
         self.effects.takes = tuple(parameters)
-        # A local name that is also the name of a group gets another spelling.
-        names = _Renaming((_bound(tree.body) | set(parameters)) & groups)
-        tree.body = [names.visit(line) for line in tree.body]
+        # A local name that is also the name of a group gets an underscore, and a group loses its prefix.
+        respelt = {name: f"{name}_" for name in (_bound(tree.body) | set(parameters)) & groups}
+        for name in {name for line in tree.body for name in names_in(line)}:
+            name.id = respelt.get(name.id, name.id.removeprefix(_GROUP))
         first = [NUMBER] if HISTORIES & self.effects.reads.keys() else []
-        every = [*dict.fromkeys([*first, *self.effects.reads]), *map(names.spelling, parameters)]
+        every = [*dict.fromkeys([*first, *self.effects.reads]), *(respelt.get(name, name) for name in parameters)]
         tree.args = ast.arguments([], [ast.arg(name) for name in every], None, [], [], None, [])
         return tree
 
@@ -279,14 +274,8 @@ class Reduction:
             if isinstance(value, ast.expr):
                 setattr(made, name, self.visit(value))
             elif isinstance(value, list):
-                setattr(made, name, [self.reduced_operand(operand) for operand in value])
+                setattr(made, name, [self.visit(item) if isinstance(item, ast.expr) else item for item in value])
         return made
-
-    def reduced_operand(self, node: ast.AST) -> ast.AST:
-        """Return a reduced operand of an expression."""
-        if isinstance(node, ast.keyword):
-            return ast.keyword(node.arg, self.visit(node.value))
-        return self.visit(node) if isinstance(node, ast.expr) else node
 
     def condition(self, node: ast.expr) -> ast.expr:
         """Return a reduced condition, which is a constant if known."""
@@ -385,8 +374,6 @@ class Reduction:
         if isinstance(called, FunctionType):
             for row in self.module.collector.handed_to(self.module.add_called(self.function, called, {})):
                 self.group_read(row)
-        if called is _UNKNOWN:
-            return self.with_reduced_operands(node)
         # Arguments that a generator makes are written out.
         arguments = [part for argument in node.args for part in self.arguments(argument)]
         named = [ast.keyword(keyword.arg, self.visit(keyword.value)) for keyword in node.keywords]
@@ -658,19 +645,3 @@ def with_arguments(expression: ast.expr, arguments: Mapping[str, ast.expr]) -> a
 
     replaced: ast.expr = _Replacing().visit(deepcopy(expression))
     return replaced
-
-
-@dataclass(slots=True)
-class _Renaming(ast.NodeTransformer):
-    """Transformer that inserts group names, and renames local names that conflict with a group."""
-
-    hidden: set[str]
-
-    def spelling(self, name: str) -> str:
-        """Return a local name, with an underscore appended if a group has the same name."""
-        return f"{name}_" if name in self.hidden else name
-
-    def visit_Name(self, node: ast.Name) -> ast.expr:
-        if node.id.startswith(_GROUP):
-            return ast.copy_location(ast.Name(node.id.removeprefix(_GROUP), node.ctx), node)
-        return ast.copy_location(ast.Name(self.spelling(node.id), node.ctx), node) if node.id in self.hidden else node

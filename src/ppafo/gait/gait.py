@@ -23,7 +23,7 @@ from ppafo.model.gait import HARMONICS as ENGINE_HARMONICS
 from ppafo.model.gait import Harmonic, Series
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -167,8 +167,7 @@ class Gait:
         """Return a curve by name; raises DataError if this gait does not contain the curve."""
         curves = self.curves
         if name not in curves:
-            hint = nearest_name(name, curves)
-            raise DataError(f"gait '{self.name}' has no curve '{name}'{hint}; available: {', '.join(curves)}")
+            raise DataError(f"gait '{self.name}' has no curve '{name}'{known_names(name, curves)}")
         return curves[name]
 
 

@@ -28,7 +28,7 @@ from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import draw_people
 from ppafo.walking.planning import batch_of_many, plan_walk
 from ppafo.walking.walk import lasting
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names, nearest_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +162,7 @@ def settings_of(arguments: Mapping[str, Any]) -> _EnvironmentSettings:
     names = [field.name for field in fields(_EnvironmentSettings)]
     for name in arguments:
         if name not in names:
-            hint = nearest_name(name, names)
-            raise ScenarioError(f"an environment has no argument '{name}'{hint}; available: {', '.join(names)}")
+            raise ScenarioError(f"an environment has no argument '{name}'{known_names(name, names)}")
     return _EnvironmentSettings(**arguments)
 
 

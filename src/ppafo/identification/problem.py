@@ -1,8 +1,9 @@
 """Problem file of ``ppafo identify``: initial parameter set, recordings, column maps, and procedures to apply."""
 
+from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
@@ -15,7 +16,7 @@ from ppafo.identification.tolerances import BenchSection
 from ppafo.identification.trajectory.layout import TrajectorySection, refuse_removed
 from ppafo.parameters.parameter_set import Citation
 from ppafo.storage.column_map import ColumnMap
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 _FILE = TomlKind(
     "identification problem", "identification", resources.files("ppafo.identification"), IdentificationError
@@ -72,12 +73,10 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
     named += [(f"experiment '{item.label}'", item.columns) for item in fitted]
     for user, name in named:
         if name is not None and name not in problem.columns:
-            hint = nearest_name(name, problem.columns)
-            known = ", ".join(problem.columns) or "none"
-            raise IdentificationError(f"{file}: {user}: there is no column map '{name}'{hint}; available: {known}")
+            names = known_names(name, problem.columns)
+            raise IdentificationError(f"{file}: {user}: there is no column map '{name}'{names}")
     return problem
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a problem file."""
-    return make_schema(ProblemFile, "ppafo identification problem")
+json_schema = partial(make_schema, ProblemFile, "ppafo identification problem")
+"""JSON Schema of a problem file."""

@@ -37,7 +37,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.units.reference import molar_mass_in
-from ppafo.wording import nearest_name, said_missing
+from ppafo.wording import known_names, said_missing
 
 PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"
 """Identification procedures in the recommended order."""
@@ -113,9 +113,8 @@ class ProcedureContext:
             molar_mass, heat_capacity_ratio = self.numbers("gas.molar_mass", "gas.heat_capacity_ratio")
             return GasAt(molar_mass, heat_capacity_ratio, temperature, deviation)
         if problem.gas not in SPECIES:
-            hint = nearest_name(problem.gas, SPECIES)
-            known = ", ".join(SPECIES)
-            raise IdentificationError(f"{self.label}: gas = {problem.gas!r} is unknown{hint}; available: {known}")
+            names = known_names(problem.gas, SPECIES)
+            raise IdentificationError(f"{self.label}: gas = {problem.gas!r} is unknown{names}")
         species = SPECIES[problem.gas]
         return GasAt(species.molar_mass, species.heat_capacity_ratio, temperature, deviation)
 

@@ -16,7 +16,7 @@ from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL, MeterKind
 from ppafo.units import from_si
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 Floats = NDArray[np.float64]
 
@@ -50,9 +50,7 @@ class Metrics(dict[str, Metric]):
 
     def __missing__(self, name: str) -> Metric:
         """Raise DataError with the nearest metric name."""
-        raise DataError(
-            f"there is no metric '{name}'{nearest_name(name, self)}; available: {', '.join(self) or 'none'}"
-        )
+        raise DataError(f"there is no metric '{name}'{known_names(name, self)}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,7 +42,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.parameters.plant import first_settings, shape_and_growth
 from ppafo.units.shown import counted_from, shown_in, shown_text
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import known_names, one_line
 
 _SAME = 1.0e-9
 """Angle difference [rad] below which two angles count as the same."""
@@ -87,8 +87,7 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
     species = parameter_set.texts[declaration.SPECIES_PATH].value
     if species not in SPECIES:
         raise ParameterError(
-            f"{parameter_set.file}: gas.species = '{one_line(species)}' is unknown{nearest_name(species, SPECIES)}; "
-            f"available: {', '.join(SPECIES)}"
+            f"{parameter_set.file}: gas.species = '{one_line(species)}' is unknown{known_names(species, SPECIES)}"
         )
     named_effects = {path.split(".")[1] for path in numbers if path.startswith(f"{SECTION}.")}
     supply = read("supply", _present(parameter_set, "supply"))
@@ -199,12 +198,7 @@ def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
 
 def actuator_problem(actuator: Actuator) -> str:
     """Return a message on contradictory actuator numbers; empty if consistent."""
-    stops = Range(
-        angle_min=actuator.angle_min,
-        angle_max=actuator.angle_max,
-        dead_volume_1=actuator.dead_volume_1,
-        dead_volume_2=actuator.dead_volume_2,
-    )
+    stops = Range(**{name: getattr(actuator, name) for name in Range._fields})
     kind, table = ACTUATORS[actuator.kind], actuator.table
     problem = "" if kind.problem is None else kind.problem(actuator, stops)
     if problem or table is None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.errors import ParameterError, PpafoError, UnitError
+from ppafo.errors import ParameterError, PpafoError, UnitError, refused_as
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import (
@@ -37,7 +37,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.units import SI, split_number
 from ppafo.units.shown import shown_text
-from ppafo.wording import nearest_name, one_line, override_text
+from ppafo.wording import known_names, nearest_name, one_line, override_text
 
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]
@@ -253,13 +253,11 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
         raise ParameterError(
             f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}{worked}"
         )
-    try:
+    with refused_as(ParameterError, f"override '{override}'", UnitError):
         value, unit = split_number(override.text)
         unit = declared[path].unit if unit == SI else unit
         entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
         entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
-    except UnitError as error:
-        raise ParameterError(f"override '{override}': {error}") from error
     kept = {key: old for key, old in parameter_set.numbers.items() if key not in other_forms(path)}
     return replace(parameter_set, numbers={**kept, path: entry})
 
@@ -282,8 +280,7 @@ def _in_conductance(override: Override) -> str:
 def _with_species(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
     species = SPECIES.get(override.text)
     if species is None:
-        hint = nearest_name(override.text, SPECIES)
-        raise ParameterError(f"override '{override}': unknown gas{hint}; available: {', '.join(SPECIES)}")
+        raise ParameterError(f"override '{override}': unknown gas{known_names(override.text, SPECIES)}")
     note = f"follows from the override {path}={override.text}"
     constants = {"gas.molar_mass": (species.molar_mass, "kg/mol")}
     constants["gas.heat_capacity_ratio"] = (species.heat_capacity_ratio, "")

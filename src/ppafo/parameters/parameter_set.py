@@ -28,7 +28,7 @@ from ppafo.parameters.graph import (
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.units import SI, base_value, format_quantity, split_quantity, to_si
 from ppafo.units.shown import units_beside, usual_unit
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
@@ -224,9 +224,9 @@ def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
     """
     name = valve or parameter_set.default_valve
     if name not in parameter_set.valve_kinds:
-        known = ", ".join(parameter_set.valve_kinds)
-        hint = nearest_name(name, parameter_set.valve_kinds)
-        raise ParameterError(f"{parameter_set.file}: there is no valve '{name}'{hint}; available: {known}")
+        raise ParameterError(
+            f"{parameter_set.file}: there is no valve '{name}'{known_names(name, parameter_set.valve_kinds)}"
+        )
     return name
 
 

@@ -9,7 +9,7 @@ from ppafo.processor.console import UNTOUCHED, Console, depth_of_stack
 from ppafo.processor.images import Decision, Image, Target
 from ppafo.processor.qemu import QemuSimulator
 from ppafo.storage.files import write_file
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 # mspdebug's simulator of an MSP430, driven by its console.
 
@@ -215,6 +215,5 @@ TARGETS = tuple(CATALOG)
 def target_of(name: str) -> Target:
     """Return a target by name. Raises ScenarioError for an unknown name."""
     if name not in CATALOG:
-        hint = nearest_name(name, CATALOG)
-        raise ScenarioError(f"there is no target '{name}'{hint}; available: {', '.join(CATALOG)}")
+        raise ScenarioError(f"there is no target '{name}'{known_names(name, CATALOG)}")
     return CATALOG[name]

@@ -20,7 +20,7 @@ from ppafo.rig.transient import record_free_decay, record_step_response, record_
 from ppafo.signals.recording import Recording
 from ppafo.simulation.scenario import UNITS
 from ppafo.version import __version__
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import known_names, one_line
 
 _LARGEST_SEED = 2**32 - 1
 _DEFAULT_DEVICE = "ppafo2011"
@@ -115,8 +115,7 @@ def record(
 def find_experiment(name: str) -> tuple[str, Callable[[ExperimentRequest], ExperimentResult]]:
     """Return summary and function of an experiment. Raises ParameterError for an unknown name."""
     if name not in EXPERIMENTS:
-        hint = nearest_name(name, EXPERIMENTS)
-        raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; available: {', '.join(EXPERIMENTS)}")
+        raise ParameterError(f"there is no experiment '{one_line(name)}'{known_names(name, EXPERIMENTS)}")
     return EXPERIMENTS[name]
 
 

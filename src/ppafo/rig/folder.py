@@ -8,8 +8,7 @@ from ppafo.errors import DataError
 from ppafo.rig.experiments import NOTICE, RigRecording
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added
-from ppafo.storage.owned_folder import read_json
-from ppafo.wording import reason
+from ppafo.storage.owned_folder import entries_of, read_json
 
 RIG_FILE = "rig.json"
 _FORMAT = "ppafo rig"
@@ -45,12 +44,9 @@ def _earlier(folder: Path, name: str) -> dict[str, Any]:
     Raises DataError if the folder was not written by the rig, or if the recording ``name`` would replace a file of
     another origin.
     """
-    try:
-        names = {entry.name for entry in folder.iterdir()} if folder.is_dir() else set()
-    except OSError as error:
-        raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
     # What a killed writer left is no file of others.
-    present = {entry for entry in names if LEFT_ASIDE not in entry}
+    entries = entries_of(folder) if folder.is_dir() else []
+    present = {entry.name for entry in entries if LEFT_ASIDE not in entry.name}
     recordings: Any = {}
     if RIG_FILE in present:
         path = folder / RIG_FILE

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.units import from_si
-from ppafo.wording import count_of, nearest_name
+from ppafo.wording import count_of, known_names, nearest_name
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -372,8 +372,7 @@ class Recording:
 
     def _channel(self, name: str) -> Channel:
         if name not in self.channels:
-            hint = nearest_name(name, self.names)
-            raise DataError(f"{self.label}: there is no channel '{name}'{hint}; available: {', '.join(self.names)}")
+            raise DataError(f"{self.label}: there is no channel '{name}'{known_names(name, self.names)}")
         return self.channels[name]
 
 
@@ -382,7 +381,7 @@ def recording_kind(name: str) -> RecordingKind:
     for kind in _KINDS:
         if kind == name:
             return kind
-    raise DataError(f"{name!r} is not a kind of recording{nearest_name(name, _KINDS)}; available: {', '.join(_KINDS)}")
+    raise DataError(f"{name!r} is not a kind of recording{known_names(name, _KINDS)}")
 
 
 def between_samples(recording: Recording, name: str, times: Floats, start: float = 0.0) -> Floats:

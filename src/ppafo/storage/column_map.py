@@ -6,10 +6,11 @@ extracts the mapped columns of a text file.
 
 from collections.abc import Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from importlib import resources
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -19,7 +20,7 @@ from ppafo.errors import DataError, refused_as
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import TIME, Between, Floats
 from ppafo.storage.clock import ClockForm, DateOrder
-from ppafo.wording import LONGEST_SHOWN, nearest_name, one_line
+from ppafo.wording import LONGEST_SHOWN, known_names, one_line
 
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
 
@@ -121,17 +122,15 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
     """
     parsed, file = read_model(_FILE, _ColumnMaps, path)
     maps = parsed.columns
-    known = ", ".join(maps)
     if name is None and len(maps) > 1:
-        raise DataError(f"{file}: has several column maps; name one as {file}:NAME; available: {known}")
+        raise DataError(f"{file}: has several column maps; name one as {file}:NAME; available: {', '.join(maps)}")
     if name is not None and name not in maps:
-        raise DataError(f"{file}: there is no column map '{name}'{nearest_name(name, maps)}; available: {known}")
+        raise DataError(f"{file}: there is no column map '{name}'{known_names(name, maps)}")
     return maps[name or next(iter(maps))]
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a file of column maps."""
-    return make_schema(_ColumnMaps, "ppafo column maps")
+json_schema = partial(make_schema, _ColumnMaps, "ppafo column maps")
+"""JSON Schema of a file of column maps."""
 
 
 def column_map_of(columns: ColumnMap | str | Path) -> tuple[ColumnMap, str]:

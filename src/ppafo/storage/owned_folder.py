@@ -100,7 +100,7 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
     # A link to nowhere is there too, and would be replaced by a folder.
     if not is_folder and os.path.lexists(folder):
         raise DataError(f"{folder}: is a file; a {kind.noun} needs a folder")
-    present = {entry.name for entry in _entries(folder)} if is_folder else set()
+    present = {entry.name for entry in entries_of(folder)} if is_folder else set()
     if present:
         _check_earlier_result(folder, kind, present, kept)
     check_folder_can_be_replaced(folder)
@@ -141,7 +141,7 @@ def _check_earlier_result(folder: Path, kind: FolderKind, present: Collection[st
 
 def _foreign_names(folder: Path, expected: Collection[str], prefix: str = "") -> Iterator[str]:
     """Yield names of folder entries, with ``prefix``, that are not among the ``expected`` files."""
-    for entry in _entries(folder):
+    for entry in entries_of(folder):
         name = f"{prefix}{entry.name}"
         is_expected_folder = any(file.startswith(f"{name}/") for file in expected)
         if is_expected_folder and entry.is_dir() and not entry.is_symlink():
@@ -150,7 +150,8 @@ def _foreign_names(folder: Path, expected: Collection[str], prefix: str = "") ->
             yield name
 
 
-def _entries(folder: Path) -> list[Path]:
+def entries_of(folder: Path) -> list[Path]:
+    """Return the files and folders in a folder. Raises DataError if the folder cannot be read."""
     try:
         return list(folder.iterdir())
     except OSError as error:

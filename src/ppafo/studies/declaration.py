@@ -4,7 +4,8 @@ Values are texts with their unit, as in a scenario file; ``loading`` converts th
 of a value.
 """
 
-from typing import Annotated, Any, Literal, get_args
+from functools import partial
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
@@ -232,6 +233,5 @@ class StudyFile(StrictTable):
     outputs: Annotated[OutputsSection, Field(description="for 'sweep': what is kept of each run")] = OutputsSection()
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a study file."""
-    return make_schema(StudyFile, "ppafo study")
+json_schema = partial(make_schema, StudyFile, "ppafo study")
+"""JSON Schema of a study file."""

@@ -13,7 +13,7 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_configuration, load_study
 from ppafo.studies.sampling import NOISE, correlate, uniform_numbers, with_noise
 from ppafo.studies.study import Configuration, RandomValue, SamplingPlan, Study, with_followers
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
 """Limits of the number of draws: two per replicate, and the largest number with balanced Sobol replicates."""
@@ -152,8 +152,7 @@ def choose_configuration(study: Study, name: str | None) -> Configuration:
             raise StudyError(f"study '{study.name}' has several configurations; choose one: {', '.join(names)}")
         return study.configurations[0]
     if name not in names:
-        hint = nearest_name(name, names)
-        raise StudyError(f"study '{study.name}' has no configuration '{name}'{hint}; available: {', '.join(names)}")
+        raise StudyError(f"study '{study.name}' has no configuration '{name}'{known_names(name, names)}")
     return study.configurations[names.index(name)]
 
 

@@ -20,7 +20,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
 from ppafo.units import parse_quantity
-from ppafo.wording import first_twice, nearest_name, override_text
+from ppafo.wording import first_twice, known_names, override_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +90,7 @@ def _check_names(key: str, requested: Sequence[str], known: Collection[str], sho
     for name in requested:
         if name not in known:
             what, apply = "metric" if key == "metrics" else "channel", shown or known
-            hint = nearest_name(name, apply)
-            raise StudyError(f"outputs.{key}: there is no {what} '{name}'{hint}; available: {', '.join(apply)}")
+            raise StudyError(f"outputs.{key}: there is no {what} '{name}'{known_names(name, apply)}")
     repeated = first_twice(requested)
     if repeated is not None:
         raise StudyError(f"outputs.{key}: '{repeated}' is named twice; name it once")
@@ -254,10 +253,7 @@ def configurations_with(configurations: Sequence[Configuration], overrides: Iter
         typed, equals, value = text.partition("=")
         name, colon, path = (part.strip() for part in typed.rpartition(":"))
         if colon and name not in own:
-            hint = nearest_name(name, names)
-            raise StudyError(
-                f"override '{text}': there is no configuration '{name}'{hint}; available: {', '.join(names)}"
-            )
+            raise StudyError(f"override '{text}': there is no configuration '{name}'{known_names(name, names)}")
         for addressed in [name] if colon else names:
             own[addressed].append(f"{path}{equals}{value}" if colon else text)
     changed, refused = [], []

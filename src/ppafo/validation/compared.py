@@ -7,7 +7,7 @@ from ppafo.errors import DataError, UnitError
 from ppafo.parameters.device import Device
 from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS
 from ppafo.units import parse_quantity, split_quantity
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import known_names, one_line
 
 ANGLE, PRESSURE_1, PRESSURE_2 = "angle", "pressure_1", "pressure_2"
 PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
@@ -101,10 +101,8 @@ def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
         if separator:
             channel = name.strip()
             if channel not in COMPARED:
-                hint, known = nearest_name(channel, COMPARED), ", ".join(COMPARED)
-                raise DataError(
-                    f"threshold '{one_line(text)}': there is no channel '{one_line(channel)}'{hint}; available: {known}"
-                )
+                names = known_names(channel, COMPARED)
+                raise DataError(f"threshold '{one_line(text)}': there is no channel '{one_line(channel)}'{names}")
             channels[channel] = _limit(value, text, COMPARED[channel].unit)
         else:
             others = _limit(value, text, "")

@@ -9,7 +9,7 @@ from ppafo.simulation.scenario import Leg
 from ppafo.units import parse_quantity
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2, Thresholds, parse_thresholds
 from ppafo.validation.replay import MOTIONS, Motion
-from ppafo.wording import argument_text, nearest_name, one_line
+from ppafo.wording import argument_text, known_names, nearest_name, one_line
 
 DEFAULT_LIMIT = 0.02
 """Default limit of the estimated delay [s]; sensors, filters and valves lag less."""
@@ -75,10 +75,8 @@ def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
                 f"initial value '{one_line(text)}' is not of the form CHANNEL=VALUE, for example '{_EXAMPLES[ANGLE]}'"
             )
         if name not in _UNITS:
-            hint = nearest_name(name, _UNITS)
             raise DataError(
-                f"initial value '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; "
-                f"available: {', '.join(_UNITS)}"
+                f"initial value '{one_line(text)}': there is no channel '{one_line(name)}'{known_names(name, _UNITS)}"
             )
         with refused_as(DataError, f"initial value '{one_line(text)}'", UnitError):
             values[name] = parse_quantity(value, _UNITS[name], atmosphere)

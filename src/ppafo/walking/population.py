@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +28,8 @@ from ppafo.walking.walk import Progress, lasting, silent
 
 MAXIMUM_WEARERS = 1_000_000
 """Largest number of wearers of a population."""
-
 STEPS_AT_ONCE = 1.0e8
-"""Total number of steps of a group of wearers that is simulated at once, a few seconds of computing time."""
-
+"""Steps of all wearers of a group that is simulated at once [-], a few seconds of computing time."""
 SHOWN = {
     "gas": ("Gas per stride", "gas mass", 3),
     "positive_push_off_work": ("Positive work on the wearer in push-off", "energy", 2),
@@ -44,19 +42,18 @@ SHOWN = {
     "stance_share": ("Stance", "fraction", 1),
 }
 """Title, kind of quantity and number of decimals of the quantities shown for every wearer."""
-
-
 OUTCOMES = {
     name: (quantity.unit, f"{quantity.summary}, mean over all strides of a wearer")
     for name, quantity in PER_STRIDE.items()
 }
+"""Unit and meaning of each outcome of a walk."""
 TRAITS = {
     "body_mass": ("kg", "mass of the body"),
     "shank_length": ("m", "knee to ankle"),
     "stride_time": ("s", "from one heel strike to the next"),
     "stance_share": ("-", "fraction of the stride until toe-off"),
 }
-"""Unit and meaning of each outcome and trait of a wearer."""
+"""Unit and meaning of each trait of a wearer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -64,10 +61,8 @@ class Population:
     """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
 
     - ``scenario``: walk of the first wearer
-    - ``minutes``: duration of each walk [min]
-    - ``seed``: random seed of the wearers
-    - ``traits``, ``outcomes``: traits of the wearers, and outcomes of their walks, without wearers whose simulation
-      diverged
+    - ``minutes``, ``seed``: duration of each walk [min], and random seed of the wearers
+    - ``traits``, ``outcomes``: of the wearers whose simulation did not diverge
     - ``diverged``: number of wearers whose simulation diverged
     - ``vented``: number of wearers whose controller stopped permanently
     - ``paused``: number of other wearers with reduced assistance for a while
@@ -132,67 +127,72 @@ def walk_population(
     if not 1 <= wearers <= MAXIMUM_WEARERS:
         raise ScenarioError(f"wearers = {wearers}: must be from 1 to {MAXIMUM_WEARERS}")
     configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
-    if walk_of(configuration).bottle is not None:
+    motion = walk_of(configuration)
+    if motion.bottle is not None:
         raise ScenarioError(
             "walks of several wearers need a constant supply pressure: omit the bottle, or the number of wearers"
         )
-    if walk_of(configuration).person:
+    if motion.person:
         raise ScenarioError(
             "wearer.person is not allowed with several wearers, which are drawn at random; omit wearer.person, or the "
             "number of wearers"
         )
-    motion = walk_of(configuration)
     people = draw_people(motion.gait, wearers, np.random.default_rng(seed))
     crowd = crowd_of(configuration, people)
-    planned = task_sequence_of_walk(crowd)
-    if minutes is None and planned is not None:
-        minutes = float(np.max(planned.duration)) / 60.0
+    sequence = task_sequence_of_walk(crowd)
+    if minutes is None and sequence is not None:
+        # Until the slowest wearer has completed the task sequence.
+        minutes = float(np.max(sequence.duration)) / 60.0
     seconds = lasting(configuration, minutes).run.duration
     run, _ = plan_walks(with_duration(crowd, seconds))
-    batch = unrecorded(run, wearers)
-
-    # Groups small enough for an interrupt to be seen and for progress to be reported.
-    size = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES
-    groups = []
-    for start in range(0, wearers, size):
-        group = slice(start, start + size)
-        groups.append(
-            run_batch(Batch(batch.program, batch.clock, batch.parameters[:, group], batch.states[:, group])).states
-        )
-        progress(float(min(start + size, wearers)), float(wearers))
-    states = np.concatenate(groups, axis=1)
-    is_finished = np.isfinite(states).all(axis=0)
-    rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
-    is_finished &= rows["result.failure_time"] >= NEVER_FAILED
-
-    # Outcomes are totals divided by the strides walked, parts of one included, or by the heel strikes.
-    walked = run.step * run.step_count
-    strides = walked * people.timing.frequency if planned is None else turns_walked(planned.timed, walked)
-    # Who never strikes must not divide by zero.
-    strikes = np.maximum(rows["walk.strides"], 1.0)
-    counts = {"toe_clearance": strikes, "toe_landing": strikes}
-    outcomes = {name: rows[quantity.total] / counts.get(name, strides) for name, quantity in PER_STRIDE.items()}
+    numbers = _final_numbers(unrecorded(run, wearers), progress)
+    is_finished = np.isfinite(list(numbers.values())).all(axis=0) & (numbers["result.failure_time"] >= NEVER_FAILED)
+    final = {path: values[is_finished] for path, values in numbers.items()}
+    walked = run.step * run.step_count  # [s]; an unfinished stride counts by its fraction
+    strides = np.asarray(walked * people.timing.frequency if sequence is None else turns_walked(sequence.timed, walked))
     traits = {
         "body_mass": motion.wearer.body_mass * np.asarray(people.mass),
         "shank_length": motion.wearer.shank_length * np.asarray(people.stature),
         "stride_time": np.asarray(people.stride_time),
         "stance_share": np.asarray(people.timing.toe_off),
     }
-
-    vented, paused, flags = 0, 0, Counter[str]()
-    if SAFE_ROW in rows:
-        is_stopped, is_reduced = rows[SAFE_ROW][is_finished] == STOPPED, rows[VENTINGS_ROW][is_finished] > 0.0
-        vented, paused = int(is_stopped.sum()), int((~is_stopped & is_reduced).sum())
-        last_flags = rows[f"{FINDING_ROW}.fault_flag"][is_finished][is_reduced]
-        flags.update(FAULT_FLAGS[flag].name for flag in last_flags.tolist())
+    vented, paused, fault_flags = _reduced_assistance(final)
     return Population(
         scenario=configuration,
         minutes=seconds / 60.0,
         seed=seed,
         traits={name: values[is_finished] for name, values in traits.items()},
-        outcomes={name: values[is_finished] for name, values in outcomes.items()},
+        outcomes=_mean_outcomes(final, strides[is_finished]),
         diverged=int((~is_finished).sum()),
         vented=vented,
         paused=paused,
-        fault_flags=dict(flags.most_common()),
+        fault_flags=fault_flags,
     )
+
+
+def _final_numbers(batch: Batch, progress: Progress) -> dict[str, Floats]:
+    """Return the final states (wearers,) by path; groups of wearers are small enough for interrupts and progress."""
+    wearers = batch.states.shape[1]
+    size = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES
+    states = np.empty_like(batch.states)
+    for start in range(0, wearers, size):
+        group = slice(start, start + size)
+        part = replace(batch, parameters=batch.parameters[:, group], states=batch.states[:, group])
+        states[:, group] = run_batch(part).states
+        progress(float(min(start + size, wearers)), float(wearers))
+    return {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
+
+
+def _mean_outcomes(final: Mapping[str, Floats], strides: Floats) -> dict[str, Floats]:
+    """Return totals of walks divided by the number of strides, those of the toes by the heel strikes, at least 1."""
+    counts = dict.fromkeys(("toe_clearance", "toe_landing"), np.maximum(final["walk.strides"], 1.0))
+    return {name: final[quantity.total] / counts.get(name, strides) for name, quantity in PER_STRIDE.items()}
+
+
+def _reduced_assistance(final: Mapping[str, Floats]) -> tuple[int, int, dict[str, int]]:
+    """Return the numbers of vented and paused wearers, and their fault flags, as in ``Population``."""
+    if SAFE_ROW not in final:
+        return 0, 0, {}
+    is_stopped, is_reduced = final[SAFE_ROW] == STOPPED, final[VENTINGS_ROW] > 0.0
+    flags = Counter(FAULT_FLAGS[flag].name for flag in final[f"{FINDING_ROW}.fault_flag"][is_reduced].tolist())
+    return int(is_stopped.sum()), int((is_reduced & ~is_stopped).sum()), dict(flags.most_common())

@@ -1,4 +1,4 @@
-"""Simulation of a walk, or of many wearers, and comparison with no device and with a healthy ankle."""
+"""Simulation of a walk of one wearer, and comparison with no device and with a healthy ankle."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -10,8 +10,8 @@ import numpy as np
 
 from ppafo.arguments import Minutes, Overrides, checked
 from ppafo.control.walking import event_on_off
-from ppafo.engine.lanes import STEPS_PER_CALL, begin_block, effort_for
-from ppafo.engine.run import batch_of
+from ppafo.engine.lanes import STEPS_PER_CALL, BatchResult, begin_block, effort_for
+from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics import Metric
 from ppafo.model.leg import passive_torque
@@ -23,11 +23,11 @@ from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle
-from ppafo.walking.bottle.course import WALKED
+from ppafo.walking.bottle.course import WALKED, SupplyEnding
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
+from ppafo.walking.motion import SHORTEST_STRIDES, WalkMotion, duration_problems, walk_of, with_duration
 from ppafo.walking.planning import fed_device, plan_walk, task_sequence_of_walk
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import WalkResult, result_of_walk
@@ -36,8 +36,11 @@ from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_hei
 Progress = Callable[[float, float], None]
 """Progress callback, called with completed and total work."""
 
-_MINUTE = 60.0
-"""A minute [s]."""
+ANKLE_RANGE = math.radians(45.0), math.radians(140.0)
+"""Ankle range [rad] without a device: 45 deg in dorsiflexion, assumed beyond any gait here, to 50 deg in
+plantarflexion, a usual norm of passive motion."""
+_LEG_CHAMBER = 1.0e-3
+"""Chamber volume [m^3] of a leg without a device: gas at rest, in a volume large enough not to require short steps."""
 
 
 def silent(done: float, total: float) -> None:  # the arguments of ``Progress``
@@ -86,62 +89,68 @@ def walk(
     -0.034 m
     """
     name_plugins(plugins)
-    if isinstance(scenario, Scenario):
-        if any(choice is not None for choice in (gait, task_sequence, bottle)) or tuple(overrides):
-            raise ScenarioError(
-                "a loaded Scenario accepts no overrides, gait, task sequence or bottle; give these to load_walk"
-            )
-        check_parts(scenario)
-        chosen = scenario
+    if not isinstance(scenario, Scenario):
+        scenario = load_walk(scenario, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
+    elif tuple(overrides) or any(choice is not None for choice in (gait, task_sequence, bottle)):
+        raise ScenarioError(
+            "a loaded Scenario accepts no overrides, gait, task sequence or bottle; give these to load_walk"
+        )
     else:
-        chosen = load_walk(scenario, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
-    chosen = lasting(chosen, minutes)
-    run, carried_bottle = plan_walk(chosen), walk_of(chosen).bottle
-    custom = chosen.controller.custom
+        check_parts(scenario)
+    scenario = lasting(scenario, minutes)
+    run, motion, custom = plan_walk(scenario), walk_of(scenario), scenario.controller.custom
     if custom is not None:
-        check_no_bottle(chosen)
-        return result_of_walk(chosen, run, run_sampled(batch_of(run), custom), None)
-    if carried_bottle is None:
-        # In parts short enough for an interrupt to be seen and for progress to be reported.
-        batch, count = batch_of(run), run.step_count
-        block = begin_block(batch, effort_for(batch))
-        for done in range(0, count, STEPS_PER_CALL):
-            block.advance(min(STEPS_PER_CALL, count - done))
-            progress(min(done + STEPS_PER_CALL, count) * run.step / 60.0, count * run.step / 60.0)
-        return result_of_walk(chosen, run, block.result(), None)
-    outcome, supply = run_on_bottle(run, fed_device(chosen), carried_bottle, walk_of(chosen).gait.stride_time, progress)
-    return result_of_walk(chosen, run, outcome, supply)
+        check_no_bottle(scenario)
+        return result_of_walk(scenario, run, run_sampled(batch_of(run), custom), None)
+    if motion.bottle is None:
+        return result_of_walk(scenario, run, _simulated(run, progress), None)
+    rows, supply = run_on_bottle(run, fed_device(scenario), motion.bottle, motion.gait.stride_time, progress)
+    return result_of_walk(scenario, run, rows, supply)
+
+
+def _simulated(run: Run, progress: Progress) -> BatchResult:
+    """Return states and records of a walk, run in parts short enough for interrupts and progress reports."""
+    batch, steps = batch_of(run), run.step_count
+    block = begin_block(batch, effort_for(batch))
+    for done in range(0, steps, STEPS_PER_CALL):
+        block.advance(min(STEPS_PER_CALL, steps - done))
+        progress(min(done + STEPS_PER_CALL, steps) * run.step / 60.0, steps * run.step / 60.0)
+    return block.result()
 
 
 def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = silent) -> BottleLife:
     """Walk on the scenario's bottle until the bottle is exhausted; return the time that it lasted.
 
-    The simulation is the one of ``walk`` on a bottle, with the rests and the longest duration of ``schedule``; a task
-    sequence is repeated. Faults are ignored, since a stopped device uses no gas. Raises ScenarioError for a walk
-    without a bottle.
+    The simulation is as in ``walk``, with the rests and the longest duration of ``schedule``; a task sequence is
+    repeated. Faults are ignored: a stopped device uses no gas. Raises ScenarioError for a walk without a bottle.
     """
-    intact = dict.fromkeys(walk_of(scenario).faults, FaultSettings())
-    scenario = replace(scenario, motion=replace(walk_of(scenario), faults=intact, broken={}))
-    motion, planned = walk_of(scenario), task_sequence_of_walk(scenario)
+    motion = _without_faults(walk_of(scenario))
     if motion.bottle is None:
         raise ScenarioError(f"{scenario.name}: has no bottle; give a walk with [bottle]")
     if scenario.controller.custom is not None:
         check_no_bottle(scenario)
+    repeated = _repeated_walk(replace(scenario, motion=motion), schedule.longest)
+    run, device = plan_walk(repeated), fed_device(repeated)
+    return life_on_bottle(run, device, motion.bottle, motion.gait.stride_time, schedule, progress)
 
-    def recorded_each_minute(seconds: float) -> Scenario:
-        lasting_walk = with_duration(scenario, seconds)
-        return replace(lasting_walk, run=replace(lasting_walk.run, output_interval=_MINUTE))
 
-    if planned is not None:
-        longest = with_duration(scenario, float(planned.duration))
-    else:
-        # A walk of more steps than a run may take begins again, like a task sequence.
-        step = plan_walk(recorded_each_minute(_MINUTE)).step
-        seconds = math.ceil(schedule.longest / motion.gait.stride_time) * motion.gait.stride_time
-        seconds = min(seconds, _MINUTE * (MAXIMUM_STEPS * step // _MINUTE))
-        longest = recorded_each_minute(_MINUTE * max(1, round(seconds / _MINUTE)))
-    run = plan_walk(longest)
-    return life_on_bottle(run, fed_device(longest), motion.bottle, motion.gait.stride_time, schedule, progress)
+def _repeated_walk(scenario: Scenario, longest: float) -> Scenario:
+    """Return the walk that is repeated on a bottle: a task sequence, else strides for up to ``longest`` [s].
+
+    Strides are recorded once a minute, and last as many whole minutes as the steps of one run allow.
+    """
+    sequence, stride_time = task_sequence_of_walk(scenario), walk_of(scenario).gait.stride_time
+    if sequence is not None:
+        return with_duration(scenario, float(sequence.duration))
+    minute = replace(scenario, run=replace(scenario.run, duration=60.0, output_interval=60.0))
+    seconds_of_run = 60.0 * (MAXIMUM_STEPS * plan_walk(minute).step // 60.0)
+    seconds = min(math.ceil(longest / stride_time) * stride_time, seconds_of_run)
+    return replace(minute, run=replace(minute.run, duration=60.0 * max(1, round(seconds / 60.0))))
+
+
+def _without_faults(motion: WalkMotion) -> WalkMotion:
+    """Return the motion with intact sensors and an intact plant."""
+    return replace(motion, faults=dict.fromkeys(motion.faults, FaultSettings()), broken={})
 
 
 def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
@@ -194,22 +203,25 @@ def compare_walks(
     """
     configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
     worn = walk(configuration, minutes=minutes, progress=progress)
-    # Refuse a walk that its bottle ended within the first strides.
-    shortest = SHORTEST_STRIDES * walk_of(worn.scenario).gait.stride_time
-    ending = None if worn.supply is None or worn.supply.ending.kind == WALKED else worn.supply.ending
-    if ending is not None and ending.time < shortest:
+    if worn.supply is not None and worn.supply.ending.kind != WALKED:
+        _check_strides_on_bottle(worn, worn.supply.ending)
+        # The bottle has shortened the walk: the walk without the device is as long.
+        minutes = float(worn.recording.time[-1]) / 60.0
+    bare = walk(without_device(configuration), minutes=minutes, progress=progress)
+    # A leg is simulated with two chambers; channels of a chamber that the device does not have are left out.
+    channels = {name: channel for name, channel in bare.recording.channels.items() if name in worn.recording}
+    averages = {name: curves for name, curves in bare.averages.items() if name in channels}
+    bare = replace(bare, recording=replace(bare.recording, channels=channels), averages=averages)
+    return WalkComparison(worn, bare, healthy_metrics(configuration))
+
+
+def _check_strides_on_bottle(worn: WalkResult, ending: SupplyEnding) -> None:
+    """Raise SimulationError for a walk that its bottle ends within the first strides."""
+    if ending.time < SHORTEST_STRIDES * walk_of(worn.scenario).gait.stride_time:
         raise SimulationError(
             f"{worn.scenario.name}: with its bottle, the walk ends after {ending.time:.3g} s, within the first "
             f"{SHORTEST_STRIDES} strides ({ending.message}); use a fuller, larger or warmer bottle"
         )
-    # Without the device for the same time, which a bottle may have shortened.
-    duration = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
-    bare = walk(without_device(configuration), minutes=duration, progress=progress)
-    # The leg alone is computed with two chambers of no device: a chamber that the device has not is none of the leg's.
-    shared = {name: channel for name, channel in bare.recording.channels.items() if name in worn.recording}
-    averages = {name: curves for name, curves in bare.averages.items() if name in shared}
-    bare = replace(bare, recording=replace(bare.recording, channels=shared), averages=averages)
-    return WalkComparison(worn, bare, healthy_metrics(configuration))
 
 
 def with_device_off(configuration: Scenario) -> Scenario:
@@ -222,16 +234,6 @@ def with_device_off(configuration: Scenario) -> Scenario:
     return replace(configuration, name=name, controller=control, motion=motion, supply_line=None, links=links)
 
 
-ANKLE_RANGE = math.radians(45.0), math.radians(140.0)
-"""Ankle range [rad] without a device: 45 deg in dorsiflexion, of a loaded foot, to 50 deg in plantarflexion.
-
-The second is a usual norm of passive motion; the first is assumed, beyond the range of any gait here.
-"""
-
-_NO_CHAMBER = 1.0e-3
-"""Chamber volume [m^3] of a leg without a device: gas at rest, in a volume large enough not to require short steps."""
-
-
 def without_device(configuration: Scenario) -> Scenario:
     """Return the walk of this wearer without a device: no foot plate, actuator torque or friction.
 
@@ -239,19 +241,16 @@ def without_device(configuration: Scenario) -> Scenario:
     removed.
     """
     off = with_device_off(configuration)
-    device, motion = off.device, walk_of(off)
-    lowest, highest = ANKLE_RANGE
-    # The stops of the actuator become the range of the ankle.
-    ankle = Actuator(0.0, 0.0, lowest, highest, _NO_CHAMBER, _NO_CHAMBER, 0.0, device.actuator.leak)
-    leg = replace(
-        device, actuator=ankle, friction=Friction(0.0, 0.0, 0.0), foot_plate=FootPlate(0.0, 0.0), effects={}, links={}
-    )
-    intact = replace(motion, faults=dict.fromkeys(motion.faults, FaultSettings()), broken={}, shut_off={})
-    return replace(off, name=f"{configuration.name}-without", device=leg, motion=intact)
+    device, motion = off.device, replace(_without_faults(walk_of(off)), shut_off={})
+    # No torque and no displacement; the stops of the actuator become the range of the ankle.
+    stops = Actuator(0.0, 0.0, *ANKLE_RANGE, _LEG_CHAMBER, _LEG_CHAMBER, 0.0, device.actuator.leak)
+    plate, friction = FootPlate(0.0, 0.0), Friction(0.0, 0.0, 0.0)
+    leg = replace(device, actuator=stops, friction=friction, foot_plate=plate, effects={}, links={})
+    return replace(off, name=f"{configuration.name}-without", device=leg, motion=motion)
 
 
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
-    """Return the metrics of a walk with a healthy ankle, in SI units; the work needs a moment curve."""
+    """Return the metrics of a walk with a healthy ankle, in SI units; work and muscle moment need a moment curve."""
     gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
     metrics = {
         "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
@@ -259,14 +258,15 @@ def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
         "toe_landing": Metric(0.0, "-", "the heel comes first"),
         "angle_difference": Metric(0.0, "rad", "0 by definition: measured from the healthy gait"),
     }
-    if gait.ankle_moment is not None:
-        work = healthy_positive_work(configuration)
-        metrics["positive_push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
-        if wearer.keeps_gait >= 0.5:
-            # Muscles that lift the foot without any device give what the measured moment asks beyond tissue.
-            torque: Any = passive_torque  # plain arithmetic, of arrays too
-            tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
-            moment = np.maximum(tissue - wearer.body_mass * gait.ankle_moment.values_at(PHASES), 0.0)
-            summary = "moment of the wearer's dorsiflexors, mean over the stride"
-            metrics["dorsiflexor_moment"] = Metric(float(moment[:-1].mean()), "N m", summary)
+    if gait.ankle_moment is None:
+        return metrics
+    work = healthy_positive_work(configuration)
+    metrics["positive_push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
+    if wearer.keeps_gait >= 0.5:
+        # Without a device, muscles lift the foot: the measured moment beyond the moment of passive tissue.
+        torque: Any = passive_torque  # plain arithmetic, of arrays too
+        tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
+        moment = np.maximum(tissue - wearer.body_mass * gait.ankle_moment.values_at(PHASES), 0.0)
+        summary = "moment of the wearer's dorsiflexors, mean over the stride"
+        metrics["dorsiflexor_moment"] = Metric(float(moment[:-1].mean()), "N m", summary)
     return metrics

@@ -23,7 +23,7 @@ from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, configurations_with
 from ppafo.studies.varying import value_at, varied_path
 from ppafo.study.runs import Rows, RunCounter, failures_of, scenario_runs, unvaried
-from ppafo.wording import argument_text, first_twice, nearest_name, said_of_configuration
+from ppafo.wording import argument_text, first_twice, known_names, said_of_configuration
 
 AS_WRITTEN = "as written"
 """Task name of scenarios that run as written, without overrides of a task."""
@@ -96,8 +96,7 @@ def compared(
     """
     names = [configuration.name for configuration in configurations]
     if baseline is not None and baseline not in names:
-        hint = nearest_name(baseline, names)
-        raise StudyError(f"baseline: there is no configuration '{baseline}'{hint}; available: {', '.join(names)}")
+        raise StudyError(f"baseline: there is no configuration '{baseline}'{known_names(baseline, names)}")
     baseline = baseline or names[0]
     named_tasks = list(tasks) or [(AS_WRITTEN, ())]
     repeated = first_twice([name for name, _ in named_tasks])

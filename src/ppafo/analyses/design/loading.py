@@ -1,8 +1,8 @@
 """Loading of a design file: a torque profile and the requirements on a device."""
 
+from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from ppafo.analyses.design.profile.problem import SizingFile, SizingProblem, sizing_problem
 from ppafo.arguments import checked
@@ -35,6 +35,5 @@ def load_design(problem: str | Path, *, plugins: Plugins = ()) -> SizingProblem:
     return sizing_problem(document, file, Path(problem).parent)
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a design file."""
-    return make_schema(SizingFile, "ppafo design")
+json_schema = partial(make_schema, SizingFile, "ppafo design")
+"""JSON Schema of a design file."""

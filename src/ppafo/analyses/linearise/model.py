@@ -12,7 +12,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
-from ppafo.wording import nearest_name, one_line
+from ppafo.wording import known_names, one_line
 
 MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
 _SINGULAR = 1.0e13
@@ -204,6 +204,5 @@ def _index_of(name: str, variables: Sequence[LinearSignal], kind: str) -> int:
     """
     names = [variable.name for variable in variables]
     if name not in names:
-        hint = nearest_name(name, names)
-        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; available: {', '.join(names)}")
+        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{known_names(name, names)}")
     return names.index(name)

@@ -35,14 +35,12 @@ def parts(
     from ppafo.analyses.parts.answer import finding_of_catalogue, finding_of_part
     from ppafo.errors import ParameterError
     from ppafo.parameters.parts import load_catalogue
-    from ppafo.wording import nearest_name
+    from ppafo.wording import known_names
 
     loaded = load_catalogue(catalogue)
     if part is None:
         return finding_of_catalogue(loaded)
     by_name = {known.name: known for known in loaded.parts}
     if part not in by_name:
-        raise ParameterError(
-            f"{loaded.file}: there is no part '{part}'{nearest_name(part, by_name)}; available: {', '.join(by_name)}"
-        )
+        raise ParameterError(f"{loaded.file}: there is no part '{part}'{known_names(part, by_name)}")
     return finding_of_part(loaded, by_name[part])

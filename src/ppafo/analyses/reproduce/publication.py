@@ -23,7 +23,7 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.walk import healthy_metrics, walk
-from ppafo.wording import argument_text, nearest_name, said_missing
+from ppafo.wording import argument_text, known_names, nearest_name, said_missing
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5
@@ -283,9 +283,9 @@ def list_studies() -> list[dict[str, Any]]:
 def check_study(study: str, overrides: Sequence[str]) -> None:
     """Raise ScenarioError for an unknown study, and for overrides with any study but the paper's."""
     if study not in study_names() and Path(study).suffix != ".toml":
-        known = ", ".join(study_names())
-        hint = nearest_name(study, study_names())
-        raise ScenarioError(f"there is no study '{label(study)}'{hint}; available: {known}, or give a .toml file")
+        raise ScenarioError(
+            f"there is no study '{label(study)}'{known_names(study, study_names())}, or give a .toml file"
+        )
     if overrides and study != SEED:
         option, name = argument_text("overrides", option="--set"), argument_text("study")
         raise ScenarioError(f"{option} {overrides[0]}: applies to the study '{SEED}' only; omit {option} or {name}")

@@ -81,12 +81,10 @@ def sensitivity(
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.draws import drawn_in
     from ppafo.study.runs import RunCounter, scenario_runs, with_companions
-    from ppafo.wording import nearest_name
+    from ppafo.wording import known_names
 
     if method is not None and method not in METHODS:
-        raise StudyError(
-            f"there is no method '{method}'{nearest_name(method, METHODS)}; available: {', '.join(METHODS)}"
-        )
+        raise StudyError(f"there is no method '{method}'{known_names(method, METHODS)}")
     chosen, base, used = drawn_in(study, overrides, configuration, independent)
     # Sobol indices of correlated values mean nothing; Shapley effects take more runs for the same bands.
     by = METHODS[method or ("sobol" if used.scores is None else "shapley")]

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -110,9 +111,8 @@ class TuningFile(StrictTable):
     effort: SearchEffort = SearchEffort()
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a tuning file."""
-    return make_schema(TuningFile, "ppafo tuning")
+json_schema = partial(make_schema, TuningFile, "ppafo tuning")
+"""JSON Schema of a tuning file."""
 
 
 AT_BOUND = 0.01

@@ -1,8 +1,8 @@
 """Report of a walk of one wearer with and without the device: text, tables and figures."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -29,7 +29,7 @@ from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import changes_in
-from ppafo.simulation.scenario import UNITS
+from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.simulation.tracking import Tracking
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
@@ -55,90 +55,6 @@ _OVER_TIME = (
 _TORQUE = Kind("", "N m", "torque", ".3g")
 _FAR_ABOVE = 2.0
 """Ratio of absolute chamber pressure to supply pressure for a remark; healthy wearers stay below."""
-
-
-@in_units(lambda worn: worn.scenario.device.shown)
-def safety_remarks(worn: WalkResult) -> list[str]:
-    """Return remarks on the shut-off valve, excessive torques or pressures, and reductions of assistance."""
-    scenario, supply = worn.scenario, worn.scenario.device.supply
-    remarks = []
-    fitted = walk_of(scenario).shut_off
-    if fitted:
-        mass, power = 1.0e3 * float(fitted["mass"]), float(fitted["power"])
-        remarks.append(
-            f"shut-off valve: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"
-        )
-    # Peaks of the desired torque above the limit of the controller, which requests no more.
-    settings = scenario.controller.settings
-    limit = settings.get("largest_torque", math.inf)
-    cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
-    if cut:
-        limit_text = _TORQUE.text(limit)
-        # The default limit is the largest torque of the device.
-        is_given = "controller.largest_torque" not in scenario.links
-        advice = "raise this limit too" if is_given else "the actuator cannot give more at this supply pressure"
-        remarks.append(
-            f"{', '.join(cut)}: the request is limited by controller.largest_torque = {limit_text}; {advice}"
-        )
-    # Where the foot drives the vane to its end, it compresses a chamber far above its supply.
-    for channel, words, set_pressure in (
-        ("pressure_1", "chamber 1", supply.pressure),
-        ("pressure_2", "chamber 2", supply.dorsiflexion_pressure),
-    ):
-        largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
-        if largest > _FAR_ABOVE * set_pressure:
-            reached, supply_text = (quantity_text(value, "pressure") for value in (largest, set_pressure))
-            remarks.append(
-                f"the pressure in {words} reaches {reached}, at a supply pressure of {supply_text}: "
-                f"actuator, valves and tubing must withstand {reached}"
-            )
-    if not worn.events:
-        return remarks
-    remarks += event_lines(worn.events)
-    return [*remarks, worn.help_text] if worn.helped.size else remarks
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _WalkPair:
-    """Result of a walk with the device and of the same walk without it, as printed and saved.
-
-    ``tracking`` is the verdict on a torque that does not follow the controller's request, with the remedies tried; None
-    if the torque follows.
-    """
-
-    comparison: WalkComparison
-    tracking: Tracking | None
-
-    def json_document(self) -> dict[str, Any]:
-        """Return the metrics (with the device, without it, healthy) and the events as plain data in SI units."""
-        worn, bare, verdict = self.comparison.with_device, self.comparison.without_device, self.tracking
-        sequence, segments = walk_of(worn.scenario).task_sequence, {}
-        if sequence is not None:
-            segments = {
-                "task_sequence": sequence.name,
-                "segments": [asdict(segment) for segment in worn.segments],
-                "segments_off": [asdict(segment) for segment in bare.segments],
-            }
-        return {
-            "format": WALK_FORMAT,
-            "schema_version": SCHEMA_VERSION,
-            "units": UNITS,
-            "status": plain(worn.status),
-            "status_off": plain(bare.status),
-            "metrics": plain(dict(worn.metrics)),
-            "metrics_off": plain(dict(bare.metrics)),
-            "events": [event.to_dict() for event in worn.events],
-            "versions": versions(),
-            "configuration": walk_document(worn.scenario),
-            "shown": dict(worn.scenario.device.shown),
-            "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
-            "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
-            "minutes": float(worn.recording.time[-1]) / 60.0,
-            **segments,
-            **bottle_data(worn),
-            "metrics_vented": plain(dict(worn.vented_metrics)),
-            "healthy": plain(dict(self.comparison.healthy)),
-        }
 
 
 SCHEMA_VERSION = 1
@@ -194,93 +110,171 @@ _LIMITS = (
 
 
 @in_units(lambda comparison: comparison.with_device.scenario.device.shown)
-def finding_of(comparison: WalkComparison) -> Finding[_WalkPair]:
+def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     """Return the comparison of a walk with and without the device as a finding.
 
     A walk that diverged has numbers but no figures, and the report has not passed.
     """
-    worn, bare = comparison.with_device, comparison.without_device
-    configuration, motion = worn.scenario, walk_of(worn.scenario)
+    worn = comparison.with_device
+    scenario, motion, law = worn.scenario, walk_of(worn.scenario), law_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
-    assumed = [(assumption.path, assumption.note) for assumption in configuration.assumptions]
-    verdict = tried(configuration, worn.tracking)
-    mended = reloaded(configuration, verdict.mended) if verdict is not None and verdict.mended else None
-    # How the torque follows what is requested, and the gains in force with their origin.
-    in_force = gains_of(configuration, law_of(configuration))
-    torque = worn.torque_sentence(verdict)
-    gains = "" if in_force is None else in_force.sentence
-    first_lines = [benefit_sentence(comparison), torque, configuration.origin.replaced, gains]
-    gait = motion.gait
-    title = f" ({gait.title})" if gait.title else ""
+    ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}"
+    verdict, gains = tried(scenario, worn.tracking), gains_of(scenario, law)
+    torque, gains_text = worn.torque_sentence(verdict), "" if gains is None else gains.sentence
+    said = (ended, benefit_sentence(comparison), torque, scenario.origin.replaced, gains_text)
+    title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (
-        configuration.description,
-        f"device '{configuration.device.name}', gait '{gait.name}'{title}",
-        law_of(configuration).summary,
+        scenario.description,
+        f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}",
+        law.summary,
     )
-    ended = f"{configuration.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}"
-    segments, supply = {}, worn.supply
-    if motion.task_sequence is not None:
-        segments = {
-            "segments.csv": partial(segments_csv, worn.segments),
-            "segments-off.csv": partial(segments_csv, bare.segments),
-        }
+    mended = usage_text(reloaded(scenario, verdict.mended)) if verdict is not None and verdict.mended else ""
+    assumed = [(assumption.path, assumption.note) for assumption in scenario.assumptions]
     return Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
-        title=f"Walking with {configuration.name}",
-        said=(ended, *filter(None, first_lines)),
+        title=f"Walking with {scenario.name}",
+        said=[sentence for sentence in said if sentence],
         parts=(
             Section(said=[sentence for sentence in set_up if sentence], is_detail=True),
             *task_sequence_parts(comparison),
             Section(columns=comparison_table(comparison), remarks=_remarks(comparison)),
             *bottle_parts(worn),
-            Section("Command with the remedy" if mended else "", code=usage_text(mended) if mended else ""),
+            Section("Command with the remedy" if mended else "", code=mended),
             Section("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
             *_pictures(comparison),
             Section("Assumptions" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
-        found=_WalkPair(comparison, verdict),
+        found=_walk_data(comparison, verdict),
         passed=comparison.is_completed and worn.is_helped,
-        files={
-            "recording.nc": partial(netcdf_bytes, worn.recording, None),
-            "recording.csv": partial(marked_csv_bytes, worn.recording),
-            "recording-off.nc": partial(netcdf_bytes, bare.recording, None),
-            "strides.csv": partial(strides_csv, worn),
-            "strides-off.csv": partial(strides_csv, bare),
-            "mean-stride.csv": partial(mean_stride_csv, worn),
-            "mean-stride-off.csv": partial(mean_stride_csv, bare),
-            **segments,
-            **({} if supply is None else {"bottle.csv": lambda: marked_csv_bytes(supply.recording)}),
-        },
-        live=partial(live_part, [configuration]),
-        overrides=changes_in(configuration),
+        files=_files(comparison),
+        live=partial(live_part, [scenario]),
+        overrides=changes_in(scenario),
     )
+
+
+def _walk_data(comparison: WalkComparison, verdict: Tracking | None) -> dict[str, Any]:
+    """Return ``walk.json``: metrics (with the device, without it, healthy) and events as plain data in SI units.
+
+    ``verdict`` is on a torque that does not follow the controller's request, None if the torque follows.
+    """
+    worn, bare = comparison.with_device, comparison.without_device
+    sequence, segments = walk_of(worn.scenario).task_sequence, {}
+    if sequence is not None:
+        segments = {
+            "task_sequence": sequence.name,
+            "segments": [asdict(segment) for segment in worn.segments],
+            "segments_off": [asdict(segment) for segment in bare.segments],
+        }
+    return {
+        "format": WALK_FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        "units": UNITS,
+        "status": plain(worn.status),
+        "status_off": plain(bare.status),
+        "metrics": plain(dict(worn.metrics)),
+        "metrics_off": plain(dict(bare.metrics)),
+        "events": [event.to_dict() for event in worn.events],
+        "versions": versions(),
+        "configuration": walk_document(worn.scenario),
+        "shown": dict(worn.scenario.device.shown),
+        "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
+        "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
+        "minutes": float(worn.recording.time[-1]) / 60.0,
+        **segments,
+        **bottle_data(worn),
+        "metrics_vented": plain(dict(worn.vented_metrics)),
+        "healthy": plain(dict(comparison.healthy)),
+    }
+
+
+def _files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
+    """Return the writers of recordings and tables by file name; names of the walk without the device end in "-off"."""
+    worn, bare = comparison.with_device, comparison.without_device
+    files: dict[str, Callable[[], bytes]] = {"recording.csv": partial(marked_csv_bytes, worn.recording)}
+    for result, ending in ((worn, ""), (bare, "-off")):
+        files[f"recording{ending}.nc"] = partial(netcdf_bytes, result.recording, None)
+        files[f"strides{ending}.csv"] = partial(strides_csv, result)
+        files[f"mean-stride{ending}.csv"] = partial(mean_stride_csv, result)
+        if walk_of(worn.scenario).task_sequence is not None:
+            files[f"segments{ending}.csv"] = partial(segments_csv, result.segments)
+    if worn.supply is not None:
+        files["bottle.csv"] = partial(marked_csv_bytes, worn.supply.recording)
+    return files
 
 
 def _remarks(comparison: WalkComparison) -> list[str]:
     """Return remarks on wearer, bottle, safety, the trusted range of speeds, and divergence."""
-    worn, bare = comparison.with_device, comparison.without_device
-    bottle, supply = "", worn.supply
-    if supply is not None:
-        time = lasted(supply)
-        ended = "" if time is None else f"lasts {duration_text(time)}: "
-        bottle = f"bottle {supply.supply.bottle.label}: {ended}{supply.ending.message}"
-    elif "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
-        with_bottle = argument_text("bottle", PAPER_BOTTLE)
-        bottle = f"the supply pressure is constant here; give {with_bottle} to see how long a bottle lasts"
+    worn = comparison.with_device
+    diverged = [walked for walked in (worn, comparison.without_device) if not walked.status.is_completed]
     remarks = (
         *person_remarks(worn.scenario),
-        bottle,
+        _bottle_remark(worn),
         *safety_remarks(worn),
         trust_remark(worn.scenario),
-        *(
-            f"{result.scenario.name}: {result.status.message}"
-            for result in (worn, bare)
-            if not result.status.is_completed
-        ),
+        *(f"{walked.scenario.name}: {walked.status.message}" for walked in diverged),
     )
     return [remark for remark in remarks if remark]
+
+
+def _bottle_remark(worn: WalkResult) -> str:
+    """Return a remark on the time that the bottle lasts, or on the argument for it; "" if no gas is used."""
+    if worn.supply is not None:
+        time = lasted(worn.supply)
+        duration = "" if time is None else f"lasts {duration_text(time)}: "
+        return f"bottle {worn.supply.supply.bottle.label}: {duration}{worn.supply.ending.message}"
+    if "gas" not in worn.metrics or worn.metrics["gas"].value <= 0.0:
+        return ""
+    with_bottle = argument_text("bottle", PAPER_BOTTLE)
+    return f"the supply pressure is constant here; give {with_bottle} to see how long a bottle lasts"
+
+
+@in_units(lambda worn: worn.scenario.device.shown)
+def safety_remarks(worn: WalkResult) -> list[str]:
+    """Return remarks on the shut-off valve, excessive torques or pressures, and reductions of assistance."""
+    remarks = [_shut_off_remark(worn.scenario), _limit_remark(worn.scenario), *_pressure_remarks(worn)]
+    remarks += event_lines(worn.events)
+    if worn.events and worn.helped.size:
+        remarks.append(worn.help_text)
+    return [remark for remark in remarks if remark]
+
+
+def _shut_off_remark(scenario: Scenario) -> str:
+    """Return mass and power of a shut-off valve as text; "" without one."""
+    fitted = walk_of(scenario).shut_off
+    if not fitted:
+        return ""
+    grams, power = 1.0e3 * float(fitted["mass"]), float(fitted["power"])
+    return f"shut-off valve: {grams:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"
+
+
+def _limit_remark(scenario: Scenario) -> str:
+    """Return a remark on peaks of the desired torque above the limit of the controller; "" without any."""
+    settings = scenario.controller.settings
+    limit = settings.get(LARGEST_TORQUE, math.inf)
+    cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
+    if not cut:
+        return ""
+    # The default limit is the largest torque of the device.
+    is_default = f"controller.{LARGEST_TORQUE}" in scenario.links
+    advice = "the actuator cannot give more at this supply pressure" if is_default else "raise this limit too"
+    limited = f"the request is limited by controller.{LARGEST_TORQUE} = {_TORQUE.text(limit)}"
+    return f"{', '.join(cut)}: {limited}; {advice}"
+
+
+def _pressure_remarks(worn: WalkResult) -> Iterator[str]:
+    """Yield a remark on each chamber that the foot compresses far above its supply pressure."""
+    supply = worn.scenario.device.supply
+    for number, supply_pressure in ((1, supply.pressure), (2, supply.dorsiflexion_pressure)):
+        channel = f"pressure_{number}"
+        largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
+        if largest > _FAR_ABOVE * supply_pressure:
+            reached, supplied = (quantity_text(value, "pressure") for value in (largest, supply_pressure))
+            yield (
+                f"the pressure in chamber {number} reaches {reached}, at a supply pressure of {supplied}: "
+                f"actuator, valves and tubing must withstand {reached}"
+            )
 
 
 def _pictures(comparison: WalkComparison) -> Sequence[Section]:

@@ -1,6 +1,7 @@
 """Verdict on a walk: benefit of the device against the same walk without it, and a remedy if it does not help."""
 
 import contextlib
+from collections.abc import Mapping, Sequence
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import PpafoError
@@ -43,74 +44,83 @@ def benefit_sentence(comparison: WalkComparison) -> str:
     The device helps by net work in push-off, toes above the ground, and an ankle closer to the healthy angle.
     """
     worn, bare = comparison.with_device, comparison.without_device
+    reasons = [] if worn.is_helped else [worn.help_text, *event_lines(worn.events)[:1]]
     if not comparison.is_completed or "net_push_off_work" not in worn.metrics:
-        faults = event_lines(worn.events)[:1]
-        return "" if worn.is_helped else f"the device does not help: {'; '.join((worn.help_text, *faults))}"
-    numbers = {name: metric.value for name, metric in worn.metrics.items()}
-    without = {name: metric.value for name, metric in bare.metrics.items()}
-    work, toes, bare_toes = numbers["net_push_off_work"], numbers.get("lowest_toes"), without.get("lowest_toes")
-    has_work, drags, dragged = work > 0.0, toes is not None and toes < 0.0, bare_toes is not None and bare_toes < 0.0
-    said = [f"{_WORK.text(work)} of net work in push-off"]
-    if "push_off_share" in numbers:
-        said[0] += f" (positive work {_SHARE.text(numbers['push_off_share'])} of the healthy ankle's)"
-    closer = 0.0
-    if "angle_difference" in numbers and "angle_difference" in without:
-        closer = without["angle_difference"] - numbers["angle_difference"]
-        angles = _ANGLE.text(numbers["angle_difference"]), _ANGLE.text(without["angle_difference"])
-        said.append(f"ankle {angles[0]} from the healthy one ({angles[1]} without)")
-    if toes is not None:
-        height = "toes would drag" if drags else f"toes {_HEIGHT.text(toes)} over the ground"
-        said.append(f"{height} ({'also' if drags == dragged else 'would drag' if dragged else 'clear'} without)")
-    lifts = not drags and (dragged or closer > 0.0)
-    where = {(True, True): "", (True, False): " in push-off but not in swing", (False, True): " in swing alone"}
-    if not worn.is_helped or not (has_work or lifts):
+        return f"the device does not help: {'; '.join(reasons)}" if reasons else ""
+    numbers, without = ({name: metric.value for name, metric in walked.metrics.items()} for walked in (worn, bare))
+    has_work = numbers["net_push_off_work"] > 0.0
+    drags, drags_without = (metrics.get("lowest_toes", 0.0) < 0.0 for metrics in (numbers, without))
+    both = numbers.keys() & without.keys()
+    is_closer = "angle_difference" in both and without["angle_difference"] > numbers["angle_difference"]
+    lifts = not drags and (drags_without or is_closer)
+    if reasons or not (has_work or lifts):
         verdict = "the device does not help"
-        said += [] if worn.is_helped else [worn.help_text, *event_lines(worn.events)[:1]]
+    elif drags:
+        verdict = "the device helps in push-off but not in swing"
     else:
-        verdict = f"the device helps{where[has_work, lifts or not drags]}"
-    needs = drags or not has_work
-    return f"{verdict}, against the same walk without it: {', '.join(said)}{_remedied(worn, drags) if needs else ''}"
+        verdict = "the device helps" if has_work else "the device helps in swing alone"
+    clauses = ", ".join([*_compared(numbers, without), *reasons])
+    needs_remedy = not reasons and walk_of(worn.scenario).bottle is None and (drags or not has_work)
+    return f"{verdict}, against the same walk without it: {clauses}{_remedied(worn, drags) if needs_remedy else ''}"
+
+
+def _compared(numbers: Mapping[str, float], without: Mapping[str, float]) -> list[str]:
+    """Return clauses on work, ankle and toes, from the metrics [SI] of the walks with the device and without it."""
+    clauses = [f"{_WORK.text(numbers['net_push_off_work'])} of net work in push-off"]
+    if "push_off_share" in numbers:
+        clauses[0] += f" (positive work {_SHARE.text(numbers['push_off_share'])} of the healthy ankle's)"
+    if "angle_difference" in numbers and "angle_difference" in without:
+        angle, angle_without = (_ANGLE.text(metrics["angle_difference"]) for metrics in (numbers, without))
+        clauses.append(f"ankle {angle} from the healthy one ({angle_without} without)")
+    if "lowest_toes" in numbers:
+        drags, drags_without = numbers["lowest_toes"] < 0.0, without.get("lowest_toes", 0.0) < 0.0
+        height = "toes would drag" if drags else f"toes {_HEIGHT.text(numbers['lowest_toes'])} over the ground"
+        height_without = "also" if drags == drags_without else "would drag" if drags_without else "clear"
+        clauses.append(f"{height} ({height_without} without)")
+    return clauses
 
 
 def _remedied(worn: WalkResult, drags: bool) -> str:
     """Return a clause on the cause of missing help and the first remedy with push-off work and clear toes."""
+    cause, candidates, advice = _cause(worn, drags)
+    for overrides in candidates:
+        with contextlib.suppress(PpafoError):
+            again = walk(reloaded(worn.scenario, overrides), minutes=_MINUTES)
+            toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
+            if again.status.is_completed and again.is_helped and work > 0.0 and (toes >= 0.0 or not drags):
+                changed = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
+                return (
+                    f"; {cause}: with {changed}, toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}, "
+                    "simulated in another walk"
+                )
+    return f"; {cause}, and {advice}"
+
+
+def _cause(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...]], str]:
+    """Return the cause of missing help, the overrides of each remedy to try, and advice if no remedy suffices."""
     scenario = worn.scenario
-    if walk_of(scenario).bottle is not None or not worn.is_helped:
-        return ""
-    raised = _raised_pressures(scenario)
-    asked, given = _lifting_torques(worn) if drags else (0.0, 0.0)
     if scenario.controller.kind == "off":
-        cause, candidates = "its controller is off", list(_LAWS)
-        advice = "another controller alone does not help"
-    elif asked < _NEARLY * given and "hold_stiffness" in scenario.controller.settings:
-        cause = (
-            f"the ankle is not lifted enough, as the controller requests {_TORQUE.text(asked)} at the lowest toes, "
-            f"where the actuator gives {_TORQUE.text(given)}"
-        )
-        stiffer = _stiffer_holds(worn, asked, given)
-        # A stiffer hold alone, before the one with more pressure: the valve may fill the chamber too slowly.
-        numbers = [*stiffer, *({**hold, **levels} for hold in stiffer[-2:] for levels in raised[:3])]
-        candidates = [remedy(scenario, each).overrides for each in numbers]
+        return "its controller is off", _LAWS, "another controller alone does not help"
+    raised = _raised_pressures(scenario)
+    requested, available = _lifting_torques(worn) if drags else (0.0, 0.0)
+    if requested < _NEARLY * available and "hold_stiffness" in scenario.controller.settings:
+        stiffer = _stiffer_holds(worn, requested, available)
+        # A stiffer hold alone comes before one with more pressure: the valve may fill the chamber too slowly.
+        changes = [*stiffer, *({**hold, **levels} for hold in stiffer[-2:] for levels in raised[:3])]
         largest = remedy(scenario, stiffer[-1]).overrides[-1].replace("=", " = ", 1)
+        cause = (
+            f"the ankle is not lifted enough, as the controller requests {_TORQUE.text(requested)} at the lowest toes, "
+            f"where the actuator gives {_TORQUE.text(available)}"
+        )
         advice = (
             f"larger settings up to `{largest}`, alone and with more supply pressure, were simulated and do not suffice"
         )
     else:
+        changes = raised
         cause = "the ankle is not lifted enough" if drags else "the torque opposes the motion"
         other = "an actuator with more torque" if drags else "another timing of push-off"
         advice = f"more supply pressure alone does not suffice; {other} was not tried"
-        candidates = [remedy(scenario, levels).overrides for levels in raised]
-    for overrides in candidates:
-        with contextlib.suppress(PpafoError):
-            again = walk(reloaded(scenario, overrides), minutes=_MINUTES)
-            lowest, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
-            if again.status.is_completed and again.is_helped and work > 0.0 and (lowest >= 0.0 or not drags):
-                changed = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
-                return (
-                    f"; {cause}: with {changed}, toes {_HEIGHT.text(lowest)} over the ground and {_WORK.text(work)}, "
-                    "simulated in another walk"
-                )
-    return f"; {cause}, and {advice}"
+    return cause, [remedy(scenario, numbers).overrides for numbers in changes], advice
 
 
 def _raised_pressures(scenario: Scenario) -> list[dict[str, float]]:
@@ -140,13 +150,13 @@ def _lifting_torques(worn: WalkResult) -> tuple[float, float]:
     return -request, -torque_reach(worn.scenario.device, angle)[0]
 
 
-def _stiffer_holds(worn: WalkResult, asked: float, given: float) -> list[dict[str, float]]:
+def _stiffer_holds(worn: WalkResult, requested: float, available: float) -> list[dict[str, float]]:
     """Return settings of the controller by path that request more torque where the toes are lowest, least first.
 
-    A limit that cuts the request is raised to the torque that the actuator gives.
+    A limit that cuts the request is raised to the torque [N m] that the actuator gives.
     """
     settings, path = worn.scenario.controller.settings, "controller.hold_stiffness"
-    is_cut = asked >= _NEARLY * float(settings["largest_torque"])
-    raised = {"controller.largest_torque": given} if is_cut else {}
+    is_cut = requested >= _NEARLY * float(settings["largest_torque"])
+    limit = {"controller.largest_torque": available} if is_cut else {}
     stiffness = max(float(settings["hold_stiffness"]), declared_numbers(worn.scenario)[path].default or 0.0)
-    return [*([raised] if raised else []), *({**raised, path: factor * stiffness} for factor in _STIFFER)]
+    return [*([limit] if limit else []), *({**limit, path: factor * stiffness} for factor in _STIFFER)]

@@ -70,7 +70,7 @@ def walk_with_and_without(
         return wearers_finding(walk_population(chosen, minutes=minutes, wearers=wearers, seed=seed, progress=advance))
     comparison = compare_walks(chosen, minutes=minutes, progress=partial(_report_walk, report, "min", _LONG_WALK))
     finding = finding_of(comparison)
-    return replace(finding, passed=finding.passed and finding.found.tracking is None) if check else finding
+    return replace(finding, passed=finding.passed and finding.found["tracking"] is None) if check else finding
 
 
 _LONG_WALK = 12.0

@@ -16,7 +16,7 @@ from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, build, host_platform
 from ppafo.exports.fmu.trial import check_unit
 from ppafo.exports.fmu.variables import tuning_of, variability_of
 from ppafo.version import __version__
-from ppafo.wording import argument_text, nearest_name
+from ppafo.wording import argument_text, known_names
 
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 """Earliest date of a zip entry, so that a unit does not depend on its date of creation."""
@@ -38,8 +38,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     # Before anything is built: a misspelt platform should not cost a compilation.
     for name in platforms:
         if name not in PLATFORMS:
-            hint = nearest_name(name, PLATFORMS)
-            raise ScenarioError(f"platform '{name}' is unknown{hint}; available: {', '.join(PLATFORMS)}")
+            raise ScenarioError(f"platform '{name}' is unknown{known_names(name, PLATFORMS)}")
         if fmi == 2 and PLATFORMS[name].folder_2 is None:
             raise ScenarioError(f"platform {name} is not defined in FMI 2: give {argument_text('fmi')} 3")
     chosen = {name: PLATFORMS[name] for name in platforms}

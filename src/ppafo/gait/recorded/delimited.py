@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.documents.regular_file import decoded
-from ppafo.errors import DataError
+from ppafo.errors import DataError, refused_as
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import SPLIT_NUMBERS, check_clock
@@ -110,15 +110,13 @@ def table_of(
     distinct_names = iter(distinct)
     named = [next(distinct_names) if name else "" for name in names]
     time_column = written.index(clock) if clock else None
-    try:
+    with refused_as(DataError, path, DataError):
         values, numbers = rows_of(block, named, () if time_column is None else (time_column,))
         has_clock = time_column is not None
         time: Floats = values[:, time_column] if has_clock else np.arange(len(values), dtype=np.float64)
         first = 1.0 if has_clock else 0.0
         time = time * seconds if frame_rate is None else (time - first) / frame_rate
         check_clock(time, numbers, may_have_trials=False)
-    except DataError as error:
-        raise DataError(f"{path}: {error}") from error
     twins = {name: others for name, others in doubled(written, distinct).items() if name != clock}
     columns = without_copies(
         {name: values[:, column] for column, name in enumerate(distinct) if column != time_column},

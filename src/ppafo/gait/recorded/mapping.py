@@ -7,9 +7,10 @@ subtracts the column.
 import math
 import re
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -207,9 +208,8 @@ def load_map(path: str | Path) -> GaitMap:
     return read_model(_FILE, GaitMap, path)[0]
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a gait map."""
-    return make_schema(GaitMap, "ppafo gait map")
+json_schema = partial(make_schema, GaitMap, "ppafo gait map")
+"""JSON Schema of a gait map."""
 
 
 @dataclass(frozen=True, slots=True)

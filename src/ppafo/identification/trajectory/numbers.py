@@ -16,7 +16,7 @@ from ppafo.simulation.numbers import other_form
 from ppafo.simulation.recorded.channels import DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.recorded.inputs import supply_paths
 from ppafo.simulation.scenario import Scenario, vane_motion
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 TIME_OFFSET = "recording.time_offset"
 """Path of the delay of the samples of a recording with respect to the run; no scenario has this parameter."""
@@ -72,8 +72,7 @@ def declaration_of(path: str, scenario: Scenario) -> Quantity:
     known = declared_numbers(scenario)
     full = full_path(path, scenario)
     if full not in known:
-        hint = nearest_name(full, known)
-        raise IdentificationError(f"{scenario.name}: '{path}' cannot be fitted{hint}; available: {', '.join(known)}")
+        raise IdentificationError(f"{scenario.name}: '{path}' cannot be fitted{known_names(full, known)}")
     return known[full]
 
 

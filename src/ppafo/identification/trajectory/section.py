@@ -33,7 +33,7 @@ from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_
 from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import Scenario
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
 
@@ -66,9 +66,8 @@ def noise_of_channels(texts: Mapping[str, str], where: str) -> dict[str, float]:
     deviations = {}
     for name, text in texts.items():
         if name not in _NOISE_UNITS:
-            hint = nearest_name(name, _NOISE_UNITS)
             raise IdentificationError(
-                f"{where}: noise.{name}: channel '{name}' cannot be fitted{hint}; available: {', '.join(_NOISE_UNITS)}"
+                f"{where}: noise.{name}: channel '{name}' cannot be fitted{known_names(name, _NOISE_UNITS)}"
             )
         deviations[name] = quantity_of(f"{where}: noise.{name}", text, _NOISE_UNITS[name])
     return deviations

@@ -35,7 +35,7 @@ from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import Figure
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_text
-from ppafo.wording import changed_text, nearest_name, said_missing
+from ppafo.wording import changed_text, known_names, nearest_name, said_missing
 
 PAPER_BOTTLE = "paper-co2-9oz"
 FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") / "files", ParameterError)
@@ -104,16 +104,7 @@ class Bottle:
     @property
     def supply(self) -> ColdSupply:
         """Bottle, regulator and hose as parameters of the gas supply model."""
-        return ColdSupply(
-            volume=self.volume,
-            wall=self.wall,
-            regulator=self.regulator,
-            body=self.body,
-            ice_capacity=self.ice_capacity,
-            hose=self.hose,
-            room_temperature=self.room_temperature,
-            heat_capacity_ratio=self.heat_capacity_ratio,
-        )
+        return ColdSupply(**{name: getattr(self, name) for name in ColdSupply._fields})
 
 
 def is_of_catalogue(name_or_path: str | Path) -> bool:
@@ -154,10 +145,7 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     """
     name, bundled, part = label(str(name_or_path)), list_bottles(), _part_of(name_or_path)
     if not (name in bundled or Path(name_or_path).suffix == ".toml" or "/" in name):
-        raise ParameterError(
-            f"there is no bottle '{name}'{nearest_name(name, bundled)}; available: {', '.join(bundled)}, or give a "
-            ".toml file"
-        )
+        raise ParameterError(f"there is no bottle '{name}'{known_names(name, bundled)}, or give a .toml file")
     # The catalogue does not state all values of a bottle: the others are those of the paper's bottle.
     parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
     paper = _entries_of(read_model(FILE, bottle_file(), PAPER_BOTTLE)[0])

@@ -15,7 +15,7 @@ from ppafo.model.source import FluidTable, fluid_pressure, gas_density, has_liqu
 from ppafo.parameters.bottles.declaration import FILL_BY_PRESSURE
 from ppafo.parameters.parameter_set import Entry
 from ppafo.units.shown import shown_text
-from ppafo.wording import nearest_name, said_missing
+from ppafo.wording import known_names, said_missing
 
 _TABLES = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"
@@ -42,9 +42,7 @@ def load_fluid(name: str) -> Fluid:
     """Load a fluid by name. Raises ParameterError if it has no property table."""
     available = list_fluids()
     if name not in available:
-        raise ParameterError(
-            f"there is no property table for '{name}'{nearest_name(name, available)}; available: {', '.join(available)}"
-        )
+        raise ParameterError(f"there is no property table for '{name}'{known_names(name, available)}")
     content = json.loads((_TABLES / f"{name}{_SUFFIX}").read_text(encoding="utf-8"))
     table = FluidTable(
         gas_constant=content["gas_constant"],

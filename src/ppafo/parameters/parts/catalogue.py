@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from types import GenericAlias
@@ -19,7 +20,7 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM
 from ppafo.parameters.parameter_set import allowed_number
-from ppafo.wording import nearest_name
+from ppafo.wording import known_names
 
 MASS = Quantity("mass", "kg", "mass of the part, of both valves for a pair", minimum=0.0, maximum=100.0)
 RATING = Quantity(
@@ -197,9 +198,8 @@ def _catalogue_file() -> type[BaseModel]:
 CATALOGUE_FILE = _catalogue_file()
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a catalogue of parts."""
-    return make_schema(CATALOGUE_FILE, "ppafo catalogue of parts")
+json_schema = partial(make_schema, CATALOGUE_FILE, "ppafo catalogue of parts")
+"""JSON Schema of a catalogue of parts."""
 
 
 DEFAULT = "parts"
@@ -228,9 +228,7 @@ class Catalogue:
         """
         parts = self.groups[group]
         if name not in parts:
-            known = ", ".join(parts) or "none"
-            hint = nearest_name(name, parts)
-            raise ParameterError(f"{self.file}: {group} has no part '{name}'{hint}; available: {known}")
+            raise ParameterError(f"{self.file}: {group} has no part '{name}'{known_names(name, parts)}")
         return parts[name]
 
     @property
@@ -273,8 +271,7 @@ def _part(file: str, group: str, name: str, parsed: Any, wrong: list[PpafoError]
     where = f"{file}: {group}.{name}"
     for key in parsed.unknown:
         if key not in declared:
-            hint = nearest_name(key, declared)
-            text = f"there is no value '{key}'{hint}; available: {', '.join(declared)}"
+            text = f"there is no value '{key}'{known_names(key, declared)}"
             wrong.append(ParameterError(f"{where}.unknown: {text}"))
         if key in figures:
             wrong.append(ParameterError(f"{where}.unknown: '{key}' has a value in this part; omit it from unknown"))

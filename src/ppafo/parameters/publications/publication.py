@@ -5,11 +5,11 @@ observations and the audit read the file of the paper on which this package is b
 """
 
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -60,9 +60,8 @@ class PublicationFile(StrictTable):
     claims: list[ClaimEntry] = Field(min_length=1)
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a file of a publication."""
-    return make_schema(PublicationFile, "ppafo publication")
+json_schema = partial(make_schema, PublicationFile, "ppafo publication")
+"""JSON Schema of a file of a publication."""
 
 
 def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:

@@ -1,7 +1,7 @@
 """Execution of the batches of an ensemble, with metrics read from meters."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -63,43 +63,46 @@ class MeteredRuns:
 
     def _run(self, task: "_MeteredBatch", threads: int | None) -> None:
         """Run a batch and store the results of its runs at their indices in the ensemble."""
-        batch, members = task.batch, task.members
+        batch, runs_of_batch = task.batch, task.members.size
         states = np.empty_like(batch.states)
-        read_from_traces = {name: np.full(members.size, np.nan) for name, kind in task.metrics.items() if kind.traced}
+        metrics = {name: np.full(runs_of_batch, np.nan) for name, kind in task.metrics.items() if kind.traced}
 
         def store(runs: slice, result: BatchResult) -> None:
             states[:, runs] = result.states
-            for name, values in read_from_traces.items():
-                values[runs] = _read(task, name, task.readings(states[:, runs], runs, result.record))
+            for name, values in task.read(metrics, result.states, runs, result.record).items():
+                metrics[name][runs] = values
             for name in self.request.bands:
                 trace = result.record[:: task.band_stride, batch.program.traced.index(name)]
-                self.traces[name][: len(trace), members[runs]] = trace
+                self.traces[name][: len(trace), task.members[runs]] = trace
 
         if self.request.custom is None:
             run_blocks(batch, store, threads, count=self._count)
         else:
-            # An object has one state, so that it cannot be in charge of two runs at a time.
-            for run in range(members.size):
+            # A Python controller has one state: it controls one run after the other.
+            for run in range(runs_of_batch):
                 column = slice(run, run + 1)
-                single = Batch(batch.program, batch.clock, batch.parameters[:, column], batch.states[:, column])
+                single = replace(batch, parameters=batch.parameters[:, column], states=batch.states[:, column])
                 store(column, run_sampled(single, self.request.custom))
                 self._count(1)
-        # By the rule for a single run: valid throughout, and finite at the end. Meters stand below the rows of a plain
-        # batch, and what they come to says nothing about the run.
-        result = group_of("result", batch.program.state_rows(), states)
-        completed = (result.failure_time >= NEVER_FAILED) & np.isfinite(states[: task.physical]).all(axis=0)
-        self.is_completed[members] = completed
+        from_meters = [name for name in task.metrics if name not in metrics]
+        metrics |= task.read(from_meters, states, slice(None), None)
+        self._store_ends(task, states, metrics)
+
+    def _store_ends(self, task: "_MeteredBatch", states: Floats, metrics: Mapping[str, Floats]) -> None:
+        """Store ends and metrics of runs, with nan for failed runs; ``states`` (rows, runs) are final."""
+        members, result = task.members, group_of("result", task.batch.program.state_rows(), states)
+        # As for a single run: valid throughout, and finite at the end. The rows of meters do not matter.
+        is_completed = (result.failure_time >= NEVER_FAILED) & np.isfinite(states[: task.physical]).all(axis=0)
+        # If the time of failure is unknown, it is the time of the last sample.
+        last_sample = task.interval * (task.samples - 1)
+        failure_time = np.where(result.failure_time < NEVER_FAILED, result.failure_time, last_sample)
+        self.is_completed[members] = is_completed
         self.too_many_parts[members] = result.too_many_parts != 0.0
-        # Without a time of failure the last sample is the best that is known.
-        end = task.interval * (task.samples - 1)
-        time = np.where(result.failure_time < NEVER_FAILED, result.failure_time, end)
-        self.failure_time[members] = np.where(completed, np.nan, time)
+        self.failure_time[members] = np.where(is_completed, np.nan, failure_time)
         for trace in self.traces.values():
-            trace[:, members[~completed]] = np.nan
-        readings = task.readings(states, slice(None), None)
-        for name in task.metrics:
-            values = read_from_traces[name] if name in read_from_traces else _read(task, name, readings)
-            self.metrics[name][members] = np.where(completed, values, np.nan)
+            trace[:, members[~is_completed]] = np.nan
+        for name, values in metrics.items():
+            self.metrics[name][members] = np.where(is_completed, values, np.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,18 +121,17 @@ class _MeteredBatch:
     samples: int
     band_stride: int
 
-    def readings(self, states: Floats, runs: slice, record: Floats | None) -> Readings:
-        """Meter readings of runs, from their final states and recorded traces."""
+    def read(self, names: Collection[str], states: Floats, runs: slice, record: Floats | None) -> dict[str, Floats]:
+        """Values of some metrics for ``runs``, from final states and recorded traces; arbitrary for failed runs."""
+        if not names:
+            return {}
         program = self.batch.program
-        groups = program.state_rows()
+        course = group_of("course", program.state_rows(), states) if program.follows_reference else ()
         traces = {} if record is None else {name: record[:, row] for row, name in enumerate(program.traced)}
-        return Readings(
-            meters=meters_of(program, states),
-            course=group_of("course", groups, states) if program.follows_reference else (),
-            interval=self.interval[runs],
-            samples=self.samples,
-            traces=traces,
-        )
+        meters, interval = meters_of(program, states), self.interval[runs]
+        readings = Readings(meters=meters, course=course, interval=interval, samples=self.samples, traces=traces)
+        with np.errstate(all="ignore"):
+            return {name: np.asarray(self.metrics[name].read(readings)) for name in names}
 
 
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
@@ -150,11 +152,11 @@ def offered(scenario: Scenario) -> dict[str, MetricKind]:
 
 
 def _meter_batch(plain: Batch, members: Members, request: OutputRequest) -> _MeteredBatch:
-    program = plain.program
-    available = {name: kind for name, kind in request.metrics.items() if has_channels(program, kind)}
+    """Batch with the meters and traces that its metrics and bands need."""
+    metrics = {name: kind for name, kind in request.metrics.items() if has_channels(plain.program, kind)}
     # In one order, so that the same metrics are one program in whatever order they are requested.
-    meters = sorted({meter.name: meter for kind in available.values() for meter in kind.meters}.items())
-    read_from_traces = dict.fromkeys(channel for kind in available.values() for channel in kind.traced)
+    meters = sorted({meter.name: meter for kind in metrics.values() for meter in kind.meters}.items())
+    read_from_traces = {channel for kind in metrics.values() for channel in kind.traced}
     interval = intervals(plain)
     stride = max(1, round(request.every / float(interval[0]))) if request.bands else 1
     # Runs of one batch may have other steps, but traces are rows of one array.
@@ -163,21 +165,14 @@ def _meter_batch(plain: Batch, members: Members, request: OutputRequest) -> _Met
             f"traces every {request.every:.6g} s need one run.output_interval for all runs, a divisor of "
             f"{request.every:.6g} s, not {interval.min():.6g} to {interval.max():.6g} s; change run.output_interval"
         )
+    # Metrics read from traces need every sample; bands alone need only those at which they are drawn.
+    trace_every, band_stride = (1, stride) if read_from_traces else (stride, 1)
     traced = sorted({*read_from_traces, *request.bands})
-    # Bands alone need the samples at which they are shown, metrics of traces every one.
-    trace_every = 1 if read_from_traces else stride
     batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
-    band_stride = stride if read_from_traces else 1
-    return _MeteredBatch(batch, members, len(plain.states), available, interval, plain.clock.samples, band_stride)
+    return _MeteredBatch(batch, members, len(plain.states), metrics, interval, plain.clock.samples, band_stride)
 
 
 def intervals(batch: Batch) -> Floats:
     """Time between two samples [s] of each run of a batch without meters."""
     timing = group_of("timing", batch.program.parameter_rows(), batch.parameters)
     return np.asarray(timing.step * batch.clock.record_every)
-
-
-def _read(task: _MeteredBatch, name: str, readings: Readings) -> Floats:
-    """Values of a metric; arbitrary for failed runs."""
-    with np.errstate(all="ignore"):
-        return np.asarray(task.metrics[name].read(readings))

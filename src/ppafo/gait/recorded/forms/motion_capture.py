@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, refused_as
 from ppafo.gait.recorded.delimited import (
     NumberBlock,
     cells_of,
@@ -134,10 +134,8 @@ def _nexus_forces(path: str | Path, block: _NexusBlock, time: Floats) -> dict[st
     ]
     if not any(names):
         return {}
-    try:
+    with refused_as(DataError, path, DataError):
         values, _ = rows_of(block.rows, names)
-    except DataError as error:
-        raise DataError(f"{path}: {error}") from error
     # Devices are sampled faster than markers, from the same first frame.
     at = np.clip(np.rint((time - time[0]) * block.rate).astype(np.int64), 0, len(values) - 1)
     forces = dict(zip((name for name in names if name), values[at].T, strict=True))
