@@ -5,9 +5,12 @@ import difflib
 import re
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from os.path import commonprefix
-from typing import Literal
+from typing import Literal, TypeVar
+
+Value = TypeVar("Value")
 
 LONGEST_SHOWN = 40
 """Largest number of characters quoted in a message from a name or cell."""
@@ -95,22 +98,27 @@ def reason(error: OSError | ValueError) -> str:
     return text[:1].lower() + text[1:]
 
 
+@contextlib.contextmanager
+def set_within(variable: ContextVar[Value], value: Value) -> Iterator[None]:
+    """Set a context variable in a ``with`` block."""
+    token = variable.set(value)
+    try:
+        yield
+    finally:
+        variable.reset(token)
+
+
 _Reader = Literal["caller", "function", "command line"]
 _reader: ContextVar[_Reader] = ContextVar("_reader", default="caller")
 
 
-@contextlib.contextmanager
-def read_by(reader: _Reader) -> Iterator[None]:
+def read_by(reader: _Reader) -> AbstractContextManager[None]:
     """Set the reader of messages in a ``with`` block: Python caller, package function, or command line.
 
     Messages name arguments for a Python caller and options on the command line, and neither for a function of the
     package, whose arguments the user never gave.
     """
-    token = _reader.set(reader)
-    try:
-        yield
-    finally:
-        _reader.reset(token)
+    return set_within(_reader, reader)
 
 
 def read_by_caller() -> bool:
@@ -135,14 +143,9 @@ def argument_text(name: str, value: str = "", option: str = "") -> str:
 _configuration: ContextVar[str] = ContextVar("_configuration", default="")
 
 
-@contextlib.contextmanager
-def said_of_configuration(name: str) -> Iterator[None]:
+def said_of_configuration(name: str) -> AbstractContextManager[None]:
     """Set the configuration that messages name in a ``with`` block, also in overrides."""
-    token = _configuration.set(name)
-    try:
-        yield
-    finally:
-        _configuration.reset(token)
+    return set_within(_configuration, name)
 
 
 def subject_text(scenario: str) -> str:

@@ -3,7 +3,7 @@
 import io
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ppafo.arguments.values import accepted_values
 from ppafo.arguments.words import FigureWidth
 from ppafo.signals import RecordingKind
+from ppafo.wording import set_within
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -123,18 +124,13 @@ _INCHES_PER_METRE = 1.0 / 0.0254
 _width: ContextVar[float | None] = ContextVar("_width", default=None)
 
 
-@contextmanager
-def drawn_at(width: float | str | None) -> Iterator[None]:
+def drawn_at(width: float | str | None) -> AbstractContextManager[None]:
     """Draw figures within a ``with`` block at a width: a text with unit, or a number [m]; None for their default.
 
     Raises ArgumentError for any other width.
     """
     metres = None if width is None else accepted_values(FigureWidth).take("width", width)
-    token = _width.set(_width.get() if metres is None else metres * _INCHES_PER_METRE)
-    try:
-        yield
-    finally:
-        _width.reset(token)
+    return set_within(_width, _width.get() if metres is None else metres * _INCHES_PER_METRE)
 
 
 def print_scale() -> float:

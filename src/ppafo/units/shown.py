@@ -6,10 +6,10 @@ that text, tables, axes and saved results, which store both as ``shown``, use th
 defaults of the package apply.
 """
 
-import contextlib
 import functools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from types import MappingProxyType
 from typing import NamedTuple, ParamSpec, TypeVar
@@ -17,6 +17,7 @@ from typing import NamedTuple, ParamSpec, TypeVar
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.units.quantity import from_si, without_exponent
 from ppafo.units.spelling import split_pressure_kind
+from ppafo.wording import set_within
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -89,14 +90,9 @@ GAUGE_ZERO = "gauge_zero"
 _chosen: ContextVar[Mapping[str, str]] = ContextVar("_chosen", default=MappingProxyType({}))
 
 
-@contextlib.contextmanager
-def shown_in(units: Mapping[str, str]) -> Iterator[None]:
+def shown_in(units: Mapping[str, str]) -> AbstractContextManager[None]:
     """Set the display units by SI unit in a ``with`` block: ``{"Pa_a": "bar_g", "N m": "N cm"}``."""
-    token = _chosen.set(units)
-    try:
-        yield
-    finally:
-        _chosen.reset(token)
+    return set_within(_chosen, units)
 
 
 def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R]], Callable[P, R]]:

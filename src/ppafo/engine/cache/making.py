@@ -19,7 +19,7 @@ from ppafo.engine.cache.folder import LOCK, cache_folder, refusal
 from ppafo.engine.cache.kept import CHECKSUMS, RequestedProgram, is_kept, load_kept_module, remove
 from ppafo.engine.cache.tidying import evict
 from ppafo.engine.compilers import Compiler, Effort
-from ppafo.wording import reason
+from ppafo.wording import reason, set_within
 
 try:
     import fcntl
@@ -134,11 +134,8 @@ def load_all(programs: Iterable[tuple[str, Effort]], compiler: Compiler, load: C
     workers = min(len(missing), os.cpu_count() or 1)
     with announce(where, len(missing)), ThreadPoolExecutor(workers) as pool:
         # A context variable, not a global: two threads may compile different sets at once.
-        known = _models.set(len(missing))
-        try:
+        with set_within(_models, len(missing)):
             started = [pool.submit(copy_context().run, load, source, effort) for source, effort in missing]
-        finally:
-            _models.reset(known)
         for task in started:
             task.result()
 
