@@ -2,7 +2,7 @@
 
 import contextlib
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
@@ -23,14 +23,6 @@ _LESS_ERROR = 0.5
 """Remaining error divided by the original one, below which a remedy that does not suffice is reported [-]."""
 
 
-class _Trial(NamedTuple):
-    """Scenario with a remedy of a cause applied."""
-
-    cause: str
-    remedy: "Remedy"
-    scenario: Scenario
-
-
 def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     """Return a tracking verdict with the first remedy that succeeds in a simulation.
 
@@ -48,31 +40,31 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     from ppafo.simulation.tracking.verdict import is_undecided
 
     try:
-        results = of_loaded.simulate_many([trial.scenario for trial in trials])
+        results = of_loaded.simulate_many([changed for _, _, changed in trials])
     except PpafoError:
         return verdict
     judged = [
-        (trial, result.tracking)
-        for trial, result in zip(trials, results, strict=True)
+        (cause, remedy, result.tracking)
+        for (cause, remedy, _), result in zip(trials, results, strict=True)
         if result.status.is_completed and not is_undecided(result)
     ]
-    for trial, left in judged:
+    for cause, remedy, left in judged:
         if left is None:
-            text = f"with {trial.remedy.text} it follows, as a further run shows"
-            return replace(verdict, cause=trial.cause, tried=text, mended=trial.remedy.overrides if is_of_file else ())
-    of_cause = [(trial.remedy, left.error) for trial, left in judged if left and trial.cause == verdict.cause]
+            text = f"with {remedy.text} it follows, as a further run shows"
+            return replace(verdict, cause=cause, tried=text, mended=remedy.overrides if is_of_file else ())
+    of_cause = [(remedy, left.error) for cause, remedy, left in judged if left and cause == verdict.cause]
     return replace(verdict, tried=_remainder_text(verdict, of_cause))
 
 
-def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> list[_Trial]:
-    """Return a scenario for each remedy that can be applied, those of the most certain cause first."""
+def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> "list[tuple[str, Remedy, Scenario]]":
+    """Return cause, remedy and changed scenario for each remedy that can be applied, the most certain cause first."""
     causes = [(verdict.cause, remedy) for remedy in verdict.remedies]
     causes += [(other.text, remedy) for other in verdict.others for remedy in other.remedies]
     trials = []
     for cause, remedy in causes[:MOST_TRIED]:
         with contextlib.suppress(PpafoError):
             again = reloaded(scenario, remedy.overrides) if is_of_file else with_numbers(scenario, remedy.numbers)
-            trials.append(_Trial(cause, remedy, replace(again, run=_trial_run(again))))
+            trials.append((cause, remedy, replace(again, run=_trial_run(again))))
     return trials
 
 

@@ -1,13 +1,13 @@
 """``ppafo export figure DIR``: redraws the figures of a result folder without a new run."""
 
 import sys
+from pathlib import Path
+from typing import Any
 
 from ppafo.arguments import FigureWidth, File, Folder
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError
-
-_FORMATS = ("png", "svg")
 
 
 def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth | None = None) -> CommandOutput:
@@ -25,9 +25,6 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
     written: step/figure.png, step/figure.svg
     """
     from ppafo.report.recording_figure import FIGURE_FORMATS
-    from ppafo.report.style import drawn_at, render_figure
-    from ppafo.storage.files import write_file
-    from ppafo.storage.result_folder import add_to_folder
 
     # Before anything is read or drawn.
     if out is not None:
@@ -40,37 +37,46 @@ def export_figure(folder: Folder, *, out: File | None = None, width: FigureWidth
 
     names = names_in(folder)
     load_drawing()
+    from ppafo.report.style import drawn_at, render_figure
+    from ppafo.storage.files import write_file
+    from ppafo.storage.result_folder import add_to_folder
+
     with drawn_at(width):
-        drawn = draw_folder(folder, names)
-    if not drawn:
-        message, document = what_is_there(folder, names)
-        command, stems = document["command"], [name.removesuffix(".png") for name in document["figures"]]
-        again = ""
-        # Not every command is a function of the package, which no module imports.
-        if stems and hasattr(sys.modules["ppafo"], command):
-            call = f"ppafo.{command}(...).plot({stems[0]!r}, width='84 mm').savefig('{stems[0]}.pdf')"
-            again = f"; for another format or width, use Python with the arguments of the command: {call}"
-        if out is not None or width is not None:
-            given = f"--width {1e3 * width:g} mm" if out is None and width is not None else f"--out {out}"
-            raise DataError(
-                f"{given}: figures of 'ppafo {command}' cannot be drawn again, only figures of runs, walks, studies "
-                f"and recordings of the simulated test bench{again}"
-            )
-        return CommandOutput(f"{message}{again}", document)
-    if out is not None:
-        if len(drawn) > 1:
-            raise DataError(
-                f"--out {out}: {folder} has {len(drawn)} figures ({', '.join(drawn)}); omit --out to write each "
-                "beside its recording"
-            )
-        (content,) = render_figure(next(iter(drawn.values())), [out.suffix.removeprefix(".")]).values()
-        written = [str(write_file(out, content))]
-    else:
+        figures = draw_folder(folder, names)
+    if not figures:
+        return _figures_to_open(*what_is_there(folder, names), out, width)
+    if out is None:
         files = {
-            f"{stem}.{form}": content
-            for stem, figure in drawn.items()
-            for form, content in render_figure(figure, _FORMATS).items()
+            f"{stem}.{file_format}": content
+            for stem, figure in figures.items()
+            for file_format, content in render_figure(figure, ("png", "svg")).items()
         }
         add_to_folder(folder, files)
         written = [str(folder / name) for name in files]
+    elif len(figures) == 1:
+        (figure,) = figures.values()
+        (content,) = render_figure(figure, [out.suffix.removeprefix(".")]).values()
+        written = [str(write_file(out, content))]
+    else:
+        raise DataError(
+            f"--out {out}: {folder} has {len(figures)} figures ({', '.join(figures)}); omit --out to write each "
+            "beside its recording"
+        )
     return CommandOutput(f"written: {', '.join(written)}", {"files": written})
+
+
+def _figures_to_open(message: str, document: dict[str, Any], out: Path | None, width: float | None) -> CommandOutput:
+    """List the figures of a result that cannot be drawn again. Raises DataError if a file or a width is requested."""
+    command, stems = document["command"], [name.removesuffix(".png") for name in document["figures"]]
+    remedy = ""
+    # Not every command is a function of the package.
+    if stems and hasattr(sys.modules["ppafo"], command):
+        call = f"ppafo.{command}(...).plot({stems[0]!r}, width='84 mm').savefig('{stems[0]}.pdf')"
+        remedy = f"; for another format or width, use Python with the arguments of the command: {call}"
+    if out is None and width is None:
+        return CommandOutput(f"{message}{remedy}", document)
+    option = f"--width {1e3 * width:g} mm" if out is None and width is not None else f"--out {out}"
+    raise DataError(
+        f"{option}: figures of 'ppafo {command}' cannot be drawn again, only figures of runs, walks, studies "
+        f"and recordings of the simulated test bench{remedy}"
+    )

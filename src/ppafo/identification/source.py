@@ -126,7 +126,8 @@ def remarks_on_readings(sources: tuple[RecordingSource, ...]) -> tuple[str, ...]
     for source in sources:
         gap = longest_gap(source.recording.time)
         if gap is not None:
-            remarks.append(f"{source.name} has no reading for {gap.duration:.4g} s after sample {gap.index + 1}")
+            index, duration = gap
+            remarks.append(f"{source.name} has no reading for {duration:.4g} s after sample {index + 1}")
         for name in source.recording.names:
             if name in _NO_SENSORS:
                 continue

@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -218,7 +218,7 @@ def draw_panels(
         panel_sizes = [(size[0] * across if number in widened else size[0], size[1]) for number in range(len(panels))]
         title_size = _TITLE_SIZE * min(map(_title_fit, panels, panel_sizes), default=1.0)
         drawn = [
-            _DrawnPanel(axes, panel, _draw(axes, panel, panel_size, title_size))
+            (axes, panel, _draw(axes, panel, panel_size, title_size))
             for axes, panel, panel_size in zip(grid, panels, panel_sizes, strict=False)
         ]
         for axes in grid[len(panels) :]:
@@ -233,7 +233,7 @@ def draw_panels(
                 upper.set_xlabel("")
         _share_scales(figure, drawn, size[1])
         if names:
-            handles = next(each.axes for each in drawn if each.panel is shared).get_legend_handles_labels()
+            handles = next(axes for axes, panel, _ in drawn if panel is shared).get_legend_handles_labels()
             anchor = (0.002, 1.0 - (_TITLE_LINE * len(lines) + 0.08) / height)
             figure.legend(*handles, loc="upper left", bbox_to_anchor=anchor, ncols=names, **_OF_LEGEND)
         # Names and messages come from files: a dollar sign in them begins no formula.
@@ -366,26 +366,21 @@ def _wrapped(label: str, length: float) -> str:
     return "\n".join(textwrap.wrap(label, letters, break_on_hyphens=False))
 
 
-class _DrawnPanel(NamedTuple):
-    """Panel with its Matplotlib axes, and the object with a colour scale, or None."""
+def _share_scales(figure: "Figure", drawn: "Sequence[tuple[Axes, Panel, Any]]", height: float) -> None:
+    """Apply common limits and a colour bar to consecutive panels with the same scale; panel ``height`` [inches].
 
-    axes: "Axes"
-    panel: Panel
-    coloured: Any
-
-
-def _share_scales(figure: "Figure", drawn: Sequence[_DrawnPanel], height: float) -> None:
-    """Apply common limits and a colour bar to consecutive panels with the same scale; panel ``height`` [inches]."""
-    for scale, group in groupby(drawn, key=lambda each: each.panel.scale):
-        members = list(group)
+    ``drawn`` are the panels with their axes, and the object with a colour scale, or None.
+    """
+    for scale, group in groupby(drawn, key=lambda panel_drawn: panel_drawn[1].scale):
         if scale is None:
             continue
-        limits = np.array([member.coloured.get_clim() for member in members], dtype=np.float64)
+        axes, _, coloured = zip(*group, strict=True)
+        limits = np.array([drawing.get_clim() for drawing in coloured], dtype=np.float64)
         # A panel of nothing but failed runs has no limits.
         limits = limits[np.isfinite(limits).all(axis=1)]
         if limits.size:
             lowest, highest = float(limits[:, 0].min()), float(limits[:, 1].max())
-            for member in members:
-                member.coloured.set_clim(lowest, highest)
-        bar = figure.colorbar(members[0].coloured, ax=[member.axes for member in members], pad=0.02)
+            for drawing in coloured:
+                drawing.set_clim(lowest, highest)
+        bar = figure.colorbar(coloured[0], ax=axes, pad=0.02)
         bar.set_label(_wrapped(scale.axis, height))

@@ -41,14 +41,6 @@ _SMOOTH = 1.0e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Gap:
-    """Time gap in a recording: index of the sample before it, and duration [s]."""
-
-    index: int
-    duration: float
-
-
-@dataclass(frozen=True, slots=True)
 class _Plateau:
     """Longest run at exactly the largest or smallest value: first and last sample index, value, and ``word``."""
 
@@ -63,15 +55,15 @@ class _Plateau:
         return self.last - self.first + 1
 
 
-def longest_gap(time: Floats) -> Gap | None:
-    """Return the longest gap if it exceeds ten median sampling intervals, else None."""
+def longest_gap(time: Floats) -> tuple[int, float] | None:
+    """Return the longest gap, as index of the sample before it and duration [s]; None up to ten median intervals."""
     # Against the median, which one gap does not move.
     intervals = np.diff(time)
     if intervals.size < 2:
         return None
     index = int(np.argmax(intervals))
     longest = float(intervals[index])
-    return Gap(index, longest) if longest > GAP_SAMPLES * float(np.median(intervals)) else None
+    return (index, longest) if longest > GAP_SAMPLES * float(np.median(intervals)) else None
 
 
 def lasting_change(values: Floats) -> float:

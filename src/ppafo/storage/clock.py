@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from datetime import date
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -40,17 +40,6 @@ _LARGEST_STEP = 10.0
 """Largest step across a counter overflow, in usual intervals [-]; a longer step means a clock set back."""
 
 
-class _Stamp(NamedTuple):
-    """Time of day [s], time zone, and other text of the cell, which may be a date; texts are empty if absent.
-
-    The time is in UTC if the time zone states its offset.
-    """
-
-    seconds: float
-    zone: str
-    date: str
-
-
 def is_clock(cell: str) -> bool:
     """Return whether a cell contains a time of day, with or without a date, rather than a number."""
     text = cell.strip()
@@ -72,13 +61,14 @@ def clock_seconds(
     that changes its time zone by name.
     """
     stamps = [_stamp(cell, form, row) for cell, row in zip(cells, rows, strict=True)]
-    zones = dict.fromkeys(re.sub(r"[+-].*", "", stamp.zone) for stamp in stamps)
+    seconds_of_day, zone_texts, date_texts = zip(*stamps, strict=True)
+    zones = dict.fromkeys(re.sub(r"[+-].*", "", zone) for zone in zone_texts)
     if len(zones) > 1:
         raise DataError(
             f"the times are in several time zones ({', '.join(zones)}); give all times in one time zone, or as numbers"
         )
-    seconds = np.array([stamp.seconds for stamp in stamps])
-    days_in_words = [stamp.date for stamp in stamps] if dates is None else [cell.strip() for cell in dates]
+    seconds = np.array(seconds_of_day)
+    days_in_words = date_texts if dates is None else [cell.strip() for cell in dates]
     if any(days_in_words):
         days = _days(days_in_words, rows, seconds, order)
         return np.asarray(_DAY * (days - days[0]) + (seconds - seconds[0]))
@@ -86,8 +76,12 @@ def clock_seconds(
     return np.asarray(seconds - seconds[0] + _DAY * midnights)
 
 
-def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
-    """Parse the time of day in a cell. Raises DataError, with ``row`` first, if it is absent or ambiguous."""
+def _stamp(cell: str, form: ClockForm | None, row: str) -> tuple[float, str, str]:
+    """Return the time of day in a cell [s], its time zone, and the other text, which may be a date.
+
+    The time is in UTC if the time zone states its offset; texts are empty if absent. Raises DataError, with ``row``
+    first, if the time is absent or ambiguous.
+    """
     text = one_line(cell.strip())
     compact = _COMPACT.fullmatch(text)
     if compact is not None:
@@ -121,7 +115,7 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
     offset = _OFFSET.search(zone)
     if offset is not None:
         seconds -= (-1.0 if offset[1] == "-" else 1.0) * (3600.0 * int(offset[2]) + 60.0 * int(offset[3] or 0))
-    return _Stamp(seconds, zone, beside)
+    return seconds, zone, beside
 
 
 def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: DateOrder | None) -> Floats:

@@ -91,6 +91,24 @@ def load_study(
     return _load(*read_source(STUDY_FILES, study), tuple(overrides), draws, seed)
 
 
+@dataclass(frozen=True, slots=True)
+class _StudySource:
+    """Source of a study: its name in messages, folder of its relative paths, and its text, empty for plain data."""
+
+    file: str
+    folder: Path
+    text: bytes
+
+
+def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], _StudySource]:
+    """Read a TOML file of a ``kind``, by name or path, or plain data; returns a modifiable document and its source."""
+    if isinstance(named, Mapping):
+        kind.check_depth(named, kind.noun)
+        return copy.deepcopy(dict(named)), _StudySource(kind.noun, Path(), b"")
+    source = _StudySource(label(str(named)), Path(named).parent, kind.read(named))
+    return kind.parse(source.text, source.file), source
+
+
 def load_configuration(
     study: str | Path | Mapping[str, Any], configuration: Configuration, changes: Overrides
 ) -> Study:
@@ -118,7 +136,7 @@ def load_configuration(
 
 def _load(
     document: dict[str, Any],
-    source: "_StudySource",
+    source: _StudySource,
     changes: tuple[str, ...],
     draws: int | None = None,
     seed: int | None = None,
@@ -126,43 +144,27 @@ def _load(
     """Build a study from a document, into which changes, draws and seed from the command line are written."""
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():
+        # The key tells the kind, which files leave out.
         if isinstance(table, dict) and "same_as" in table:
             table.setdefault("kind", "same_as")
     parsed = validate(declared.StudyFile, document, source.file, StudyError)
-    given = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
+    sampling = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
     with refused_as(StudyError, source.file, StudyError):
         if changes:
-            given_here = [_configuration(section, source.folder) for section in parsed.configurations]
-            changed = configurations_with(given_here, changes)
+            unchanged = [_configuration(section, source.folder) for section in parsed.configurations]
+            changed = configurations_with(unchanged, changes)
             for table, configuration in zip(document["configurations"], changed, strict=True):
                 table["overrides"] = list(configuration.scenario.origin.overrides)
-        if given and parsed.sample is None:
-            if any(not isinstance(entry, declared.NOT_RANDOM) for entry in parsed.vary):
-                raise StudyError(NO_SAMPLE)
-            raise StudyError("has no [sample], so the runs are not random; omit draws and seed")
-        if given:
-            document["sample"] |= given
+        if sampling and parsed.sample is None:
+            is_random = any(not isinstance(entry, declared.NOT_RANDOM) for entry in parsed.vary)
+            raise StudyError(
+                NO_SAMPLE if is_random else "has no [sample], so the runs are not random; omit draws and seed"
+            )
+        if sampling:
+            document["sample"] |= sampling
     parsed = validate(declared.StudyFile, document, source.file, StudyError)
     with refused_as(StudyError, source.file, StudyError):
         return _build(parsed, document, source, changes)
-
-
-@dataclass(frozen=True, slots=True)
-class _StudySource:
-    """Source of a study: its name in messages, folder of its relative paths, and text in bytes, None for data."""
-
-    file: str
-    folder: Path
-    text: bytes
-
-
-def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], _StudySource]:
-    """Read a TOML file of a ``kind``, by name or path, or plain data; returns a modifiable document and its source."""
-    if isinstance(named, Mapping):
-        kind.check_depth(named, kind.noun)
-        return copy.deepcopy(dict(named)), _StudySource(kind.noun, Path(), b"")
-    source = _StudySource(label(str(named)), Path(named).parent, kind.read(named))
-    return kind.parse(source.text, source.file), source
 
 
 def _build(
@@ -172,24 +174,13 @@ def _build(
 
     ``document`` is the file as plain data with the caller's ``changes``; the study keeps both.
     """
-    repeated = first_twice([configuration.name for configuration in parsed.configurations])
+    repeated = first_twice([section.name for section in parsed.configurations])
     if repeated is not None:
         raise StudyError(f"two configurations are named '{repeated}'; give every configuration a different name")
-    configurations = tuple(_configuration(configuration, source.folder) for configuration in parsed.configurations)
-    outputs = parsed.outputs
-    if not parsed.vary and len(configurations) == 1:
-        raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
-    paths = [entry.path for entry in parsed.vary]
-    # Rows of channels over time are lists of one length, and bands are quantiles at one time.
-    if "run.duration" in paths and (outputs.trajectories or outputs.bands):
-        raise StudyError(
-            "'run.duration' cannot vary with trajectories or bands, which need runs of equal length; omit these outputs"
-        )
-    repeated = first_twice(paths)
-    if repeated is not None:
-        raise StudyError(f"'{repeated}' is varied twice; omit one [[vary]]")
-    _check_set_or_varied(parsed, configurations)
+    configurations = tuple(_configuration(section, source.folder) for section in parsed.configurations)
     scenarios = [configuration.scenario for configuration in configurations]
+    _check_varied(parsed)
+    _check_set_or_varied(parsed, configurations)
     varied_paths = {entry.path: _common_path(entry, configurations, parsed) for entry in parsed.vary}
     independent = [
         _axis_or_drawn(entry, varied_paths[entry.path], configurations)
@@ -200,14 +191,13 @@ def _build(
     scores = _scores(parsed, drawn)
     # A grid alone is run once, with the noise that its scenarios write.
     if drawn:
-        drawn, scores = with_noise(drawn, scores, scenarios, paths)
+        drawn, scores = with_noise(drawn, scores, scenarios, [*varied_paths])
     # The noise, which has no [[vary]] table, is a plain number.
-    units = {number.path: "-" for number in drawn}
-    units |= {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()}
+    plain = {number.path: "-" for number in drawn}
+    given = {path: varied.given for path, varied in varied_paths.items() if varied.given}
     # What follows a gauge pressure counts from the atmosphere of its run as well.
     followed = _followed_paths(parsed, varied_paths)
     gauge = {path for path, varied in varied_paths.items() if varied.is_gauge}
-    gauge |= {path for path, other in followed.items() if other in gauge}
     return Study(
         name=parsed.name,
         description=" ".join(parsed.description.split()),
@@ -217,20 +207,31 @@ def _build(
         same=followed,
         scores=scores,
         sample=_sample(parsed, drawn),
-        outputs=valid_outputs(outputs, scenarios),
+        outputs=valid_outputs(parsed.outputs, scenarios),
         runs_of_chunk=parsed.runs_of_chunk,
-        units=units,
-        given={
-            path: varied.given
-            for path, varied in varied_paths.items()
-            if varied.given not in ("", usual_unit(varied.quantity.unit))
-        },
-        gauge=frozenset(gauge),
+        units=plain | {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()},
+        given={path: unit for path, unit in given.items() if unit != usual_unit(varied_paths[path].quantity.unit)},
+        gauge=frozenset(gauge | {path for path, other in followed.items() if other in gauge}),
         only={entry.path: entry.only for entry in parsed.vary if entry.only},
         document=document,
         text=source.text,
         changes=changes_in(*scenarios, overrides=changes),
     )
+
+
+def _check_varied(parsed: declared.StudyFile) -> None:
+    """Raise StudyError for a study that varies nothing, one path twice, or the duration of channels over time."""
+    paths = [entry.path for entry in parsed.vary]
+    if not paths and len(parsed.configurations) == 1:
+        raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
+    # Rows of channels over time are lists of one length, and bands are quantiles at one time.
+    if "run.duration" in paths and (parsed.outputs.trajectories or parsed.outputs.bands):
+        raise StudyError(
+            "'run.duration' cannot vary with trajectories or bands, which need runs of equal length; omit these outputs"
+        )
+    repeated = first_twice(paths)
+    if repeated is not None:
+        raise StudyError(f"'{repeated}' is varied twice; omit one [[vary]]")
 
 
 def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration]) -> None:
@@ -265,12 +266,13 @@ def _common_path(
 ) -> VariedPath:
     """Return a varied path with its unit, limits and atmosphere; StudyError if these differ between configurations."""
     names = [configuration.name for configuration in configurations]
+    scenarios = [each.scenario for each in configurations if not entry.only or each.name in entry.only]
     for name in entry.only:
         if name not in names:
             hint = nearest_name(name, names)
             raise StudyError(f"vary '{entry.path}': only: there is no configuration '{name}'{hint}")
     with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError):
-        varied, *others = (varied_path(entry.path, each.scenario) for each in _varying(entry, configurations))
+        varied, *others = (varied_path(entry.path, scenario) for scenario in scenarios)
     if any(other != varied for other in others):
         raise StudyError(
             f"vary '{entry.path}': has different units, limits or atmospheres in different "
@@ -282,7 +284,7 @@ def _common_path(
         return varied
     with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
         if isinstance(entry, declared.Stated):
-            _, unit = stated_normal(varied, _varying(entry, configurations)[0].scenario)
+            _, unit = stated_normal(varied, scenarios[0])
             return in_its_unit(varied, [f"0 {unit}"])
         return in_its_unit(varied, texts_of(entry))
 
@@ -295,7 +297,11 @@ def _axis_or_drawn(
         if not isinstance(entry, declared.Stated):
             return axis_or_distribution(entry, varied_path)
         # One draw is run in every configuration, so all of them must mean the same distribution.
-        distributions = {stated_normal(varied_path, each.scenario)[0] for each in _varying(entry, configurations)}
+        distributions = {
+            stated_normal(varied_path, each.scenario)[0]
+            for each in configurations
+            if not entry.only or each.name in entry.only
+        }
         if len(distributions) > 1:
             raise UnitError(
                 "the parameter sets of the configurations state different values; limit this [[vary]] with 'only', or "
@@ -328,10 +334,6 @@ def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, Varie
             )
         followed[entry.path] = entry.same_as
     return followed
-
-
-def _varying(entry: declared.Varied, configurations: Iterable[Configuration]) -> list[Configuration]:
-    return [each for each in configurations if not entry.only or each.name in entry.only]
 
 
 def _scores(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Factor | None:

@@ -7,7 +7,7 @@ recordings ends the search. ``change.py`` defines a change of the model, ``candi
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -119,58 +119,59 @@ def causes_of(
     none = search.evaluated([ModelChange()])[0]
     if none is None or none.is_noise:
         return Diagnosis(is_noise=none is not None)
-    is_measured = settings.motion == "measured"
-    if is_measured and sum(measured.recording.duration for measured in read) > _LONGEST_SEARCHED:
+    if settings.motion == "measured" and sum(measured.recording.duration for measured in read) > _LONGEST_SEARCHED:
         # Hundreds of replays of a minute each would take minutes of computing time.
         tried = search.compared(_samples(records), none)
-        explaining = [cause for cause in tried if cause.explains]
+        has_cause = any(cause.explains for cause in tried)
         return (
-            _explained(search, none, tried, explaining, [])
-            if explaining
+            _explained(search, none, tried, [])
+            if has_cause
             else Diagnosis(tried=len(tried), kinds=_TRIED_IN_LONG_RECORDINGS)
         )
+    swaps, sized, lacking = _candidates(read, agreements, device, settings)
+    tried = []
+    for candidates in (_samples(records), _motions(records, settings)):
+        tried += search.compared(candidates, none)
+        if any(cause.explains for cause in tried):
+            return _explained(search, none, tried, sized)
+    # Errors that any bench has come before a fault, a mistake without a size too: they need no cause.
+    of_bench = search.compared([candidate for candidate in sized if candidate.usual], none)
+    # A delay that ends at its limit is longer than that, and no error of any bench.
+    is_late = any(agreement.delay.is_at_limit for agreement in agreements)
+    errors = None if is_late else _usual_errors(search, none, of_bench)
+    if errors is not None:
+        return Diagnosis(errors, None, len(tried) + len(of_bench))
+    not_of_bench = [candidate for candidate in sized if not candidate.usual]
+    for compared, candidates in (([], swaps), (of_bench, not_of_bench), ([], lacking)):
+        tried += [*compared, *search.compared(candidates, none)]
+        if any(cause.explains for cause in tried):
+            return _explained(search, none, tried, sized)
+    return _unexplained(search, tried, _TRIED_WITH_MEASURED_ANGLE if settings.motion == "measured" else "")
+
+
+def _candidates(
+    read: Sequence[MeasuredRecording],
+    agreements: Sequence[RecordingAgreement],
+    device: Device,
+    settings: ReplaySettings,
+) -> tuple[list[CandidateCause], list[CandidateCause], list[CandidateCause]]:
+    """Return exchanged channels and units, errors of a size with numbers of the set, and effects that the model lacks.
+
+    With a measured angle they leave out what changes an input or the motion of the model.
+    """
     names = set.intersection(*(set(measured.recording.names) for measured in read))
-    units = _units_of_moving(read, agreements, device)
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
+    stages = (
+        exchanges(device, names, _units_of_moving(read, agreements, device)),
+        [*sizes(device, names), *numbers(read[0], device, settings)],
+        effects(device),
+    )
+    is_measured = settings.motion == "measured"
     swaps, sized, lacking = (
-        [candidate for candidate in candidates if not (is_measured and _acts_on_inputs_or_motion(candidate))]
-        for candidates in (
-            exchanges(device, names, units),
-            [*sizes(device, names), *numbers(read[0], device, settings)],
-            effects(device),
-        )
+        [candidate for candidate in stage if not (is_measured and _acts_on_inputs_or_motion(candidate))]
+        for stage in stages
     )
-    first = [_samples(records), _motions(records, settings)]
-    tried, explaining = _tried_in_turn(search.compared(stage, none) for stage in first)
-    if not explaining:
-        # Errors that any bench has come before a fault, a mistake without a size too: they need no cause.
-        of_bench = search.compared([candidate for candidate in sized if candidate.usual], none)
-        # A delay that ends at its limit is longer than that, and no error of any bench.
-        is_late = any(agreement.delay.is_at_limit for agreement in agreements)
-        errors = None if is_late else _usual_errors(search, none, of_bench)
-        if errors is not None:
-            return Diagnosis(errors, None, len(tried) + len(of_bench))
-
-        def stages() -> Iterator[list[SizedCause]]:
-            yield search.compared(swaps, none)
-            yield of_bench + search.compared([candidate for candidate in sized if not candidate.usual], none)
-            yield search.compared(lacking, none)
-
-        later, explaining = _tried_in_turn(stages())
-        tried += later
-    if explaining:
-        return _explained(search, none, tried, explaining, sized)
-    # What is wrong with samples is seen in them, whatever else is wrong; a misread unit is no hint beside other faults.
-    nearest = max(
-        (cause for cause in tried if not cause.candidate.is_of_unit),
-        key=lambda cause: (cause.candidate.is_of_samples, cause.gain),
-        default=None,
-    )
-    return Diagnosis(
-        nearest=None if nearest is None else _cause_of([nearest], search.penalty),
-        tried=len(tried),
-        kinds=_TRIED_WITH_MEASURED_ANGLE if is_measured else "",
-    )
+    return swaps, sized, lacking
 
 
 def _acts_on_inputs_or_motion(candidate: CandidateCause) -> bool:
@@ -202,17 +203,6 @@ def _units_of_moving(
     return {name: {recording.channels[name].stated for recording in recordings if name in recording} for name in moving}
 
 
-def _tried_in_turn(stages: Iterable[Sequence[SizedCause]]) -> tuple[list[SizedCause], list[SizedCause]]:
-    """Return the candidates tried stage by stage until success, and the candidates that explain the recordings."""
-    tried: list[SizedCause] = []
-    for stage in stages:
-        tried += stage
-        explaining = [cause for cause in tried if cause.explains]
-        if explaining:
-            return tried, explaining
-    return tried, []
-
-
 def _usual_errors(search: CauseSearch, none: ScaledResiduals, of_bench: Sequence[SizedCause]) -> ResidualCause | None:
     """Return a usual sensor error, or several together, that explains the recordings; None if no such error does.
 
@@ -232,16 +222,13 @@ def _usual_errors(search: CauseSearch, none: ScaledResiduals, of_bench: Sequence
 
 
 def _explained(
-    search: CauseSearch,
-    none: ScaledResiduals,
-    tried: Sequence[SizedCause],
-    explaining: Sequence[SizedCause],
-    sized: Sequence[CandidateCause],
+    search: CauseSearch, none: ScaledResiduals, tried: Sequence[SizedCause], sized: Sequence[CandidateCause]
 ) -> Diagnosis:
     """Return the best cause with its alternatives, or a diagnosis without a cause if a second one is needed.
 
-    ``explaining`` are the candidates that explain the recordings, ``sized`` the candidates with a magnitude to combine.
+    Some of the causes ``tried`` explain the recordings; ``sized`` are candidates with a magnitude, to combine with one.
     """
+    explaining = [cause for cause in tried if cause.explains]
     first = max(explaining, key=lambda cause: cause.gain)
     # What has no size of its own to fit, a swap or a sign, cannot pass for two other changes.
     is_fitted = first.candidate.has_size and not first.candidate.is_of_samples
@@ -252,6 +239,18 @@ def _explained(
     # With errors of sensors that any bench has, other small changes may explain as much as one alone.
     others = search.beside_usual(slopes, none, {cause.candidate.name for cause in explaining})
     return Diagnosis(_cause_of(explaining, search.penalty, others), None, len(tried))
+
+
+def _unexplained(search: CauseSearch, tried: Sequence[SizedCause], kinds: str) -> Diagnosis:
+    """Return the diagnosis without a cause, with the best of the causes ``tried``, of the ``kinds`` in words."""
+    # What is wrong with samples is seen in them, whatever else is wrong; a misread unit is no hint beside other faults.
+    nearest = max(
+        (cause for cause in tried if not cause.candidate.is_of_unit),
+        key=lambda cause: (cause.candidate.is_of_samples, cause.gain),
+        default=None,
+    )
+    nearest_cause = None if nearest is None else _cause_of([nearest], search.penalty)
+    return Diagnosis(nearest=nearest_cause, tried=len(tried), kinds=kinds)
 
 
 def _in_other_unit(

@@ -46,12 +46,15 @@ def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
         raise StudyError(
             f"'{one_line(text)}' is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'"
         )
+    name, lower, upper = parts.groups()
     with refused_as(StudyError, f"'{one_line(text)}'", ScenarioError, UnitError):
-        path = varied_path(parts[1], base)
+        path = varied_path(name, base)
         # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
-        unit = split_quantity(parts[3])[1]
-        lower = parts[2] if split_quantity(parts[2])[1] else f"{parts[2]} {unit}".rstrip()
-        low, high, path = path.level(lower), path.level(parts[3]), given_in(path, [parts[3]])
+        unit = split_quantity(upper)[1]
+        if not split_quantity(lower)[1]:
+            lower = f"{lower} {unit}".rstrip()
+        low, high = path.level(lower), path.level(upper)
+        path = given_in(path, [upper])
     if not low < high:
         raise StudyError(f"'{one_line(text)}': the lower end must be below the upper end")
     return path, low, high
@@ -150,32 +153,31 @@ class FindResult:
 
     def with_values(self, base: Scenario, values: Floats, seeds: Floats, is_of_grid: bool) -> "FindResult":
         """Try values, each with all noise streams, and return them merged with the values tried before."""
-        metric, streams = self.condition.metric, max(1, seeds.size)
-        columns = {self.path.path: np.tile(values, streams)}
+        metric, shape = self.condition.metric, (max(1, seeds.size), values.size)
+        columns = {self.path.path: np.tile(values, shape[0])}
         if seeds.size:
             columns[NOISE] = np.repeat(seeds, values.size)
         rows = self.runs.run(columns)
         # One instant of a value that swings may meet the condition by chance.
         judged = settled(rows, metric)
-        # A loop whose command turns all the time meets no condition that anybody would build on.
         verdicts = excess(rows, base, columns)
-        turns = verdicts.oscillates == 1.0
+        oscillates = verdicts.oscillates == 1.0
         # A run without a verdict is none that follows.
-        is_asked = self.condition.text == FOLLOWS
-        fails = verdicts.follows != 1.0 if is_asked else (verdicts.follows == 0.0) & is_to_follow(base, columns)
-        by_stream = (
-            each.reshape(streams, values.size)
-            for each in (rows[metric], np.where(turns, np.nan, judged), judged > rows[metric], turns, fails)
-        )
-        metrics, usable, unsettled, turning, failing = by_stream
+        fails = verdicts.follows != 1.0
+        if self.condition.text != FOLLOWS:
+            fails = (verdicts.follows == 0.0) & is_to_follow(base, columns)
+        # A loop whose command turns all the time meets no condition that anybody would build on.
+        usable = np.where(oscillates, np.nan, judged)
         tried = np.empty(values.size, TRIED)
         tried["value"], tried["is_of_grid"] = values, is_of_grid
-        tried["metric"], tried["judged"] = metrics.mean(axis=0), usable.mean(axis=0)
-        tried["spread"] = metrics.std(axis=0, ddof=min(1, streams - 1))
-        tried["unsettled"], tried["oscillating"] = unsettled.sum(axis=0), turning.sum(axis=0)
-        tried["follows"] = ~failing.any(axis=0)
-        both = np.concatenate([self.tried, tried])
-        return replace(self, tried=both[np.argsort(both["value"], kind="stable")])
+        tried["metric"] = rows[metric].reshape(shape).mean(axis=0)
+        tried["judged"] = usable.reshape(shape).mean(axis=0)
+        tried["spread"] = rows[metric].reshape(shape).std(axis=0, ddof=min(1, shape[0] - 1))
+        tried["unsettled"] = (judged > rows[metric]).reshape(shape).sum(axis=0)
+        tried["oscillating"] = oscillates.reshape(shape).sum(axis=0)
+        tried["follows"] = ~fails.reshape(shape).any(axis=0)
+        merged = np.concatenate([self.tried, tried])
+        return replace(self, tried=merged[np.argsort(merged["value"], kind="stable")])
 
 
 def outermost(
@@ -207,14 +209,7 @@ def outermost(
     search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED))
     search = search.with_values(base, np.linspace(low, high, grid), seeds, True)
     if not np.isfinite(search.tried["judged"]).any():
-        ends = f"from {path.quote(low)} to {path.quote(high)}"
-        if search.tried["oscillating"].any():
-            raise StudyError(
-                f"scenario '{base.name}': the loop oscillates in every run {ends}; omit the gains of the "
-                "controller, so that they are computed for each device"
-            )
-        reason = f"; the first: {runs.reason}" if runs.reason else ""
-        raise StudyError(f"scenario '{base.name}': no run {ends} gives the metric '{condition.metric}'{reason}")
+        raise _no_value(search, f"from {path.quote(low)} to {path.quote(high)}")
     # All parts of a bracket side by side: a bisection would wait for every one of its runs.
     index, neighbour = search.found
     while index is not None and neighbour is not None:
@@ -224,10 +219,29 @@ def outermost(
         search = search.with_values(base, np.linspace(value, neighbour, _PARTS + 1)[1:-1], seeds, False)
         index, neighbour = search.found
     # With noise a single run does not represent the mean over the noise streams.
-    if condition.text != FOLLOWS or seeds.size:
-        return search
-    value = search.nearest if index is None else float(search.tried["value"][index])
-    values = [value] if neighbour is None else [value, neighbour]
-    results = [simulate(with_overrides(base, [f"{path.path}={each!r} {SI}"])) for each in values]
-    said = [result.following if result.tracking is None else result.tracking.found for result in results]
-    return replace(search, verdicts=tuple(zip(values, said, strict=True)))
+    is_single_run = condition.text == FOLLOWS and not seeds.size
+    return replace(search, verdicts=_verdicts(search, base)) if is_single_run else search
+
+
+def _no_value(search: FindResult, ends: str) -> StudyError:
+    """Return the error for a search of which no run has the metric; ``ends`` names the range of values."""
+    if search.tried["oscillating"].any():
+        return StudyError(
+            f"scenario '{search.scenario}': the loop oscillates in every run {ends}; omit the gains of the controller, "
+            "so that they are computed for each device"
+        )
+    reason = f"; the first: {search.runs.reason}" if search.runs.reason else ""
+    return StudyError(
+        f"scenario '{search.scenario}': no run {ends} gives the metric '{search.condition.metric}'{reason}"
+    )
+
+
+def _verdicts(search: FindResult, base: Scenario) -> tuple[tuple[float, str], ...]:
+    """Return the value found and its outer neighbour, or else the nearest value, with the verdict of a run of each."""
+    index, neighbour = search.found
+    values = [search.nearest if index is None else float(search.tried["value"][index])]
+    if neighbour is not None:
+        values.append(neighbour)
+    results = [simulate(with_overrides(base, [f"{search.path.path}={value!r} {SI}"])) for value in values]
+    verdicts = [result.following if result.tracking is None else result.tracking.found for result in results]
+    return tuple(zip(values, verdicts, strict=True))

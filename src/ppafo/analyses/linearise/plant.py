@@ -50,13 +50,6 @@ def size_of(name: str) -> float:
     return _SIZES.get(UNITS.get(name, ""), 1.0)
 
 
-class _PlantValues(NamedTuple):
-    """Time derivatives of all states, and outputs, each by name [SI]."""
-
-    rates: dict[str, float]
-    outputs: dict[str, float]
-
-
 @dataclass(frozen=True, slots=True)
 class LinearisedPlant:
     """Plant of a run without controller and sensors, as a function of states and inputs.
@@ -81,7 +74,7 @@ class LinearisedPlant:
         supplies = DRIVEN[:1] if self.run.program.has_one_chamber else DRIVEN[:2]
         return ("command", *supplies, *more)
 
-    def at(self, values: Mapping[str, float]) -> _PlantValues:
+    def at(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
         """Return time derivatives and outputs for values of all states and inputs by name [SI].
 
         A valve state that follows the command immediately does not count as a state: its derivative is 0.
@@ -109,7 +102,7 @@ class LinearisedPlant:
         rates = motion_rates | pressure_rates | temperature_rates
         outputs = {"torque": program.actuator.torque(plant, angle, *pressures)} | {name: values[name] for name in rates}
         outputs |= {"supplied_flow": gas.supplied, "vented_flow": gas.vented}
-        return _PlantValues(rates | valve.rates, outputs | {name: values[name] for name in valve.rates})
+        return rates | valve.rates, outputs | {name: values[name] for name in valve.rates}
 
 
 def plant_of(run: Run, direction: float | None, values: Mapping[str, float], time: float = 0.0) -> LinearisedPlant:

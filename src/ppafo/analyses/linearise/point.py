@@ -186,16 +186,16 @@ def _steady(
         starts.append({**values, **start, **dict.fromkeys(opening_names(values), command)})
     plant = plant_of(run, direction, values)
     # The unknowns are all states, and the command if a level is given.
-    names = [*plant.at(values).rates, *([] if level is None else ["command"])]
+    names = [*plant.at(values)[0], *([] if level is None else ["command"])]
 
     def imbalance(values: Mapping[str, float]) -> Floats:
         """Return time derivatives relative to the size of the states [1/s], and relative error of the level [-]."""
-        state = plant.at(values)
+        rates_by_name, outputs = plant.at(values)
         # So that pascals and openings count alike.
-        rates = [rate / size_of(name) for name, rate in state.rates.items()]
+        rates = [rate / size_of(name) for name, rate in rates_by_name.items()]
         if level is None:
             return np.array(rates)
-        reached = quantity.value(values["angle"], values["pressure_1"], values["pressure_2"], state.outputs["torque"])
+        reached = quantity.value(values["angle"], values["pressure_1"], values["pressure_2"], outputs["torque"])
         return np.array([*rates, (reached - level) / quantity.size])
 
     roots = (_newton(imbalance, names, start) for start in starts)

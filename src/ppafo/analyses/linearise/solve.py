@@ -114,30 +114,30 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
 def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     """Return the linear model at an operating point, with one-sided slopes on the sides given by ``side_of``."""
     values, plant = dict(point.values), plant_of(run, point.direction, point.values, point.time or 0.0)
-    here = plant.at(values)
+    rates_here, outputs_here = plant.at(values)
     # Slopes of rates and outputs on the side of ``side_of`` and on the other side, and estimates of their errors.
     slopes: dict[str, tuple[Floats, Floats, Floats]] = {}
-    for name in (*here.rates, *plant.inputs):
+    for name in (*rates_here, *plant.inputs):
 
         def rates_and_outputs(value: float, name: str = name) -> Floats:
-            state = plant.at({**values, name: value})
-            return np.array([*state.rates.values(), *state.outputs.values()])
+            rates, outputs = plant.at({**values, name: value})
+            return np.array([*rates.values(), *outputs.values()])
 
         side, size = side_of(name, values, plant.direction), size_of(name)
         near_name, error = one_sided_slopes(rates_and_outputs, values[name], side, size)
         far_name, far_error = one_sided_slopes(rates_and_outputs, values[name], -side, size)
         slopes[name] = near_name, far_name, error + far_error
     # What the valve takes from its command at once is no state: nothing but the output that shows it asks for it.
-    rows = [*(f"rate of {state}" for state in here.rates), *here.outputs]
+    rows = [*(f"rate of {state}" for state in rates_here), *outputs_here]
     # A second chamber that the actuator lacks stays at the atmosphere, without any slope.
-    idle = [name for name in here.rates if run.program.has_one_chamber and name in OF_SECOND_CHAMBER]
-    for name in (name for name in here.rates if name.startswith(VALVE)):
+    idle = [name for name in rates_here if run.program.has_one_chamber and name in OF_SECOND_CHAMBER]
+    for name in (name for name in rates_here if name.startswith(VALVE)):
         other_rows = [row != name for row in rows]
         if not any(np.any(side[other_rows]) for side in slopes[name][:2]):
             idle.append(name)
-    states, outputs = ([name for name in names if name not in idle] for names in (here.rates, here.outputs))
+    states, outputs = ([name for name in names if name not in idle] for names in (rates_here, outputs_here))
     columns = [*states, *plant.inputs]
-    is_row = [name not in idle for name in (*here.rates, *here.outputs)]
+    is_row = [name not in idle for name in (*rates_here, *outputs_here)]
     near, far, errors = (np.array([slopes[name][index] for name in columns]).T[is_row] for index in (0, 1, 2))
     sizes = np.array([size_of(name) for name in columns])
     largest = np.max(np.maximum(np.abs(near), np.abs(far)) * sizes, axis=1, keepdims=True)
@@ -156,12 +156,12 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         time=point.time,
         states=tuple(LinearSignal(name, UNITS[name], values[name]) for name in states),
         inputs=tuple(LinearSignal(name, UNITS[name], values[name]) for name in plant.inputs),
-        outputs=tuple(LinearSignal(name, UNITS[name], here.outputs[name]) for name in outputs),
+        outputs=tuple(LinearSignal(name, UNITS[name], outputs_here[name]) for name in outputs),
         a=a,
         b=b,
         c=c,
         d=d,
-        rates=np.array([here.rates[name] for name in states]),
+        rates=np.array([rates_here[name] for name in states]),
         sides=sides,
         edges=tuple(SlopeKink(name, side_of(name, values, point.direction) > 0.0) for name in kinks),
         delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),

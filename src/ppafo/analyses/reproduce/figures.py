@@ -1,5 +1,6 @@
 """Figures 7 and 8 of the paper: simulated step response and torque task, with synthetic measurements."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from operator import methodcaller
@@ -63,47 +64,63 @@ def step_response_figure(
     ``synthetic`` is a recording of the simulated bench, drawn as a thin line with a band from the smallest to the
     largest readings; below each panel, the difference from the model is stated.
     """
-    end, marked, named = _MILLISECONDS * float(recording.time[-1]), [], []
+    time, last = _MILLISECONDS * recording.time, _MILLISECONDS * float(recording.time[-1])
     if events is not None:
-        breakaway, stop = _MILLISECONDS * events.breakaway_time, _MILLISECONDS * events.stop_time
-        end = min(end, stop * (1.0 + _SHOWN_AFTER_STOP))
-        marked = [Mark("at", x=time, colour=GREY, style=_EVENT) for time in (breakaway, stop)]
-        # Angles at which nothing else is drawn there.
-        for time, angle, words in ((breakaway, 120.0, "breaks away"), (stop, 25.0, "at rest")):
-            named.append(Mark("text", time + 0.01 * end, angle, label=words, colour=GREY, style=_SMALL_WORDS))
-    ends = -_SHOWN_BEFORE_STEP * end, end
-    upper: list[Panel] = []
-    lower: list[Panel] = []
-    curves = _curves(recording, levels)
-    measured_curves = None if synthetic is None else _curves(synthetic, levels)
-    for index, (name, quantity, unit, colour, frame) in enumerate(_CURVES):
-        values = curves[index]
-        model = Mark("line", _MILLISECONDS * recording.time, values, label="model", colour=colour, style={"zorder": 3})
-        marks, then = [model, *marked, *named], partial(_enlarge, frame, ends)
-        if synthetic is not None and measured_curves is not None:
-            times, measured = _MILLISECONDS * synthetic.time, measured_curves[index]
-            # A line, and a band from the smallest to the largest readings.
-            starts = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
-            band = np.minimum.reduceat(measured, starts), np.maximum.reduceat(measured, starts)
-            middles, pale = times[starts] + 0.5 * _BIN, {"alpha": 0.3, "zorder": 1}
-            marks[1:1] = [
-                Mark("line", times, measured, (), "synthetic measurement", EXPERIMENT.colour, _THIN),
-                Mark("band", middles, band, colour=EXPERIMENT.colour, style=pale),
-            ]
-            apart = measured - np.interp(synthetic.time, recording.time, values)
-            differences = [
-                Mark("line", times, apart, colour=EXPERIMENT.colour, style={"linewidth": 0.9}),
+        last = min(last, _MILLISECONDS * events.stop_time * (1.0 + _SHOWN_AFTER_STOP))
+    time_limits = -_SHOWN_BEFORE_STEP * last, last
+    event_lines, event_names = _event_marks(events, last)
+    signals: list[Panel] = []
+    errors: list[Panel] = []
+    for letter, (name, quantity, unit, colour, inset_frame), model in zip(
+        "ABCD", _CURVES, _curves(recording, levels), strict=True
+    ):
+        marks = [Mark("line", time, model, label="model", colour=colour, style={"zorder": 3})]
+        if synthetic is not None:
+            measured = _curves(synthetic, levels)[len(errors)]
+            marks += _measured_marks(_MILLISECONDS * synthetic.time, measured)
+            error = measured - np.interp(synthetic.time, recording.time, model)
+            error_marks = [
+                Mark("line", _MILLISECONDS * synthetic.time, error, colour=EXPERIMENT.colour, style={"linewidth": 0.9}),
                 Mark("level", y=0.0, colour=colour, style={"linewidth": 1.0}),
-                *marked,
+                *event_lines,
             ]
-            kind, title = Kind("Error", unit.replace("psig", "psi")), "Measurement less model"
-            limit = methodcaller("set_xlim", *ends)
-            lower.append(Panel(_AFTER_STEP, kind, differences, title, then=limit, tall=0.85, shares_x=True))
-        legend, title = "" if upper else "figure", f"$\\bf{{{'ABCD'[index]}}}$   {name}"
-        upper.append(Panel(_AFTER_STEP, Kind(quantity, unit), marks, title, None, legend, then, 2.3, shares_x=True))
-        named = []
-    panels = [*upper[:2], *lower[:2], *upper[2:], *lower[2:]]
+            kind, limit = Kind("Error", unit.replace("psig", "psi")), methodcaller("set_xlim", *time_limits)
+            errors.append(
+                Panel(_AFTER_STEP, kind, error_marks, "Measurement less model", then=limit, tall=0.85, shares_x=True)
+            )
+        # The first panel has the names of the events, and the legend of all panels.
+        marks += event_lines if signals else [*event_lines, *event_names]
+        legend, title = "" if signals else "figure", f"$\\bf{{{letter}}}$   {name}"
+        enlarge = partial(_enlarge, inset_frame, time_limits)
+        signals.append(
+            Panel(_AFTER_STEP, Kind(quantity, unit), marks, title, None, legend, enlarge, 2.3, shares_x=True)
+        )
+    panels = [*signals[:2], *errors[:2], *signals[2:], *errors[2:]]
     return draw_panels(panels, 2, (3.15, 1.0), kind=(synthetic or recording).kind)
+
+
+def _event_marks(events: StepEvents | None, last: float) -> tuple[list[Mark], list[Mark]]:
+    """Return upright lines at the events, and their names, for panels that end at ``last`` [ms]."""
+    if events is None:
+        return [], []
+    # Names at angles [deg] at which nothing else is drawn at that time.
+    named = ((events.breakaway_time, 120.0, "breaks away"), (events.stop_time, 25.0, "at rest"))
+    times = [_MILLISECONDS * time for time, _, _ in named]
+    return [Mark("at", x=time, colour=GREY, style=_EVENT) for time in times], [
+        Mark("text", time + 0.01 * last, angle, label=name, colour=GREY, style=_SMALL_WORDS)
+        for time, (_, angle, name) in zip(times, named, strict=True)
+    ]
+
+
+def _measured_marks(time: Floats, readings: Floats) -> list[Mark]:
+    """Return a line of the readings over time [ms], and the band from their smallest to their largest per ``_BIN``."""
+    starts = np.flatnonzero(np.diff(np.floor(time / _BIN), prepend=-np.inf) > 0.0)
+    band = np.minimum.reduceat(readings, starts), np.maximum.reduceat(readings, starts)
+    pale = {"alpha": 0.3, "zorder": 1}
+    return [
+        Mark("line", time, readings, (), "synthetic measurement", EXPERIMENT.colour, _THIN),
+        Mark("band", time[starts] + 0.5 * _BIN, band, colour=EXPERIMENT.colour, style=pale),
+    ]
 
 
 def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
@@ -150,49 +167,43 @@ def torque_task_figure(
     simulated bench with both valves.
     """
     runs = ((solenoid, SOLENOID, "solenoid"), (proportional, PROPORTIONAL, "proportional"))
-    torques, gas, at_end = [], [], []
-    errors = [Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8})]
-    for (run, style, name), stated, bench in zip(runs, gas_in_paper, synthetic or (None, None), strict=True):
-        torques.append(_torque_marks(run, style, ceiling, bench))
-        errors.append(Mark("line", run.time, run["reference"] - run["torque"], colour=style.colour))
+    torques = [
+        _torque_marks(run, style, ceiling, bench)
+        for (run, style, _), bench in zip(runs, synthetic or (None, None), strict=True)
+    ]
+    errors = [
+        Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8}),
+        *(Mark("line", run.time, run["reference"] - run["torque"], colour=style.colour) for run, style, _ in runs),
+    ]
+    gas: list[Mark] = []
+    for (run, style, name), stated in zip(runs, gas_in_paper, strict=True):
         supplied = run["supplied_mass"]
-        gas_label = f"{name}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g, in the paper {stated:g} g"
-        gas.append(Mark("line", run.time, supplied, label=gas_label, colour=style.colour))
+        label = f"{name}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g, in the paper {stated:g} g"
+        gas.append(Mark("line", run.time, supplied, label=label, colour=style.colour))
         gas.append(Mark("level", y=stated / GRAMS_PER_KILOGRAM, colour=style.colour, style=_LEVEL))
-        at_end += _end_marks(name, run, style)
-    most = GRAMS_PER_KILOGRAM * max(float(run["supplied_mass"][-1]) for run, _, _ in runs)
+    opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)
     drawn = [mark.y for marks in torques for mark in marks]
     low, high = min(float(np.min(values)) for values in drawn), max(float(np.max(values)) for values in drawn)
-    air, least = 0.05 * (high - low), -0.08 if proportional["command"].min() >= 0.0 else -1.1
-    opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)
-    torque_limits = {"ylim": (low - air, high + air)}
+    margin = 0.05 * (high - low)
+    most_gas = GRAMS_PER_KILOGRAM * max(float(run["supplied_mass"][-1]) for run, _, _ in runs)
+    torque_limits = {"ylim": (low - margin, high + margin)}
     chambers = {"ylim": (0.0, 2.0), "yticks": (0.5, 1.5), "yticklabels": ("2", "1")}
-    gas_limits = {"ylim": (0.0, 1.1 * max(most, *gas_in_paper))}
+    opening_limits = {"ylim": (-0.08 if proportional["command"].min() >= 0.0 else -1.1, 1.08)}
+    gas_limits = {"ylim": (0.0, 1.1 * max(most_gas, *gas_in_paper))}
+    over_time: tuple[tuple[Kind, list[Mark], str, str, float, dict[str, Any]], ...] = (
+        (_TORQUE, torques[0], "Torque with solenoid valves, on or off", "above", 2.3, torque_limits),
+        (Kind(), _filling_marks(solenoid), "Chamber that the solenoid valves fill", "", 0.7, chambers),
+        (_TORQUE, torques[1], "Torque with the proportional valve", "above", 2.3, torque_limits),
+        (Kind(), [opening], "Opening of the proportional valve", "", 0.7, opening_limits),
+        (replace(_TORQUE, words="Error"), errors, "Error: reference less torque, both valves", "", 1.3, {}),
+        (_GAS, gas, "CO$_2$ from the supply (dotted: the paper)", "above", 1.3, gas_limits),
+    )
+    time_limits = float(solenoid.time[0]), float(solenoid.time[-1])
     panels = [
-        Panel(
-            TIME,
-            kind,
-            marks,
-            title,
-            legend=legend,
-            then=methodcaller("set", xlim=(float(solenoid.time[0]), float(solenoid.time[-1])), **limits),
-            tall=tall,
-            shares_x=True,
-        )
-        for kind, marks, title, legend, tall, limits in (
-            (_TORQUE, torques[0], "Torque with solenoid valves, on or off", "above", 2.3, torque_limits),
-            (Kind(), _filling_marks(solenoid), "Chamber that the solenoid valves fill", "", 0.7, chambers),
-            (_TORQUE, torques[1], "Torque with the proportional valve", "above", 2.3, torque_limits),
-            (Kind(), [opening], "Opening of the proportional valve", "", 0.7, {"ylim": (least, 1.08)}),
-            (replace(_TORQUE, words="Error"), errors, "Error: reference less torque, both valves", "", 1.3, {}),
-            (_GAS, gas, "CO$_2$ from the supply (dotted: the paper)", "above", 1.3, gas_limits),
-        )
+        Panel(TIME, kind, marks, title, None, legend, methodcaller("set", xlim=time_limits, **limits), tall, True)
+        for kind, marks, title, legend, tall, limits in over_time
     ]
-    # Room to the right of the longer bar for the amounts.
-    ends = {"xlim": (0.0, 1.8 * most), "yticks": (1.0, 0.0), "yticklabels": [name for _, _, name in runs]}
-    then = methodcaller("set", **ends)
-    panels.append(Panel(_GAS, Kind(), at_end, "Location of this gas at the end", then=then, tall=0.75))
-    return draw_panels(panels, 1, (6.3, 1.0), kind=solenoid.kind)
+    return draw_panels([*panels, _gas_panel(runs, most_gas)], 1, (6.3, 1.0), kind=solenoid.kind)
 
 
 def _torque_marks(recording: Recording, style: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:
@@ -226,28 +237,27 @@ def _filling_marks(recording: Recording) -> list[Mark]:
     return marks
 
 
-def _end_marks(name: str, run: Recording, style: DrawingStyle) -> list[Mark]:
-    """Return bars of the supplied gas at the end: in the chambers, vented, and below it leaked past the vane."""
-    is_first = name == "solenoid"
-    height = 1.0 if is_first else 0.0
-    supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
-    bars = (
-        (0.0, supplied - vented, height, 0.25, style.colour, 1.0, "in the chambers"),
-        (supplied - vented, supplied, height, 0.25, style.colour, 0.35, "vented"),
-        (supplied - leaked, supplied, height - 0.36, 0.05, GREY, 1.0, "leaked past the vane"),
-    )
-    inside, out, past = (f"{GRAMS_PER_KILOGRAM * mass:.2f}" for mass in (supplied - vented, vented, leaked))
-    return [
-        Mark("text", supplied, height, label=f"  {inside}, {out}, {past} g", colour=BLACK, style=_WORDS),
-        *(
-            Mark(
-                "band",
-                (low, high),
-                ((y - half,) * 2, (y + half,) * 2),
-                label=words if is_first else "",
-                colour=colour,
-                style={"alpha": alpha},
-            )
-            for low, high, y, half, colour, alpha, words in bars
-        ),
-    ]
+def _gas_panel(runs: Sequence[tuple[Recording, DrawingStyle, str]], most: float) -> Panel:
+    """Return the panel of the supplied gas at the end: bars in the chambers, vented, and below them leaked.
+
+    The first of two runs is above, with labels for the legend; ``most`` is the larger gas [g].
+    """
+    marks: list[Mark] = []
+    rows = (1.0, ("in the chambers", "vented", "leaked past the vane")), (0.0, ("", "", ""))
+    for (run, style, _), (height, labels) in zip(runs, rows, strict=True):
+        supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
+        inside = supplied - vented
+        amounts = ", ".join(f"{GRAMS_PER_KILOGRAM * mass:.2f}" for mass in (inside, vented, leaked))
+        marks.append(Mark("text", supplied, height, label=f"  {amounts} g", colour=BLACK, style=_WORDS))
+        bars = (
+            (0.0, inside, height, 0.25, style.colour, 1.0),
+            (inside, supplied, height, 0.25, style.colour, 0.35),
+            (supplied - leaked, supplied, height - 0.36, 0.05, GREY, 1.0),
+        )
+        for label, (start, end, middle, half, colour, alpha) in zip(labels, bars, strict=True):
+            edges = (middle - half,) * 2, (middle + half,) * 2
+            marks.append(Mark("band", (start, end), edges, label=label, colour=colour, style={"alpha": alpha}))
+    # Room to the right of the longer bar for the amounts.
+    limits = {"xlim": (0.0, 1.8 * most), "yticks": (1.0, 0.0), "yticklabels": [name for _, _, name in runs]}
+    set_limits = methodcaller("set", **limits)
+    return Panel(_GAS, Kind(), marks, "Location of this gas at the end", then=set_limits, tall=0.75)

@@ -6,6 +6,7 @@ violation is better; a candidate with a failed run is worse than all others (Deb
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from ppafo.simulation.simulate import simulate
 from ppafo.simulation.tracking.metered import shortfall
 from ppafo.studies.distributions import Floats
 from ppafo.studies.intervals import noise_interval
+from ppafo.studies.limits import MetricLimit
 from ppafo.studies.sampling import NOISE_DRAWS, with_new_noise
 from ppafo.studies.study import with_overrides
 from ppafo.study.runs import (
@@ -60,11 +62,11 @@ def solve_tuning(problem: Problem, threads: int | None, progress: Report | None)
     """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
     spread = problem.spread
     metrics = with_companions(problem.metrics, problem.scenario)
-    runs = scenario_runs(
-        problem.scenario, metrics, RunCounter(_largest_runs(problem), progress), problem.gauge, threads
-    )
+    counter = RunCounter(_largest_runs(problem), progress)
+    runs = scenario_runs(problem.scenario, metrics, counter, problem.gauge, threads)
     draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
-    scales = _scales(problem, _metrics_of_gains(runs, problem, problem.before, draws))
+    gains_before = {path: [value] for path, value in problem.before.items()}
+    scales = _scales(problem, _metrics_of_candidates(runs, problem, gains_before, draws))
 
     def costs(fractions: Floats) -> Floats:
         values = {gain.path: gain.value(fractions[:, column]) for column, gain in enumerate(problem.searched)}
@@ -74,8 +76,8 @@ def solve_tuning(problem: Problem, threads: int | None, progress: Report | None)
     before, after = (
         _evaluate(runs, problem, scales, gains, draws) for gains in (problem.before, problem.gains(starts[0].fractions))
     )
-    bounds = {gain.path: gain.bound_reached(after.gains[gain.path]) for gain in problem.searched}
-    reached = {path: bound for path, bound in bounds.items() if bound is not None}
+    bounds = ((gain.path, gain.bound_reached(after.gains[gain.path])) for gain in problem.searched)
+    reached = {path: bound for path, bound in bounds if bound is not None}
     valve = problem.scenario.device.valve_name
     return Tuned(
         tuning=problem.name,
@@ -128,42 +130,31 @@ class CandidateMetrics:
     failed: NDArray[np.bool_]
     off: Floats
 
-    @property
-    def without_value(self) -> Floats:
-        """Fraction of the runs of each candidate that failed or lack a metric (candidates,)."""
-        lacking = self.failed | np.any([~np.isfinite(values) for values in self.judged.values()], axis=0)
-        return np.asarray(np.mean(lacking, axis=1))
-
 
 @dataclass(frozen=True, slots=True)
 class _CandidateScores:
     """Scores of candidates, each (candidates,).
 
+    ``cost``: cost by which candidates are ranked
     ``objective``, ``violation``: objective, and violation of the constraints
     ``off``: fraction by which tracking exceeds its limits
-    ``without_value``: fraction of runs without a value
+    ``without_value``: fraction of the runs that failed or lack a metric
     """
 
+    cost: Floats
     objective: Floats
     violation: Floats
     off: Floats
     without_value: Floats
 
-    @property
-    def cost(self) -> Floats:
-        """Cost by which candidates are ranked, (candidates,)."""
-        # Deb's rules in one number, since SciPy compares nothing else.
-        broken = self.violation + self.off
-        usual = np.where(broken > 0.0, INFEASIBLE + broken, self.objective)
-        return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)
-
 
 def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float]) -> _CandidateScores:
     """Score candidates by objective, constraints and tracking; ``scales`` are scales of the goals by metric [SI]."""
-    failing = runs.without_value
+    lacks_metric = np.any([~np.isfinite(values) for values in runs.judged.values()], axis=0)
+    without_value = np.asarray(np.mean(runs.failed | lacks_metric, axis=1))
     # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
-    known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.judged.items()}
-    objective, violation = np.zeros(failing.size), np.zeros(failing.size)
+    known = {name: np.where(without_value[:, None] > 0.0, 0.0, values) for name, values in runs.judged.items()}
+    objective, violation = np.zeros(without_value.size), np.zeros(without_value.size)
     for goal in problem.goals:
         objective += goal.weight * problem.bad_end(known[goal.metric], goal.weight > 0.0) / scales[goal.metric]
     for constraint in problem.constraints:
@@ -173,7 +164,11 @@ def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float])
         violation += np.maximum(0.0, excess) / (abs(constraint.limit) or 1.0)
     # A loop that does not follow its reference violates a constraint that holds in every tuning.
     off = np.maximum(0.0, problem.bad_end(runs.off, True))
-    return _CandidateScores(objective=objective, violation=violation, off=off, without_value=failing)
+    # Deb's rules in one number, since SciPy compares nothing else.
+    broken = violation + off
+    cost = np.where(broken > 0.0, INFEASIBLE + broken, objective)
+    cost = np.where(without_value > 0.0, UNUSABLE * (1.0 + without_value), cost)
+    return _CandidateScores(cost, objective, violation, off, without_value)
 
 
 @on_one_thread
@@ -192,7 +187,8 @@ def search(costs: Costs, before: Sequence[float], effort: SearchEffort) -> list[
 def _search_from_start(
     costs: Costs, before: Sequence[float], effort: SearchEffort, random: np.random.Generator
 ) -> SearchStart:
-    from scipy.optimize import differential_evolution, minimize
+    """Return the result of one start: differential evolution, then a simplex around its best candidate."""
+    from scipy.optimize import minimize
 
     batches: list[Floats] = []
 
@@ -201,10 +197,42 @@ def _search_from_start(
         batches.append(costs(np.clip(np.atleast_2d(columns.T), 0.0, 1.0)))
         return batches[-1]
 
+    evolved = _evolution(batch_costs, before, effort, random)
+    generations = len(batches)
+    # In a flat valley generations come to within a hundredth of the best, and hardly nearer.
+    size = np.clip(np.std(evolved.population, axis=0), *_SIMPLEX_SIZES)
+    corners = [evolved.x, *(evolved.x + np.diag(np.where(evolved.x + size > 1.0, -size, size)))]
+    refined = minimize(
+        lambda fractions: float(batch_costs(fractions[:, None])[0]),
+        evolved.x,
+        method="Nelder-Mead",
+        bounds=[(0.0, 1.0)] * len(before),
+        options={
+            "initial_simplex": np.array(corners),
+            "maxfev": _REFINEMENTS * len(before),
+            "xatol": _TOLERANCE,
+            "fatol": _TOLERANCE * _TOLERANCE * abs(float(evolved.fun)),
+        },
+    )
+    best = np.minimum.accumulate([np.min(batch) for batch in batches]).tolist()
+    return SearchStart(
+        fractions=tuple(map(float, refined.x)),
+        cost=float(refined.fun),
+        candidates=sum(map(len, batches)),
+        # The simplex adds one cost, where it ended.
+        generations=(*best[:generations], best[-1]),
+        is_settled=_is_settled(evolved.population_energies),
+    )
+
+
+def _evolution(costs: Costs, before: Sequence[float], effort: SearchEffort, random: np.random.Generator) -> Any:
+    """Return SciPy's result of the differential evolution, with its last population."""
+    from scipy.optimize import differential_evolution
+
     # SciPy refuses a first candidate beyond the bounds.
     is_within = all(0.0 <= fraction <= 1.0 for fraction in before)
-    result = differential_evolution(
-        batch_costs,
+    return differential_evolution(
+        costs,
         [(0.0, 1.0)] * len(before),
         x0=np.asarray(before) if is_within else None,
         init="latinhypercube",
@@ -220,31 +248,6 @@ def _search_from_start(
         vectorized=True,
         rng=random,
     )
-    generations = len(batches)
-    # In a flat valley generations come to within a hundredth of the best, and hardly nearer.
-    size = np.clip(np.std(result.population, axis=0), *_SIMPLEX_SIZES)
-    corners = [result.x, *(result.x + np.diag(np.where(result.x + size > 1.0, -size, size)))]
-    refined = minimize(
-        lambda fractions: float(batch_costs(fractions[:, None])[0]),
-        result.x,
-        method="Nelder-Mead",
-        bounds=[(0.0, 1.0)] * len(before),
-        options={
-            "initial_simplex": np.array(corners),
-            "maxfev": _REFINEMENTS * len(before),
-            "xatol": _TOLERANCE,
-            "fatol": _TOLERANCE * _TOLERANCE * abs(float(result.fun)),
-        },
-    )
-    best = np.minimum.accumulate([np.min(batch) for batch in batches]).tolist()
-    return SearchStart(
-        fractions=tuple(map(float, refined.x)),
-        cost=float(refined.fun),
-        candidates=sum(map(len, batches)),
-        # The simplex adds one cost, where it ended.
-        generations=(*best[:generations], best[-1]),
-        is_settled=_is_settled(result.population_energies),
-    )
 
 
 def _is_settled(costs: Floats) -> bool:
@@ -257,14 +260,8 @@ def _is_settled(costs: Floats) -> bool:
     return float(np.std(excess)) <= _TOLERANCE * abs(float(np.mean(excess)))
 
 
-def _metrics_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> CandidateMetrics:
-    """Run one set of gains over the draws and return its metrics."""
-    values = {gain.path: np.array([gains[gain.path]]) for gain in problem.searched}
-    return _metrics_of_candidates(runs, problem, values, draws)
-
-
 def _metrics_of_candidates(
-    runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]
+    runs: Runs, problem: Problem, values: Mapping[str, Sequence[float] | Floats], draws: Mapping[str, Floats]
 ) -> CandidateMetrics:
     """Run every candidate with every draw and return the metrics.
 
@@ -308,20 +305,24 @@ def _evaluate(
 ) -> GainResult:
     """Return the result of a set of gains over the draws of the search, over fresh draws and on the nominal device."""
     spread = problem.spread
-    in_search = _metrics_of_gains(runs, problem, gains, draws)
-    over_fresh = in_search
+    candidate = {path: [value] for path, value in gains.items()}
+    over_fresh = in_search = _metrics_of_candidates(runs, problem, candidate, draws)
     fresh: dict[str, Floats] = {}
     noise: dict[str, ConfidenceInterval] = {}
     if spread is not None:
         # Draws that follow those of the search: the gains were not chosen on them.
         fresh = spread.uncertainty.random_columns(spread.draws, FRESH_DRAWS, spread.seed)
-        over_fresh = _metrics_of_gains(runs, problem, gains, fresh)
+        over_fresh = _metrics_of_candidates(runs, problem, candidate, fresh)
         if spread.uncertainty.has_noise:
-            for name, values in _metrics_of_gains(runs, problem, gains, with_new_noise(fresh)).metrics.items():
+            renewed = _metrics_of_candidates(runs, problem, candidate, with_new_noise(fresh))
+            for name, values in renewed.metrics.items():
                 if share := noise_interval(over_fresh.metrics[name][0], values[0], _NOISE_CONFIDENCE):
                     noise[name] = share
     scores, fresh_scores = (judge(metrics, problem, scales) for metrics in (in_search, over_fresh))
-    result = simulate(scenario_with(problem, gains))
+    # Unchanged gains are not written and read again, which would round them.
+    is_changed = gains != problem.before
+    scenario = with_overrides(problem.scenario, problem.lines(gains)) if is_changed else problem.scenario
+    result = simulate(scenario)
     return GainResult(
         gains=gains,
         values=_values(in_search.metrics, problem),
@@ -334,7 +335,7 @@ def _evaluate(
         share_without_value=float(scores.without_value[0]),
         fresh_violation=float(fresh_scores.violation[0]),
         fresh_share_without_value=float(fresh_scores.without_value[0]),
-        torque_ceiling=_unreachable_draws(problem, gains, fresh, over_fresh),
+        torque_ceiling=_unreachable_draws(problem, scenario, fresh, over_fresh),
         share_of_noise=noise,
         metrics=result.metrics,
         result=result,
@@ -342,44 +343,37 @@ def _evaluate(
 
 
 def _unreachable_draws(
-    problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: CandidateMetrics
+    problem: Problem, base: Scenario, draws: Mapping[str, Floats], runs: CandidateMetrics
 ) -> UnreachableDraws:
     """Return the draws in which the supply limits the torque, and the violated constraints that this explains."""
-    base = scenario_with(problem, gains)
     columns = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
     scenario = with_numbers(base, columns)
     if not scenario.follows_reference:
         return UnreachableDraws(0.0, ())
     lacking = np.broadcast_to(shortfall(scenario), runs.failed[:1].shape)
-    spread, explained = problem.spread, []
-    for constraint in problem.constraints:
-        values, is_most = runs.judged[constraint.metric], constraint.is_most
-        follows = bool(METRICS[constraint.metric].of_reference)
-        if not follows or constraint.is_kept(float(problem.bad_end(values, is_most)[0])):
-            continue
-        # An error is never below what the supply lacks: where that alone is too much, no gains can keep the limit.
-        is_mean = spread is None or spread.fraction is None
-        smallest_error = np.mean(lacking, axis=1) if is_mean else problem.bad_end(lacking, True)
-        is_out_of_reach = (
-            constraint.metric in MINIMUM_ERRORS and is_most and not constraint.is_kept(float(smallest_error[0]))
-        )
-        # Else the draws that lack nothing must keep it alone; a standard deviation needs two of them.
-        within_reach = values[:, lacking[0] == 0.0]
-        if (
-            is_out_of_reach
-            or within_reach.shape[1] < 2
-            or constraint.is_kept(float(problem.bad_end(within_reach, is_most)[0]))
-        ):
-            explained.append(constraint.metric)
+    explained = [
+        constraint.metric
+        for constraint in problem.constraints
+        if METRICS[constraint.metric].of_reference
+        and _is_explained(problem, constraint, runs.judged[constraint.metric], lacking)
+    ]
     return UnreachableDraws(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
 
 
-def scenario_with(problem: Problem, gains: Gains) -> Scenario:
-    """Return the scenario of a problem with given gains, rounded as in the overrides to paste."""
-    # Gains that are unchanged are not written and read again, which would round them.
-    if gains == problem.before:
-        return problem.scenario
-    return with_overrides(problem.scenario, problem.lines(gains))
+def _is_explained(problem: Problem, constraint: MetricLimit, values: Floats, lacking: Floats) -> bool:
+    """Return whether the torque that the supply is ``lacking`` in each draw [N m] is all that breaks a constraint."""
+    is_most = constraint.is_most
+    if constraint.is_kept(float(problem.bad_end(values, is_most)[0])):
+        return False
+    if constraint.metric in MINIMUM_ERRORS and is_most:
+        # An error is never below what the supply lacks: where that alone is too much, no gains can keep the limit.
+        is_mean = problem.spread is None or problem.spread.fraction is None
+        smallest_error = np.mean(lacking, axis=1) if is_mean else problem.bad_end(lacking, True)
+        if not constraint.is_kept(float(smallest_error[0])):
+            return True
+    # Else the draws that lack nothing must keep it alone; a standard deviation needs two of them.
+    within_reach = values[:, lacking[0] == 0.0]
+    return within_reach.shape[1] < 2 or bool(constraint.is_kept(float(problem.bad_end(within_reach, is_most)[0])))
 
 
 def _values(metrics: Mapping[str, Floats], problem: Problem) -> dict[str, float]:

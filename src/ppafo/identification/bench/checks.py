@@ -117,8 +117,9 @@ def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> in
     skipped = int(np.searchsorted(source.recording.time, part.time[0]))
     gap = longest_gap(part.time)
     if gap is not None:
+        index, duration = gap
         raise IdentificationError(
-            f"{source.name}: {procedure}: gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s (sample "
-            f"{skipped + gap.index + 1}); give a start or an end that excludes the gap"
+            f"{source.name}: {procedure}: gap of {duration:.4g} s after {part.time[index]:.6g} s (sample "
+            f"{skipped + index + 1}); give a start or an end that excludes the gap"
         )
     return skipped

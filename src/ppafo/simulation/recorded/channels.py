@@ -25,11 +25,11 @@ _SMALLEST_ABSOLUTE = 0.3
 
 def check_gaps(recording: Recording, file: str) -> None:
     """Raise DataError, prefixed with ``file``, for a recording with a gap too long for its inputs to be known."""
-    gap = longest_gap(recording.time)
-    if gap is not None and gap.duration > LONGEST_GAP:
+    index, duration = longest_gap(recording.time) or (0, 0.0)
+    if duration > LONGEST_GAP:
         raise DataError(
-            f"{file}: there is a gap of {gap.duration:.4g} s after {recording.time[gap.index]:.6g} s (sample "
-            f"{gap.index + 1}), in which the inputs are not known; cut the recording there"
+            f"{file}: there is a gap of {duration:.4g} s after {recording.time[index]:.6g} s (sample "
+            f"{index + 1}), in which the inputs are not known; cut the recording there"
         )
 
 
