@@ -12,7 +12,7 @@ from ppafo.documents.models import SchemaVersion, make_schema, optional, table, 
 from ppafo.documents.problems import NAME, QUANTITY
 from ppafo.documents.toml_text import TomlKind, label, value_text
 from ppafo.errors import DataError, UnitError, refused_as
-from ppafo.gait.gait import CURVES, REQUIRED, Gait, GaitCurve, plain_unit
+from ppafo.gait.gait import CURVES, REQUIRED, Gait, GaitCurve, Origin, plain_unit
 from ppafo.gait.plausible import check_gait
 from ppafo.units import from_si, parse_quantity, to_si
 
@@ -67,8 +67,11 @@ def gait_file() -> type[BaseModel]:
         "name": (str, Field(pattern=NAME, max_length=100)),
         "title": (str, Field("", description="one line: who walks, and how")),
         "origin": (
-            Literal["measured", "synthetic"],
-            Field(description="synthetic: made by a model, not recorded from a person"),
+            Origin,
+            Field(
+                description="imported: from a file that does not state its origin; synthetic: made by a model, not "
+                "recorded from a person"
+            ),
         ),
         "source": (Annotated[str, Field(min_length=1)], Field(description="where the numbers come from")),
         "notes": (str, Field("", description="further remarks")),

@@ -131,7 +131,7 @@ def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[Ga
             ),
         ),
         found=GaitFound(gait, imported),
-        kind=gait.origin,
+        kind="synthetic" if gait.origin == "synthetic" else "measured",
         files={f"{gait.name}.toml": lambda: gait_toml(gait).encode()},
     )
 

@@ -28,7 +28,8 @@ from ppafo.wording import known_names
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-Origin = Literal["measured", "synthetic"]
+Origin = Literal["measured", "imported", "synthetic"]
+"""Origin of a gait: stated as measured, imported from a file that does not state its origin, or made by a model."""
 
 CURVES: dict[str, str] = {
     "shank_angle": "rad",

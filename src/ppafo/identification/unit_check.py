@@ -25,6 +25,15 @@ The zero of a gauge pressure and the choked flow make a law of the absolute pres
 """
 
 
+_CORRECTION = "correct the unit in the header or the column map"
+
+
+def _mistake_text(names: Sequence[str], mistake: str, factor: float) -> str:
+    """Return the unit mistake of channels in words, with its factor above 1."""
+    verb = "seem" if len(names) > 1 else "seems"
+    return f"{' and '.join(names)} {verb} to be {mistake}, a factor of {max(factor, 1.0 / factor):.4g}"
+
+
 def with_wrong_units(
     estimates: tuple[Estimate, ...], known: Mapping[str, float | None], recordings: Sequence[Recording]
 ) -> tuple[Estimate, ...]:
@@ -67,9 +76,8 @@ def with_wrong_units(
             distance = max(abs(ratios[path] - size) for path in acted_on & ratios.keys())
             if distance < nearest:
                 text = (
-                    f"{' and '.join(names)} {'seem' if len(names) > 1 else 'seems'} to be {mistake}, a factor of "
-                    f"{max(factor, 1.0 / factor):.4g}; correct the unit in the header or the column map, or give the "
-                    "value that you expect in device.overrides"
+                    f"{_mistake_text(names, mistake, factor)}; {_CORRECTION}, or give the value that you expect in "
+                    "device.overrides"
                 )
                 nearest = distance
                 explained = tuple(
@@ -92,7 +100,12 @@ def with_smoothing_unit(
     if not result.scatter > _LARGE_SCATTER:
         return result
     smoothest, found = result.scatter / _SMOOTHER, result
-    for names, mistake, factor in _misread_pressures(sources):
+    channels = {name: channel for source in sources for name, channel in source.recording.channels.items()}
+    pressures = tuple(name for name, channel in channels.items() if channel.unit == "Pa")
+    # All absolute pressures together, then each one.
+    groups = dict.fromkeys((pressures, *((name,) for name in pressures)))
+    stated = {group: [channels[name].stated for name in group] for group in groups}
+    for names, (mistake, factor) in ((group, each) for group in groups for each in misread_units("Pa", stated[group])):
         again = [replace(source, recording=_in_unit(source.recording, names, factor, atmosphere)) for source in sources]
         try:
             scatter = run(tuple(again)).scatter
@@ -101,22 +114,12 @@ def with_smoothing_unit(
         if scatter < smoothest:
             smoothest = scatter
             text = (
-                f"{' and '.join(names)} {'seem' if len(names) > 1 else 'seems'} to be {mistake}, a factor of "
-                f"{max(factor, 1.0 / factor):.4g}; the scatter would be {percentage(scatter, 2)} of the largest "
-                f"reading instead of {percentage(result.scatter, 2)}; correct the unit in the header or the column map"
+                f"{_mistake_text(names, mistake, factor)}; the scatter would be {percentage(scatter, 2)} of the "
+                f"largest reading instead of {percentage(result.scatter, 2)}; {_CORRECTION}"
             )
             doubted = (replace(estimate, verdict=WRONG_UNIT, explanation=text) for estimate in result.estimates)
             found = replace(result, estimates=tuple(doubted))
     return found
-
-
-def _misread_pressures(sources: tuple[RecordingSource, ...]) -> Iterable[tuple[tuple[str, ...], str, float]]:
-    """Return names of absolute pressures, one or all, with a unit mistake and its factor: reading over true value."""
-    channels = {name: channel for source in sources for name, channel in source.recording.channels.items()}
-    names = tuple(name for name, channel in channels.items() if channel.unit == "Pa")
-    for chosen in dict.fromkeys((names, *((name,) for name in names))):
-        for mistake, factor in misread_units("Pa", [channels[name].stated for name in chosen]):
-            yield chosen, mistake, factor
 
 
 def _in_unit(recording: Recording, names: Iterable[str], factor: float, atmosphere: float) -> Recording:

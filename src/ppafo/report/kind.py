@@ -136,11 +136,6 @@ def of_path(path: str, unit: str, form: str = ".6g", given: str = "") -> Kind:
     return Kind(label_of(path), unit, quantity, form, fixed_zero(path), given if quantity else "")
 
 
-def of_channel(name: str, unit: str) -> Kind:
-    """Return the kind of a channel of a recording, from its SI unit."""
-    return Kind(name.replace("_", " ").capitalize(), unit, quantity_of_unit(unit))
-
-
 def duration_kind(longest: float) -> Kind:
     """Return the kind of durations up to the longest [s]: in seconds, or in minutes above two minutes."""
     return Kind("Time", "s", "duration") if longest > _LONG else TIME

@@ -69,7 +69,11 @@ def test_parts_are_listed_with_what_is_doubtful_and_what_is_not_known(capsys: py
     assert main(["sets", "parts"]) == 0
     printed = capsys.readouterr().out
     assert all(part.name in printed for part in load_catalogue().parts)
+    # All figures of this bottle are known, and none is doubtful.
+    assert "SodaStream 60 L cylinder" in printed
+    (row,) = [line for line in printed.splitlines() if line.startswith("sodastream-60l")]
+    assert row.split()[-2:] == ["none", "none"]
     assert main(["sets", "parts", "enfield-ls-v05s"]) == 0
     printed = capsys.readouterr().out
     assert "31.6 mm^2  published" in printed
-    assert "not known: largest_pressure, nominal_flow, spool_frequency" in printed
+    assert "unknown figures: largest_pressure, nominal_flow, spool_frequency" in printed

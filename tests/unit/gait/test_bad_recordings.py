@@ -280,9 +280,12 @@ def test_all_columns_without_a_unit_are_named_and_all_options_that_are_not_plaus
         import_gait([plain], ImportSettings(body_mass=62.0))
     stated = [part.partition("'")[2].partition("'")[0] for part in refused.value.parts]
     assert stated == names[1:-1]
-    several = r"^2 things are wrong: \(1\) a body mass of 900 kg .*; \(2\) a stature of 17 m"
-    with pytest.raises(DataError, match=several):
+    # Together with what is wrong in the file.
+    with pytest.raises(DataError) as refused:
         import_gait([plain], ImportSettings(body_mass=900.0, stature=17.0))
+    assert refused.value.parts[0].startswith("a body mass of 900 kg")
+    assert refused.value.parts[1].startswith("a stature of 17 m")
+    assert [part.partition("'")[2].partition("'")[0] for part in refused.value.parts[2:]] == names[1:-1]
 
 
 @pytest.mark.parametrize("slope", [0.18, -0.01, -0.04])
@@ -522,7 +525,6 @@ def test_settings_that_make_no_sense_are_refused(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[ankle_angle]\nterms = ['a']\npositive = 'up'\n", "'shank_angle' is missing"),
         (
             "[shank_angle]\nterms = ['s']\n[ankle_angle]\nterms = ['a']\npositive = 'up'\n",
             "ankle_angle.positive = 'up' is not allowed; allowed: plantarflexion, dorsiflexion",

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from ppafo.errors import DataError
 from ppafo.gait import CURVES, Gait, walk_recording
 from ppafo.gait.document import gait_toml, parse_gait
+from ppafo.gait.finding import gait_finding
 from ppafo.gait.gait import KNEE
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.mapping import (
@@ -99,7 +100,10 @@ def test_a_map_names_columns_signs_and_zero(
 def test_opensim_tables_of_one_walk(opensim_files: dict[str, Path], normative: Gait) -> None:
     found = import_gait(list(opensim_files.values()), ImportSettings(normative.body_mass))
     assert_same(found.gait, normative)
-    assert found.gait.origin == "measured"
+    # The tables of OpenSim do not state that a person was measured.
+    assert found.gait.origin == "imported"
+    assert 'origin = "imported"' in gait_toml(found.gait)
+    assert str(gait_finding(found.gait, found)).splitlines()[0].endswith("(imported)")
 
 
 @pytest.mark.parametrize("how", ["acceleration", "position", "backwards", "hip and thigh"])

@@ -49,6 +49,25 @@ def test_the_band_of_the_line_is_narrow_beside_the_pressure_of_the_regulator(sma
     assert np.ptp(heights) < 0.2 * (highest - lowest)
 
 
+def test_the_temperatures_of_the_figure_are_means_of_strides_without_the_ripple_of_the_pulses(
+    small: WalkResult,
+) -> None:
+    assert small.supply is not None
+    (drawn,) = [
+        line
+        for axes in bottle_figure(small).axes
+        if "Temperature" in axes.get_title("left")
+        for line in axes.lines
+        if line.get_label() == "bottle"
+    ]
+    times, series = small.supply.times, small.supply.values["bottle_temperature"]
+    strikes = small.recording.time[small.starts]
+    inside = (times >= strikes[1]) & (times < strikes[2])
+    assert drawn.get_ydata()[1] == pytest.approx(series[inside].mean() - 273.15)
+    assert len(drawn.get_ydata()) == strikes.size - 1
+    assert np.all(np.diff(drawn.get_ydata()) < 0.0), "the bottle cools from stride to stride"
+
+
 def test_a_bottle_of_a_gram_ends_empty_and_its_gas_stays_what_a_gas_can_be() -> None:
     found = walk(WALK, minutes=0.1, overrides=["bottle.gas_mass=1 g", "bottle.volume=1.5 cm^3"], bottle=BOTTLE)
     assert found.supply is not None

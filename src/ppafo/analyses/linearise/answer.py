@@ -115,7 +115,7 @@ def _torque(model: LinearModel, command: float) -> Floats:
 
 _POINTS = 400
 _LOWEST_SHARE = 0.1
-"""Lowest frequency of the frequency response plot, divided by the frequency of the slowest pole [-]."""
+"""Lowest frequency of the frequency response plot, divided by the lowest reported frequency [-]."""
 _HIGHEST_FREQUENCY = 100.0
 """Highest frequency of the frequency response plot [Hz]."""
 _LOOP_POINTS = slice(None, None, -20)
@@ -289,10 +289,12 @@ def _loop(model: LinearModel) -> Section:
 
 def frequency_panels(model: LinearModel) -> list[Panel]:
     """Return panels of the frequency response of torque to command, and of the open loop with its margins if any."""
-    poles = np.abs(model.poles) / (2.0 * np.pi)
-    lowest = min(float(np.min(poles[poles > 0.0], initial=1.0)), 1.0)
+    poles, margins = np.abs(model.poles) / (2.0 * np.pi), model.margins
+    found = () if margins is None else (margins.gain_crossover, margins.phase_crossover, margins.bandwidth)
+    # All frequencies that the report names: poles, crossovers and bandwidth.
+    lowest = min((1.0, *poles[poles > 0.0].tolist(), *(at for at in found if at)))
     # Half the sample rate, where the loop ends, is in the plot of a loop.
-    highest = max(_HIGHEST_FREQUENCY, 0.0 if model.margins is None else 0.5 / model.delays.period)
+    highest = max(_HIGHEST_FREQUENCY, 0.0 if margins is None else 0.5 / model.delays.period)
     frequencies = np.geomspace(_LOWEST_SHARE * lowest, highest, _POINTS)
     scales = {"xscale": "log", "xlim": (float(frequencies[0]), 1.1 * highest)}
     response = model.response(frequencies)

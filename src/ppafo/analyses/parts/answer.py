@@ -9,6 +9,7 @@ from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of
 from ppafo.report.kind import Kind
 
+_NO = "none"
 _WIDTH = 110
 """Line length of the printed notes of a catalogue [characters]."""
 
@@ -47,11 +48,11 @@ def finding_of_catalogue(catalogue: Catalogue) -> Finding[Parts]:
     """Return a catalogue as a finding: a table for each group, with mass, doubtful and unknown figures of each part."""
     # Notes are written over several lines of a file: how they were broken there means nothing.
     notes = "\n".join(textwrap.wrap(" ".join(catalogue.notes.split()), _WIDTH))
-    head = ("part", "maker and model", ("mass", Kind(quantity="part mass")), "figures to check", "not known")
+    head = ("part", "maker and model", ("mass", Kind(quantity="part mass")), "figures to check", "unknown figures")
     tables = []
     for group, members in catalogue.groups.items():
         rows = [
-            (part.name, part.title, part.full_mass, ", ".join(part.doubtful) or "-", ", ".join(part.unknown) or "-")
+            (part.name, part.title, part.full_mass, ", ".join(part.doubtful) or _NO, ", ".join(part.unknown) or _NO)
             for part in members.values()
         ]
         tables.append(finding.Section(group.capitalize(), columns_of(head, rows), left=len(head)))
@@ -74,7 +75,7 @@ def finding_of_part(catalogue: Catalogue, part: Part) -> Finding[Parts]:
         for name, figure in part.figures.items()
     ]
     remarks = [f"{name}: {figure.note}" for name, figure in part.figures.items() if figure.note]
-    remarks += [f"not known: {', '.join(part.unknown)}"] if part.unknown else []
+    remarks += [f"unknown figures: {', '.join(part.unknown)}"] if part.unknown else []
     head = ("figure", "value", "origin", "source")
     return Finding(
         name="parts",

@@ -10,13 +10,14 @@ import numpy as np
 
 from ppafo.analyses.sweep.results import StudyResults, metric_kind
 from ppafo.report.finding import Section
-from ppafo.report.kind import TIME, Kind, of_channel, of_path
+from ppafo.report.kind import TIME, Kind, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION, font_size
 from ppafo.signals.recording import CHANNELS
 from ppafo.studies.sampling import NOISE
 from ppafo.study.store import FOLLOWS
+from ppafo.units.shown import quantity_of_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -243,7 +244,8 @@ def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
             marks.append(Mark("band", table["time"][rows], ends, colour=colour, style={"alpha": opacity}))
         if _MEDIAN in fractions:
             marks.append(Mark("line", table["time"][rows], table["q0.5"][rows], label=name, colour=colour))
-    kind = of_channel(channel, CHANNELS[channel].unit)
+    unit = CHANNELS[channel].unit
+    kind = Kind(channel.replace("_", " ").capitalize(), unit, quantity_of_unit(unit))
     percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
     title = f"{percentages} % of runs below"
     return Panel(TIME, kind, marks, then=lambda axes: axes.set_title(title, fontsize=font_size(9.0)))

@@ -109,14 +109,11 @@ def search_panels(
         Mark("line", tuned, rows, label="after", colour=BLUE, style=dots),
     )
 
-    def name_gains(axes: "Axes") -> None:
-        axes.set_yticks(rows, [label_of(gain.path) for gain in searched])
-        axes.set_ylim(-0.6, len(searched) - 0.4)
-        axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])
-
+    names, ends_of_axis = [label_of(gain.path) for gain in searched], ["minimum", "maximum"]
+    every = {"yticks": rows, "yticklabels": names, "ylim": (-0.6, len(searched) - 0.4), "xticks": [0.0, 1.0]}
     return [
         Panel(Kind("Generation"), Kind(), costs_of_starts, "Objective, best so far", legend="inside", then=scale),
-        Panel(Kind("Between bounds"), Kind(), marks, then=name_gains),
+        Panel(Kind("Between bounds"), Kind(), marks, then=lambda axes: axes.set(**every, xticklabels=ends_of_axis)),
     ]
 
 

@@ -120,7 +120,7 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
     texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
     listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
     schema = f"a gait map ({setting_text('columns')}; format: 'ppafo doctor --schema gait-map')"
-    return f"{'; '.join(reasons)} ({files}: {listed}); name the columns in {schema}"
+    return f"{'; '.join(reasons)} ({files}: {listed}); name the columns in {schema}, or add a file that has them"
 
 
 def _marker(name: str) -> str:

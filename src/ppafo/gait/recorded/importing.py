@@ -37,7 +37,7 @@ from ppafo.gait.recorded.mapping import ImportSettings, check_settings, setting_
 from ppafo.gait.recorded.signal import Signal, low_pass
 from ppafo.gait.recorded.source import GaitSource, of_largest_one, read_source
 from ppafo.gait.recorded.strides import StrideSelection, of_usual_time, without_drop_outs, without_odd_shapes
-from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
+from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.wording import count_of
 
 
@@ -70,8 +70,9 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     DataError that lists all problems with file, column, row and remedy: after a problem with one curve, the other
     curves are still checked. Repaired values are listed in the remarks.
     """
-    check_settings(settings)
     wrong: list[PpafoError] = []
+    with noted_in(wrong):
+        check_settings(settings)
     source = read_source(files, settings, wrong)
     settings = source.settings
     walk, footfalls = dict(source.walk), None
@@ -154,7 +155,7 @@ def _finish(
 ) -> ImportedGait:
     """Return the import result of the mean curves; raises DataError, with all problems, if a curve is implausible."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
-    share, time = (float(np.mean([getattr(each, name) for each in taken])) for name in ("stance_share", "time"))
+    shares, times = ([getattr(each, name) for each in taken] for name in ("stance_share", "time"))
     means = {name: curve.mean for name, curve in curves.items()}
     fitted = {name: fit_curve(curve.mean, HARMONICS[name], curve.spread) for name, curve in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
@@ -164,7 +165,7 @@ def _finish(
     if knee is not None and knee.thigh is None and len(knee.forward) == len(knee.up) == 1:
         forward, up = (terms[0].removeprefix("-").rpartition(".")[0] for terms in (knee.forward, knee.up))
         is_one_marker = forward == up != ""
-    mean_stride = MeanStride(files, means, share, time, signs_from, is_one_marker)
+    mean_stride = MeanStride(files, means, float(np.mean(shares)), float(np.mean(times)), signs_from, is_one_marker)
     with noted_in(wrong):
         check_scatter(curves, errors, walk)
     with noted_in(wrong):
@@ -174,10 +175,27 @@ def _finish(
     with noted_in(wrong):
         check_direction(walk, signs_from)
     raise_noted(wrong)
-    gait = _gait(settings, source.tables, taken, {name: curve for name, (curve, _) in fitted.items()}, footfalls.events)
+    # A file states that it was made by a model, never that it was measured.
+    origin: Origin = "imported" if all(table.kind == "measured" for table in source.tables) else "synthetic"
+    series: dict[str, Any] = {name: curve for name, (curve, _) in fitted.items()}
+    joined = ", ".join(Path(table.file).name for table in source.tables)
+    gait = Gait(
+        name=settings.name,
+        title=settings.title or f"Mean of {len(taken)} strides, {settings.side} foot",
+        origin=origin,
+        source=f"imported from {joined}, {settings.side} foot; strides from the {footfalls.events.replace('_', ' ')}",
+        body_mass=settings.body_mass or 0.0,
+        stature=settings.stature,
+        walking_speed=settings.walking_speed,
+        stride_time=mean_stride.stride_time,
+        stance_share=mean_stride.stance_share,
+        stride_time_deviation=float(np.std(times, ddof=1)) if len(taken) > 1 else 0.0,
+        stance_share_deviation=float(np.std(shares, ddof=1)) if len(taken) > 1 else 0.0,
+        strides=len(taken),
+        **series,
+    )
     all_remarks = [*remarks, *_remarks(curves, strides, footfalls.events)]
-    all_remarks += knee_remarks(knee, walk, settings.stature)
-    all_remarks += sign_remarks(means["shank_angle"], means["ankle_angle"])
+    all_remarks += knee_remarks(knee, walk, settings.stature) + sign_remarks(means["shank_angle"], means["ankle_angle"])
     all_remarks += moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []
     all_remarks += turning_remarks(mean_stride) + delay_remarks(mean_stride) + size_remarks(mean_stride)
     all_remarks += _sampling_remarks(walk, taken)
@@ -186,8 +204,7 @@ def _finish(
     # The reading of the file that would be neutral.
     neutral = float(np.degrees(taken_off)) + sign * tilt
     given = setting_text("ankle_neutral", math.radians(neutral), f"{neutral:.1f} deg")
-    all_remarks += zero_remarks(tilt, f"give {given}, or ankle_angle.neutral in a gait map")
-    all_remarks += scatter_remarks(curves, errors)
+    all_remarks += zero_remarks(tilt, f"give {given}") + scatter_remarks(curves, errors)
     left_out, names = (stride for stride, _ in strides.left_out), (table.file for table in source.tables)
     unique = tuple(dict.fromkeys(all_remarks))
     return ImportedGait(gait, taken, tuple(left_out), curves, errors, footfalls.events, tuple(names), unique)
@@ -229,37 +246,6 @@ def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[
     raise DataError(
         f"{walk['shank_angle'].file}: has {count} covered by both angles and events ({events}; {spans}), but at least "
         f"{least} are needed; give a longer recording{fewer}"
-    )
-
-
-def _spread(values: Sequence[float]) -> float:
-    return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
-
-
-def _gait(
-    settings: ImportSettings,
-    tables: Sequence[MotionTable],
-    strides: Sequence[Stride],
-    curves: Mapping[str, Any],
-    events: str,
-) -> Gait:
-    """Build the gait from settings, source files, strides and the fitted curves."""
-    origin: Origin = "measured" if all(table.kind == "measured" for table in tables) else "synthetic"
-    names = ", ".join(Path(table.file).name for table in tables)
-    return Gait(
-        name=settings.name,
-        title=settings.title or f"Mean of {len(strides)} strides, {settings.side} foot",
-        origin=origin,
-        source=f"imported from {names}, {settings.side} foot; strides from the {events.replace('_', ' ')}",
-        body_mass=settings.body_mass or 0.0,
-        stature=settings.stature,
-        walking_speed=settings.walking_speed,
-        stride_time=float(np.mean([stride.time for stride in strides])),
-        stance_share=float(np.mean([stride.stance_share for stride in strides])),
-        stride_time_deviation=_spread([stride.time for stride in strides]),
-        stance_share_deviation=_spread([stride.stance_share for stride in strides]),
-        strides=len(strides),
-        **curves,
     )
 
 

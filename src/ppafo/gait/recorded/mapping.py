@@ -128,12 +128,21 @@ class KneeMap(StrictTable):
         return self
 
 
+_OF_THE_FORM = "default: the column and sign of the file format"
+
+
 class GaitMap(StrictTable):
-    """Gait map: meaning of the columns of recorded files; a curve that is not listed is not imported."""
+    """Gait map: meaning of the columns of recorded files.
+
+    An angle that is not listed has the column of the file format; any other curve that is not listed is not imported.
+    """
 
     schema_version: SchemaVersion = 1
-    shank_angle: ShankMap
-    ankle_angle: AngleMap
+    shank_angle: ShankMap = Field(default_factory=lambda: ShankMap(terms=("shank_angle",)), description=_OF_THE_FORM)
+    ankle_angle: AngleMap = Field(
+        default_factory=lambda: AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
+        description=_OF_THE_FORM,
+    )
     ankle_moment: MomentMap | None = None
     vertical_force: ForceMap | None = None
     centre_of_pressure: PressureMap | None = None
@@ -170,8 +179,6 @@ Side = Literal["right", "left"]
 def package_map() -> GaitMap:
     """Return the gait map of a CSV file with the column names and signs of the package."""
     return GaitMap(
-        shank_angle=ShankMap(terms=("shank_angle",)),
-        ankle_angle=AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
         ankle_moment=MomentMap(terms=("ankle_moment",), positive="plantarflexion"),
         vertical_force=ForceMap(terms=("vertical_force",)),
         centre_of_pressure=PressureMap(terms=("centre_of_pressure",)),

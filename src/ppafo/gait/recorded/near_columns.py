@@ -21,7 +21,8 @@ def nearest_column(missing: str, known: Iterable[str]) -> str:
 
 def _likeness(missing: str, name: str) -> float:
     """Return the similarity of two names [-], 0 if they cannot have the same meaning."""
-    (wanted, axis), (found, other_axis) = _parts(missing), _parts(name)
+    parts = (match.groups() if (match := _AXIS.fullmatch(text)) else (text, "") for text in (missing, name))
+    (wanted, axis), (found, other_axis) = parts
     if axis != other_axis:
         return 0.0
     (words, side), (others, other_side) = _words(wanted), _words(found)
@@ -33,11 +34,6 @@ def _likeness(missing: str, name: str) -> float:
         return min(ratios) if min(ratios) >= _NEAR_WORD else 0.0
     whole = _ratio("".join(words), "".join(others))
     return whole if whole >= _NEAR_WHOLE else 0.0
-
-
-def _parts(name: str) -> tuple[str, str]:
-    match = _AXIS.fullmatch(name)
-    return (match[1], match[2]) if match else (name, "")
 
 
 def _words(name: str) -> tuple[list[str], str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
+from ppafo.gait.gait import REQUIRED
 from ppafo.gait.mean_stride import SignSource
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.contacts import force_of_plates
@@ -76,7 +77,8 @@ def read_table(
     Gaps of up to ``longest_gap`` [s] are interpolated, with a remark on each gap.
     """
     chosen = form_of(path, form)
-    return cut_table(replace(chosen.read(path), form=form or chosen.name), longest_gap, start, end)
+    table = replace(chosen.read(path), form=form or chosen.name)
+    return table if table.problem else cut_table(table, longest_gap, start, end)
 
 
 def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float) -> Convention:
@@ -92,9 +94,7 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
     for name in GaitMap.model_fields:
         choices = [getattr(convention.columns, name) for convention in conventions]
         pairs = zip(choices, tables, strict=True)
-        fitting = [
-            convention for convention, table in pairs if name != "schema_version" and _is_there(convention, table)
-        ]
+        fitting = [each for each, table in pairs if name != "schema_version" and _is_there(each, table)]
         columns[name] = fitting[0] if fitting else choices[0]
     plates = tuple(dict.fromkeys(plate for convention in conventions for plate in convention.plates))
     remarks = tuple(dict.fromkeys(remark for convention in conventions for remark in convention.remarks))
@@ -136,23 +136,29 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     """
     if not files:
         raise DataError("no file was given; a gait needs at least shank and ankle angles")
-    cut, tables = (settings.longest_gap, settings.start, settings.end), []
+    cut, tables = (settings.longest_gap, *((None, None) if wrong else (settings.start, settings.end))), []
     for path in files:
         with noted_in(wrong):
             tables.append(read_table(path, *cut, settings.form))
     if len(tables) < len(files):
         raise_noted(wrong)
+    wrong += [DataError(table.problem) for table in tables if table.problem]
+    is_usable = not wrong
     if settings.columns is None:
         # Only without a map: a user's map names the columns as the file has them.
         tables = [FORMS[table.form].arrange(table) for table in tables]
     settings, remarks = _with_subject(settings, tables, wrong)
     # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
     body_mass = settings.body_mass or 1.0
-    convention = (
-        find_convention(tables, settings.side, body_mass)
-        if settings.columns is None
-        else convention_of_map(settings.columns, tables, settings.side)
-    )
+    own = settings.columns
+    try:
+        if own is None or not own.model_fields_set >= set(REQUIRED):
+            convention = find_convention(tables, settings.side, body_mass)
+        if own is not None:
+            filled = {name: getattr(convention.columns, name) for name in REQUIRED if name not in own.model_fields_set}
+            convention = convention_of_map(own.model_copy(update=filled), tables, settings.side)
+    except DataError as error:
+        raise_noted([*wrong, error])
     columns = convention.columns
     if settings.ankle_neutral is not None:
         neutral = {"neutral": format_quantity(settings.ankle_neutral, "rad")}
@@ -164,6 +170,8 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     moved = [column.removeprefix("-") for name, terms in used.items() if name not in LOADS for column in terms]
     tables = [fill_gaps(without_lost_markers(table, moved), names, settings.longest_gap) for table in tables]
     walk = walk_signals(tables, columns, body_mass, settings.stature, settings.columns is None, wrong)
+    if not is_usable:
+        raise_noted(wrong)
     if settings.body_mass is None:
         walk |= {name: of_largest_one(walk[name]) for name in ("ankle_moment", FORCE) if name in walk}
     if convention.plates and FORCE not in walk and settings.body_mass is not None:

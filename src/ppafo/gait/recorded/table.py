@@ -46,7 +46,8 @@ class MotionTable:
     """Motion recording: columns over time [s] as stored in a file; a unit that the file does not state is empty.
 
     ``form`` is the name of the file format, set by the caller of the reader. ``kind`` is ``measured`` or ``synthetic``.
-    ``remarks`` describe repairs, ``trial`` holds data on subject and events.
+    ``remarks`` describe repairs, ``trial`` holds data on subject and events. ``problem`` is a fault of the file that
+    leaves its columns readable; the import refuses the file after it has checked them.
     """
 
     file: str
@@ -57,6 +58,7 @@ class MotionTable:
     kind: str = "measured"
     remarks: tuple[str, ...] = ()
     trial: TrialData | None = None
+    problem: str = ""
 
 
 _LARGEST_JUMP = 3.0

@@ -1,14 +1,17 @@
 """Causes outside the loop: torque or load beyond reach, and initial pressures that do not carry the load."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
 from ppafo.metrics.metric import Floats, followed
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
+from ppafo.parameters.device import Device
 from ppafo.parameters.graph import PRESSURE_PATH
 from ppafo.parameters.reach import static_torque, supply_for, supply_that_moves, torque_reach
 from ppafo.simulation.numbers import number_at
@@ -32,8 +35,8 @@ _NEARLY_ALL, _OFTEN = 0.97, 0.03
 """Torque divided by the reach at which the actuator counts as at its limit, and fraction of the time that is often."""
 _MORE_TORQUE = (1.1, 1.3, 1.6, 2.5)
 """Torques of trials, divided by the largest present torque [-]."""
-_ANGLES = 400
-"""Number of samples at which the reach is compared with the torque."""
+_SAMPLES = 400
+"""Largest number of samples at which the reach is compared with the torque."""
 _WITHIN = 0.95
 """Reduced reference divided by the actuator's reach [-]."""
 LOCKED = Remedy({}, ("motion.kind=locked",))
@@ -66,6 +69,31 @@ class TorqueReach(NamedTuple):
     def lacking(self) -> float:
         """Torque beyond reach [N m], 0 or less within reach."""
         return self.wanted - self.reach if self.upwards else self.reach - self.wanted
+
+
+def reach_at_samples(case: Case) -> tuple[NDArray[np.intp], Floats]:
+    """Up to 400 settled samples of a recording, and the lowest and highest static torque at their angles [N m].
+
+    Returns the indices, counted from the first settled sample, and torques of shape (samples, 2).
+    """
+    device, angle = case.scenario.device, case.recording["angle"][case.settled.samples]
+    chosen, torque = np.unique(np.linspace(0, angle.size - 1, _SAMPLES).astype(np.intp)), static_torque(device)
+    return chosen, np.array([torque_reach(device, float(angle[index]), torque) for index in chosen])
+
+
+def _supplies_for(
+    device: Device, torques: Sequence[tuple[str, float, float]], factors: Sequence[float]
+) -> list[dict[str, float]]:
+    """Return supply pressures [Pa absolute] by path for each factor [-] with which the supplies can give all torques.
+
+    A torque is the path of its supply, an angle [rad] and the torque [N m] there, which the factor multiplies.
+    """
+    trials = [{path: supply_for(device, at, factor * torque) for path, at, torque in torques} for factor in factors]
+    return [
+        {path: pressure for path, pressure in each.items() if pressure is not None}
+        for each in trials
+        if None not in each.values()
+    ]
 
 
 def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
@@ -109,13 +137,8 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     if lies:
         return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or add a load", is_beyond_reach=True)
     lacking = [peak for peak in peaks if peak.lacking > 0.0]
-    changes: list[dict[str, float]] = []
-    for margin in _MARGINS:
-        needed = [supply_for(device, peak.angle, margin * peak.wanted) for peak in lacking]
-        given = [pressure for pressure in needed if pressure is not None]
-        if len(given) == len(lacking):
-            paths = [supply_that_moves(device, peak.upwards) for peak in lacking]
-            changes.append(dict(zip(paths, given, strict=True)))
+    torques = [(supply_that_moves(device, peak.upwards), peak.angle, peak.wanted) for peak in lacking]
+    changes = _supplies_for(device, torques, _MARGINS)
     if "amplitude" in scenario.reference.settings:
         level = float(scenario.reference.settings["level"])
         changes.append({"reference.amplitude": min(abs(_WITHIN * peak.reach - level) for peak in peaks)})
@@ -175,9 +198,8 @@ def torque_at_its_limit(case: Case) -> TrackingCause | None:
     scenario, device, samples = case.scenario, case.scenario.device, case.settled.samples
     if scenario.controlled != ANGLE or case.oscillates or case.only_switches:
         return None
-    angle, torque, own = case.recording["angle"][samples], case.recording["torque"][samples], static_torque(device)
-    places = np.unique(np.linspace(0, angle.size - 1, _ANGLES).astype(np.intp))
-    reaches = np.array([torque_reach(device, float(angle[place]), own) for place in places])
+    angle, torque = case.recording["angle"][samples], case.recording["torque"][samples]
+    places, reaches = reach_at_samples(case)
     # An actuator that pushes one way only has a reach in one direction only: below 0 downwards, above 0 upwards.
     acts = reaches * np.array([-1.0, 1.0]) > 0.0
     shares = np.divide(torque[places, None], reaches, out=np.zeros_like(reaches), where=acts)
@@ -195,12 +217,7 @@ def torque_at_its_limit(case: Case) -> TrackingCause | None:
         f"{level_text('N m', given)} at {level_text('rad', where)} and "
         f"{level_text('Pa', number_at(scenario, supply))}"
     )
-    trials = [{path: supply_for(device, at, factor * reach) for path, at, reach in ends} for factor in _MORE_TORQUE]
-    pressures = [
-        {path: pressure for path, pressure in each.items() if pressure is not None}
-        for each in trials
-        if None not in each.values()
-    ]
+    pressures = _supplies_for(device, ends, _MORE_TORQUE)
     # A load that is near the limit of the actuator often is too much for the stiffness of the law, too.
     stiffer = [dict(each.numbers) for each in stiffened(scenario, (2.0, 4.0))]
     both = [{**pressure, **numbers} for pressure in pressures[-2:] for numbers in stiffer]

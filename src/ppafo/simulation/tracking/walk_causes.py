@@ -6,19 +6,17 @@ import numpy as np
 
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
-from ppafo.parameters.reach import static_torque, supply_for, torque_reach
+from ppafo.parameters.reach import supply_for
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation
-from ppafo.simulation.tracking.load_causes import ONE_WAY
+from ppafo.simulation.tracking.load_causes import ONE_WAY, reach_at_samples
 from ppafo.simulation.tracking.remedies import dead_band, larger_gains, level_text, remedy, sized_valves
 
 _OFTEN = 0.1
 """Fraction of the samples with a request that counts as often [-]."""
 _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
 """Settings of a walking controller that request a torque in dorsiflexion."""
-_ANGLES = 400
-"""Number of samples of a walk at which the reach is compared with the request."""
 
 
 def _request_beyond_reach(case: Case) -> TrackingCause | None:
@@ -26,10 +24,8 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     scenario, samples = case.scenario, case.settled.samples
     if case.failure == "overshoots":
         return None
-    device, torque = scenario.device, static_torque(scenario.device)
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
-    places = np.unique(np.linspace(0, angle.size - 1, _ANGLES).astype(np.intp))
-    reaches = np.array([torque_reach(device, float(angle[place]), torque) for place in places])
+    places, reaches = reach_at_samples(case)
     above, below = reference[places] - reaches[:, 1], reaches[:, 0] - reference[places]
     share = float(np.mean((above > 0.0) | (below > 0.0)))
     if share <= _OFTEN:
@@ -56,19 +52,16 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     numbers: dict[str, float] = {}
     for path, lacking in (("supply.pressure", above), ("supply.dorsiflexion_pressure", below)):
         place = places[int(np.argmax(lacking))]
-        needed = (
-            supply_for(device, float(angle[place]), 1.05 * float(reference[place])) if lacking.max() > 0.0 else None
-        )
-        if needed is not None:
+        needed = supply_for(scenario.device, float(angle[place]), 1.05 * float(reference[place]))
+        if needed is not None and lacking.max() > 0.0:
             numbers[path] = needed
     remedies = [remedy(scenario, numbers)] if numbers else []
     if scenario.controller.settings.get("largest_torque", 0.0) > 0.0:
         least = float(np.quantile(np.where(reference[places] > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
         if least > 0.0:
             remedies.append(remedy(scenario, {"controller.largest_torque": least}))
-    return TrackingCause(
-        text, tuple(remedies), "increase `supply.pressure` or request less torque", is_beyond_reach=True
-    )
+    advice = "increase `supply.pressure` or request less torque"
+    return TrackingCause(text, tuple(remedies), advice, is_beyond_reach=True)
 
 
 def _valve_of_walk(case: Case) -> TrackingCause | None:
@@ -100,11 +93,6 @@ def _speed_of_gait(case: Case) -> TrackingCause:
     )
 
 
-def _oscillation_of_walk(case: Case) -> TrackingCause | None:
-    """Cause: gains that make a walk oscillate, or a pair of valves whose step exceeds the torque limit."""
-    return oscillation(case) if case.oscillates or (case.failure == "overshoots" and case.only_switches) else None
-
-
 def _dead_band_of_walk(case: Case) -> TrackingCause | None:
     """Cause: the command of a walk often stays within the valve's dead band, without compensation by its controller."""
     scenario = case.scenario
@@ -120,7 +108,10 @@ def _dead_band_of_walk(case: Case) -> TrackingCause | None:
 
 CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _request_beyond_reach,
-    _oscillation_of_walk,
+    # Gains that make a walk oscillate, or a pair of valves whose step exceeds the torque limit.
+    lambda case: (
+        oscillation(case) if case.oscillates or (case.failure == "overshoots" and case.only_switches) else None
+    ),
     _dead_band_of_walk,
     _valve_of_walk,
     gains_of_another_device,

@@ -10,6 +10,7 @@ from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind, duration_kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
+from ppafo.signals.recording import Floats
 from ppafo.walking.result import WalkResult
 
 if TYPE_CHECKING:
@@ -38,13 +39,16 @@ def bottle_figure(result: WalkResult) -> "Figure":
     end = float(recording.time[-1])
     dots = {"marker": ".", "markersize": 2.5, "linewidth": 0.8}
     torque = [Mark("line", recording.time[result.starts[:-1]] if peaks.size else peaks, peaks, style=dots)]
-    left = [
-        Mark("line", times, values[name], label=label, colour=colour)
-        for name, label, colour in _MASSES
-        if name in values
-    ]
+    left = [Mark("line", times, values[name], (), label, colour) for name, label, colour in _MASSES if name in values]
+    first = np.unique(np.searchsorted(times, recording.time[result.starts]))
+
+    def over_strides(series: Floats) -> Floats:
+        """Means over strides: with each pulse of flow the gas in the bottle cools, and warms again until the next."""
+        return np.add.reduceat(series, first)[:-1] / np.diff(first) if first.size > 1 else series
+
     temperatures = [
-        Mark("line", times, values[name], label=label, colour=colour) for name, label, colour in _TEMPERATURES
+        Mark("line", over_strides(times), over_strides(values[name]), (), label, colour)
+        for name, label, colour in _TEMPERATURES
     ]
     if supply.supply.line.freezes > 0.5:
         dry_ice = supply.supply.line.temperatures[0]
@@ -72,7 +76,7 @@ def bottle_figure(result: WalkResult) -> "Figure":
                 ],
                 largest=float(np.max(values["bottle_pressure"])),
             ),
-            panel(Kind("Temperature", "K", "temperature"), temperatures),
+            panel(Kind("Temperature, mean of a stride", "K", "temperature"), temperatures),
             panel(
                 Kind("Peak torque of each stride", "N m", "torque"),
                 torque,

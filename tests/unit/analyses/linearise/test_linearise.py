@@ -355,9 +355,13 @@ def test_a_loop_whose_gain_is_low_is_stable_and_has_the_bandwidth_of_its_integra
     assert expected < 2e-4
     assert model.margins.gain_crossover == pytest.approx(expected, rel=0.01)
     assert model.margins.bandwidth == pytest.approx(expected, rel=0.01)
-    # The crossover is not among the frequencies that are drawn.
+    # The crossover is far below the slowest pole, and the axis covers it.
+    assert expected < 0.01 * float(np.min(np.abs(model.poles))) / math.tau
     (gain, *_) = frequency_panels(model)
-    assert [mark.label for mark in gain.marks if mark.label] == ["gain margin at 500 Hz"]
+    labels = [mark.label for mark in gain.marks if mark.label]
+    assert labels == [f"phase margin at {model.margins.gain_crossover:.3g} Hz", "gain margin at 500 Hz"]
+    axes = linearise(TASK, overrides=["reference.level=5 N m"]).plot("frequency-response").axes
+    assert all(panel.get_xlim()[0] < 0.2 * expected for panel in axes)
 
 
 def test_margins_and_crossover_are_those_of_loop_shaping() -> None:

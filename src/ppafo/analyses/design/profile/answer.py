@@ -48,6 +48,8 @@ _HEAD = (
     ("mass", _MASS),
     "limited by",
 )
+_WHOLE_PEAK = 0.005
+"""Largest fraction of the peak torque that may be cut off without a word [-]: half of the last digit of a pressure."""
 _MARGINS = ("error", "torque", "flow", "gas")
 _ORIGINS = {
     "typed": "typed, not measured",
@@ -362,7 +364,11 @@ def suggestion_sentence(sizing: Sizing) -> str:
         return "no suggestion: no valve keeps the error limit at any of the pressures"
     bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
     cut = 0.0 if choice.margins is None else -choice.margins.torque
-    peak = f", with {100.0 * cut:.0f} % of the peak cut off" if cut > 0.0 else ""
+    problem, largest = sizing.problem, sizing.problem.profile.largest
+    whole = PRESSURE.text(problem.atmosphere + largest / problem.torque_constant)
+    most = TORQUE.text((1.0 - cut) * largest)
+    at_most = f"at most {most} of {TORQUE.text(largest)}; the whole peak needs pressure.lowest = '{whole}'"
+    peak = f", with {100.0 * cut:.0f} % of the peak cut off ({at_most})" if cut > _WHOLE_PEAK else ""
     return (
         f"suggested: {choice.valve.name} at {PRESSURE.text(choice.pressure)}{bottle}, the lightest that lasts "
         f"and keeps the error limit{peak}, {_MASS.text(choice.mass or 0.0, '.0f')}; a lower pressure is "

@@ -28,8 +28,8 @@ _EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.
 """Overrides for an earlier foot lift from toe-off, used if toes do not clear the ground with the walk's own lift."""
 _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 """Catalogue figures of an actuator that a walk adopts."""
-_SENSOR_RANGE, _SENSOR_MARGIN = 2.0e6, 1.1
-"""Default range of the chamber pressure sensors [Pa absolute], and range of larger ones over the highest pressure."""
+_SENSOR_MARGIN = 1.1
+"""Range of larger chamber pressure sensors divided by the highest pressure [-]."""
 _PROPORTIONAL = "proportional"
 """Valve type that a torque controller needs; solenoid valves only limit the torque."""
 SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
@@ -48,10 +48,11 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
     Nearest are the strides with the most torque, and the strides with the highest toes and enough torque: one or two
     results, none if no walk provides help.
     """
-    common = _common_overrides(requirements, valve, actuator)
+    settings = load_walk(WALKS[valve.kind]).controller.settings
+    common = _common_overrides(requirements, valve, actuator, float(settings["highest_pressure"]))
     strides: list[WalkedDevice] = []
     is_followed = valve.kind == _PROPORTIONAL
-    own_limit = float(load_walk(WALKS[valve.kind]).controller.settings["largest_torque"])
+    own_limit = float(settings["largest_torque"])
     # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
     static_torque = actuator.values["torque_constant"] * (requirements.pressure - STANDARD_ATMOSPHERE)
     requests = [_ABOVE * requirements.torque]
@@ -92,13 +93,18 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
     return [strongest] if highest is strongest else [strongest, highest]
 
 
-def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: Part) -> tuple[str, ...]:
-    """Return the overrides common to all walks with a pair: wearer, supply, figures of the parts, shut-off valve."""
+def _common_overrides(
+    requirements: DesignRequirements, valve: Part, actuator: Part, sensor_range: float
+) -> tuple[str, ...]:
+    """Return the overrides common to all walks with a pair: wearer, supply, figures of the parts, shut-off valve.
+
+    Chamber pressure sensors whose range [Pa absolute] is too small for the supply are replaced.
+    """
     dorsiflexion = STANDARD_ATMOSPHERE + _DORSIFLEXION * (requirements.pressure - STANDARD_ATMOSPHERE)
     units = {quantity.name: quantity.unit for quantity in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
     # A foot that moves compresses the gas above the range that sensors have by default.
     compressed = _SENSOR_MARGIN * COMPRESSION * requirements.pressure
-    sensor = (f"controller.highest_pressure={written_text(compressed, 'Pa_a')}",) if compressed > _SENSOR_RANGE else ()
+    sensor = (f"controller.highest_pressure={written_text(compressed, 'Pa_a')}",) if compressed > sensor_range else ()
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     return (
         *of_wearer(requirements),

@@ -4,6 +4,7 @@ The header of a CSV file need not be ``name [unit]``: a name alone, or with the 
 """
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from ppafo.errors import DataError, UnitError, refused_as
@@ -22,19 +23,18 @@ _TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
 _COUNTERS = ("", "index", "frame", "frame#", "framenumber", "frame number", "sample")
 """Column names of row counters, in lower case; the first is pandas' index."""
 
+_NO_TIME = "a mean stride over percent of the stride cannot be imported: give at least two strides over time"
 _LONGEST_SHOWN = 40
 """Largest number of characters of a name in a message."""
-
-
-def _recognises(path: str | Path) -> bool:
-    """Return True for a CSV suffix; a .txt file is excluded if its first line marks it as a file of markers."""
-    return Path(path).suffix.lower() != ".txt" or not _header(path).startswith("PathFileType")
 
 
 def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of the package's column names and signs; raises DataError for a left foot."""
     if side != "right":
-        raise DataError(f"a CSV file without a gait map is read as the right foot; omit {setting_text('side')}")
+        raise DataError(
+            "a CSV file is read as the right foot unless a gait map names both angles; omit "
+            f"{setting_text('side')}, or give such a map ({setting_text('columns')})"
+        )
     return Convention(package_map())
 
 
@@ -65,26 +65,25 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     delimiter, pairs = delimiter_of(header), _named_columns(header)
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
     at = next((place for place, name in enumerate(names) if name.lower() in _TIMES), 0)
-    if not all(name.lower() in _COUNTERS for name in names[:at]):
-        at = 0
-    if names[at].lower() not in _TIMES:
-        raise DataError(
-            f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; a mean stride "
-            "over percent of the stride cannot be read: give at least two strides over time, with shank and ankle "
-            f"angle; loads also need {setting_text('body_mass')}"
-        )
+    at = at if all(name.lower() in _COUNTERS for name in names[:at]) else 0
+    clock = names[at] if names[at].lower() in _TIMES else ""
+    problem = f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; {_NO_TIME}"
     if "" in names[at:]:
         raise DataError(f"{path}: a column has no name; name every column")
     # A decimal comma shows only where commas do not separate the cells.
     has_comma = delimiter != "," and any(re.search(r"\d,\d", line) for line in lines[first + 1 :])
     with refused_as(DataError, str(path), DataError):
         kind = kind_of_comments(line for line in lines if line.startswith("#"))
-    with refused_as(DataError, f"{path}: column {names[at]!r}", UnitError):
-        seconds = to_si(1.0, units[at] or _TIMES[names[at].lower()], "s")
+    with refused_as(DataError, f"{path}: column {clock!r}", UnitError):
+        seconds = to_si(1.0, units[at] or _TIMES[clock.lower()], "s") if clock else 1.0
     block = NumberBlock(
         lines=lines, first=first + 1, delimiter=delimiter, decimal="," if has_comma else ".", is_ragged=False
     )
-    return table_of(path, block, [*[""] * at, *names[at:]], units, names[at], seconds=seconds, kind=kind)
+    try:
+        table = table_of(path, block, [*[""] * at, *names[at:]], units, clock, seconds=seconds, kind=kind)
+    except DataError as error:
+        raise DataError(str(error) if clock else problem) from error
+    return table if clock else replace(table, problem=problem)
 
 
 def _header(path: str | Path) -> str:
@@ -96,7 +95,8 @@ FORM = GaitForm(
     summary="CSV files with the names and signs of this package, or others with a gait map",
     suffixes=(".csv", ".txt", ".tsv"),
     read=read_plain_csv,
-    recognises=_recognises,
+    # The first line of a .txt file may mark it as a file of markers.
+    recognises=lambda path: Path(path).suffix.lower() != ".txt" or not _header(path).startswith("PathFileType"),
     convention=_convention,
     is_whole=True,
 )

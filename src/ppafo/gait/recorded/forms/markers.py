@@ -257,11 +257,6 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
     return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'}, from its magnitude: {was}"]
 
 
-def is_trc(path: str | Path) -> bool:
-    """Return True for a file of markers, detected by its suffix or by its first line."""
-    return Path(path).suffix.lower() == ".trc" or read_bytes(path).startswith(b"PathFileType")
-
-
 def _read_trc(path: str | Path) -> MotionTable:
     """Return the markers of a TRC file as columns ``LABEL.x``, ``.y``, ``.z``."""
     trc = read_trc(path)
@@ -275,5 +270,5 @@ TRC = GaitForm(
     suffixes=(".trc", ".txt"),
     read=_read_trc,
     convention=marker_convention,
-    recognises=is_trc,
+    recognises=lambda path: Path(path).suffix.lower() == ".trc" or read_bytes(path).startswith(b"PathFileType"),
 )

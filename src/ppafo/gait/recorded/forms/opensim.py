@@ -26,13 +26,6 @@ def _is_table(path: str | Path) -> bool:
     return suffix in (_CSV, ".tsv")
 
 
-def _recognises(path: str | Path) -> bool:
-    """Return True for OpenSim's own files, and for a plain CSV file with OpenSim's name of an ankle coordinate."""
-    if not _is_table(path):
-        return True
-    return any(name.startswith("ankle_angle_") for name in plain_names(path))
-
-
 def _read(path: str | Path) -> MotionTable:
     """Return the table with the units implied by OpenSim's labels; the header states the unit of angles.
 
@@ -162,6 +155,7 @@ FORM = GaitForm(
     suffixes=(".mot", ".sto", _CSV, ".txt", ".tsv"),
     read=_read,
     convention=opensim_convention,
-    recognises=_recognises,
+    # A plain CSV file has OpenSim's name of an ankle coordinate.
+    recognises=lambda path: not _is_table(path) or any(name.startswith("ankle_angle_") for name in plain_names(path)),
     arrange=_turned_forward,
 )

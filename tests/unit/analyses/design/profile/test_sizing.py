@@ -395,8 +395,21 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
     assert sizing.choice is not None
     assert sizing.choice.margins is not None
     assert sizing.choice.margins.torque >= -0.3
-    assert "% of the peak cut off" in suggestion_sentence(sizing)
-    assert "meets all" not in suggestion_sentence(sizing)
+    # Equation (2): the peak of 5 N m needs 5 N m / 14.51 cm^3 = 344.6 kPa, 50 psi above the atmosphere.
+    most = TORQUE_CONSTANT * (sizing.choice.pressure - ATMOSPHERE)
+    said = suggestion_sentence(sizing)
+    assert (
+        f"% of the peak cut off (at most {most:.3g} N m of 5 N m; the whole peak needs pressure.lowest = '50 psi_g')"
+        in said
+    )
+    # The remedy, in the file, gives the whole peak.
+    file = tmp_path / "brief.toml"
+    file.write_text(file.read_text().replace('"15 psi_g"', '"50 psi_g"'))
+    whole = design(file).found
+    assert isinstance(whole, Sizing)
+    assert whole.choice is not None
+    assert TORQUE_CONSTANT * (whole.choice.pressure - ATMOSPHERE) == pytest.approx(5.0, rel=5e-3)
+    assert "cut off" not in suggestion_sentence(whole)
 
 
 def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
