@@ -1,10 +1,9 @@
 """Integration step of both chambers with supply lines, isothermal or with an energy balance.
 
-The stages of ``pneumatics`` keep their second order with any matrix. The matrix here takes into account that a line
-loses the gas that its chamber gains, so that a chamber in equilibrium with a small line does not require small steps.
-The lines are integrated after each stage, with the gas drawn by the valves. Gas in a line has the reference
-temperature, also with an energy balance of the chambers: warm gas pushed back from a chamber gives its heat to the
-walls of the line.
+The stages of ``pneumatics`` keep their second order with any matrix. The matrix here includes the gas that a line loses
+to its chamber, so that a chamber in equilibrium with a small line does not require small steps. The lines are
+integrated after each stage, with the gas drawn by the valves; line 2 draws from line 1, so its flow is needed alone.
+Gas in a line has the reference temperature: warm gas pushed back from a chamber gives its heat to the walls.
 """
 
 import math
@@ -70,20 +69,14 @@ def lines_after(
     return step_lines(lines, set_1, set_2, plant.gas_product, state, taken_1, taken_2, inlet_rise, step)
 
 
-def with_lines(linear: Linearisation, share_1: float, share_2: float) -> Linearisation:
-    """Linearisation that includes the gas lost by the lines; ``share`` is chamber volume divided by line volume [-]."""
-    more_1, more_2 = linear.supplied_by_1 * share_1, linear.supplied_by_2 * share_2
-    a, d = linear.a - more_1, linear.d - more_2
+def with_lines(linear: Linearisation, ratio_1: float, ratio_2: float) -> Linearisation:
+    """Linearisation that includes the gas lost by the lines; ``ratio`` is chamber volume divided by line volume [-]."""
+    # A chamber that draws gas lowers its own supply: the flow responds more strongly.
+    added_1, added_2 = linear.supplied_by_1 * ratio_1, linear.supplied_by_2 * ratio_2
+    a, d = linear.a - added_1, linear.d - added_2
     scale = 1.0 / (a * d - linear.b * linear.c)
-    return Linearisation(
-        a=a,
-        b=linear.b,
-        c=linear.c,
-        d=d,
-        scale=scale,
-        supplied_by_1=linear.supplied_by_1 + more_1,
-        supplied_by_2=linear.supplied_by_2 + more_2,
-    )
+    supplied_by_1, supplied_by_2 = linear.supplied_by_1 + added_1, linear.supplied_by_2 + added_2
+    return Linearisation(a, linear.b, linear.c, d, scale, supplied_by_1, supplied_by_2)
 
 
 def begin_fed_gas(
@@ -98,15 +91,15 @@ def begin_fed_gas(
     parts: ActuatorFunctions,
 ) -> FedGas:
     """First stage of one step [s] with ports at line pressures and volumes that change up to ``next_angle`` [rad]."""
-    held = held_chambers(plant, state.angle, parts=parts)
-    linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
-    volumes = parts.rest_volumes(plant, state.angle)
-    linear = with_lines(linear, volumes[0] / lines.volume_1, volumes[1] / lines.volume_2)
-    chambers = begin_moving_stage(plant, state, held, next_angle, linear, flows, step, parts=parts)
+    fixed = held_chambers(plant, state.angle, parts=parts)
+    linear, flows = linearise(fixed.per_mass_1, fixed.per_mass_2, flowing, step)
+    volume_1, volume_2 = parts.rest_volumes(plant, state.angle)
+    linear = with_lines(linear, volume_1 / lines.volume_1, volume_2 / lines.volume_2)
+    chambers = begin_moving_stage(plant, state, fixed, next_angle, linear, flows, step, parts=parts)
     first = chambers.still.first
-    # What of the sums is line 2's: the same stage once more, for one number.
-    growth = (volumes[1] - parts.rest_volumes(plant, next_angle)[1]) / (volumes[1] * max(step, SHORTEST))
-    drift_2 = linear.supplied_by_2 * state.mass_2 * growth
+    # The same stage for the flow out of line 2 alone, of which ``supplied`` is the sum with line 1.
+    growth_2 = (volume_2 - parts.rest_volumes(plant, next_angle)[1]) / (volume_2 * max(step, SHORTEST))
+    drift_2 = linear.supplied_by_2 * state.mass_2 * growth_2
     taken_2 = flowing.in_2.from_source + drift_2 + linear.supplied_by_2 * first.mass_2
     stepped = lines_after(plant, lines, line_state, step * (first.supplied - taken_2), step * taken_2, 0.0, step)
     return FedGas(chambers=chambers, taken_2=taken_2, drift_2=drift_2, lines=stepped)
@@ -121,15 +114,15 @@ def end_lines(
     from_2: float,
     step: float,
 ) -> LineState:
-    """Both lines at the end of the step [s]; ``change`` are the mass changes of chambers and totals in the step.
+    """Both lines at the end of the step [s]; ``change`` has the mass changes of chambers and totals in the step.
 
     ``from_2`` is the flow [kg/s] out of line 2 in the second stage.
     """
     still = begun.chambers.still
-    second = from_2 - 2.0 * begun.taken_2 - begun.drift_2
-    # Half the second stage's rate of chamber 2 is what the change has beside the first stage.
-    responded = still.linear.supplied_by_2 * (change.mass_2 - 1.5 * step * still.first.mass_2)
-    taken_2 = step * (1.5 * begun.taken_2 + 0.5 * second) + responded
+    second_2 = from_2 - 2.0 * begun.taken_2 - begun.drift_2
+    # The change of chamber 2 beyond the first stage is half the rate of the second: the response of the flow to it.
+    responded_2 = still.linear.supplied_by_2 * (change.mass_2 - 1.5 * step * still.first.mass_2)
+    taken_2 = step * (1.5 * begun.taken_2 + 0.5 * second_2) + responded_2
     inlet_rise = begun.lines.inlet_rise
     return lines_after(plant, lines, line_state, change.supplied - taken_2, taken_2, inlet_rise, step).after
 
@@ -156,20 +149,19 @@ class FedThermalGas(NamedTuple):
     lines: LineStep
 
 
-def with_line(flow: PortFlowSlopes, fraction: float) -> PortFlowSlopes:
-    """Flow of a port with derivatives that include the gas lost by its line; ``fraction`` as in ``with_lines``."""
-    # A chamber that draws lowers its own supply: the flow responds more strongly.
-    more = flow.source_slope * fraction
+def with_line(flow: PortFlowSlopes, ratio: float) -> PortFlowSlopes:
+    """Flow of a port with derivatives that include the gas lost by its line; ``ratio`` as in ``with_lines``."""
+    added = flow.source_slope * ratio
     return PortFlowSlopes(
         total=flow.total,
-        total_slope=flow.total_slope + more,
+        total_slope=flow.total_slope + added,
         from_source=flow.from_source,
-        source_slope=flow.source_slope + more,
+        source_slope=flow.source_slope + added,
     )
 
 
 def mass_from_source(thermal: ThermalParameters, flow: float, state: PlantState, masses: ThermalState) -> float:
-    """True mass flow [kg/s] out of line 2 from the flow at the reference temperature; warm gas flows back below 0."""
+    """True mass flow [kg/s] out of line 2, from the flow at the reference temperature; below 0, warm gas returns."""
     return flow * transport(thermal, flow, 1.0, math.sqrt(state.mass_2 / masses.mass_2)).mass
 
 
@@ -188,18 +180,18 @@ def begin_fed_thermal_gas(
 ) -> FedThermalGas:
     """First stage of one step [s] as ``begin_fed_gas``, for gas with an energy balance."""
     at_begin = parts.chambers_at_begin(plant, state, next_angle, step)
-    at, ratio = at_begin.chambers, thermal.heat_capacity_ratio
-    # A chamber that gives takes more gas for a rise of its pressure.
-    share_1 = at.volume_1 * (1.0 + ratio * at.give_1) / lines.volume_1
-    share_2 = at.volume_2 * (1.0 + ratio * at.give_2) / lines.volume_2
-    # What comes from a line brings more energy than mass, by the ratio of heat capacities.
-    in_1 = with_line(flowing.in_1, 1.0 / ratio * share_1)
-    in_2 = with_line(flowing.in_2, 1.0 / ratio * share_2)
+    start, heat_ratio = at_begin.chambers, thermal.heat_capacity_ratio
+    # A compliant chamber takes more gas for a rise of its pressure.
+    ratio_1 = start.volume_1 * (1.0 + heat_ratio * start.give_1) / lines.volume_1
+    ratio_2 = start.volume_2 * (1.0 + heat_ratio * start.give_2) / lines.volume_2
+    # Gas from a line brings more energy than mass, by the ratio of heat capacities.
+    in_1 = with_line(flowing.in_1, 1.0 / heat_ratio * ratio_1)
+    in_2 = with_line(flowing.in_2, 1.0 / heat_ratio * ratio_2)
     flowing = SlopedFlows(in_1, in_2, flowing.leak)
     chambers = begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step, parts=parts)
-    first, by_2 = chambers.first, chambers.matrix.slopes.supplied_by_2
-    drift_2 = -by_2 * state.mass_2 * at.growth_2 / at.volume_2
-    taken_2 = mass_from_source(thermal, in_2.from_source, state, masses) + drift_2 + by_2 * first.content_2
+    first, supplied_by_2 = chambers.first, chambers.matrix.slopes.supplied_by_2
+    drift_2 = -supplied_by_2 * state.mass_2 * start.growth_2 / start.volume_2
+    taken_2 = mass_from_source(thermal, in_2.from_source, state, masses) + drift_2 + supplied_by_2 * first.content_2
     stepped = lines_after(plant, lines, line_state, step * (first.supplied - taken_2), step * taken_2, 0.0, step)
     return FedThermalGas(chambers=chambers, taken_2=taken_2, drift_2=drift_2, lines=stepped)
 
