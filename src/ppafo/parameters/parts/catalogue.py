@@ -121,6 +121,13 @@ class Part:
         return tuple(name for name, figure in self.figures.items() if figure.origin in DOUBTFUL)
 
     @property
+    def ideal(self) -> tuple[str, ...]:
+        """Names of the figures without a value that count as ideal: no delay, no dead band, no pressure limit."""
+        zeros = [quantity.name for quantity in figures_of(self.group, self.kind) if quantity.default == 0.0]
+        zeros += [RATING.name] if self.group in ("valves", "actuators") else []
+        return tuple(name for name in zeros if name not in self.values)
+
+    @property
     def full_mass(self) -> float:
         """Mass of the part in use [kg]; for a bottle with its gas."""
         # Only a bottle has no mass of its own: it is empty mass and content.

@@ -412,6 +412,40 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
     assert "cut off" not in suggestion_sentence(whole)
 
 
+def test_a_cut_peak_is_told_without_a_bottle_and_without_a_pressure_that_suffices_and_no_replaced_valve_is_warned_of(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    document = (
+        FILE.replace("proportional", "solenoid")
+        .replace("enfield-ls-v05s", "festo-vovg-5v-pair")
+        .replace("repetitions = 100", "hours = 20.0")
+        .replace("co2-3_5oz", "pipeline-jacpac-9oz")
+        .replace('"0.4 N m"', '"1.2 N m"')
+    )
+    (tmp_path / "long.toml").write_text(document)
+    sizing = design(tmp_path / "long.toml").found
+    assert isinstance(sizing, Sizing)
+    assert "pair of valves" not in caplog.text
+    (sized,) = sizing.valves
+    assert (sized.works, sized.bottle) == (True, None)
+    # Equation (2): 4 N m / 14.51 cm^3 = 275.7 kPa, 39.98 psi above the atmosphere.
+    most = sizing.problem.torque_constant * (sized.pressure - ATMOSPHERE)
+    said = f"(at most {most:.3g} N m of 4 N m; the whole peak needs pressure.lowest = '40 psi_g'"
+    assert f"% of the peak cut off {said})" in suggestion_sentence(sizing)
+    (tmp_path / "weak.toml").write_text(f'{document.replace("1.2 N m", "0.1 N m")}[pressure]\nhighest = "20 psi_g"\n')
+    weak = design(tmp_path / "weak.toml").found
+    assert isinstance(weak, Sizing)
+    (sized,) = weak.valves
+    assert not sized.works
+    # 20 psi give 137.9 kPa x 14.51 cm^3 = 2.001 N m: half of the peak.
+    assert sized.pressure == pytest.approx(ATMOSPHERE + 20.0 * 6894.757)
+    assert suggestion_sentence(weak) == (
+        "no suggestion: no valve keeps the error limit at any of the pressures; festo-vovg-5v-pair at 20 psi_g, with "
+        "50 % of the peak cut off (at most 2 N m of 4 N m; the whole peak needs pressure.lowest = '40 psi_g' and a "
+        "higher pressure.highest)"
+    )
+
+
 def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
     problem = dataclasses.replace(load_design("push-off"), repetitions=500.0)
     parts = load_catalogue().groups["bottles"]
