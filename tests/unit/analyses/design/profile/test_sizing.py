@@ -1,5 +1,6 @@
 """Sizing: what is planted is found, what limits is named, and bad files are one line."""
 
+import ast
 import dataclasses
 import re
 import tomllib
@@ -17,6 +18,7 @@ from ppafo.analyses.design.profile.problem import choose_knots
 from ppafo.analyses.design.profile.search import OSCILLATES, Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.analyses.design.profile.solve import _lasting_bottle, smallest_bottle
 from ppafo.analyses.design.question import design
+from ppafo.analyses.find.question import find
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.loading import load_scenario
@@ -265,10 +267,39 @@ def test_simulated_repetitions_are_covered_to_a_whole_sample(folder: Path) -> No
     assert dataclasses.asdict(problem.scenario.reference)["kind"] == "tabulated"
 
 
+def test_a_lever_cylinder_is_sized_by_the_search_that_its_refusal_names(tmp_path: Path) -> None:
+    changed = FILE.replace("simulated = 1", 'overrides = ["device.set=cylinder-lever"]\nsimulated = 1')
+    (tmp_path / "lever.toml").write_text(changed)
+    with pytest.raises(PpafoError, match="needs a torque proportional to the pressure difference") as refused:
+        load_design(tmp_path / "lever.toml")
+    figure = '= { value = 32.0, unit = "mm", origin = "datasheet", source = "its sheet" }\n'
+    table = '[actuators.own]\nmaker = "Acme"\nmodel = "C32"\n'
+    part = f'schema_version = 1\nname = "own"\ntitle = "own"\n{table}bore {figure}lever_length {figure}'
+    (tmp_path / "own.toml").write_text(part)
+    with pytest.raises(PpafoError) as unknown:
+        load_catalogue(tmp_path / "own.toml")
+    assert "actuators.own: bore, lever_length not allowed: a catalogue has actuators whose torque" in str(unknown.value)
+    (named,) = {str(error.value).partition("search its supply pressure: ")[2] for error in (refused, unknown)}
+    name, arguments = ast.parse(named, mode="eval").body.args[0], ast.parse(named, mode="eval").body.keywords
+    given = {argument.arg: ast.literal_eval(argument.value) for argument in arguments}
+    found = find(ast.literal_eval(name), grid=9, **given).found
+    # A bore of 25.7 mm, 5.1875 cm^2, on a lever of 25 mm gives at most 12.97 cm^3: 5 N m of the 6 N m need 385 kPa.
+    assert found.value is not None
+    assert found.value - ATMOSPHERE > 385.0e3
+    assert found.metric_at_value is not None
+    assert found.metric_at_value <= 0.5
+
+
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("enfield-ls-v05s", "festo-vovg-5v-pair", "'festo-vovg-5v-pair' is a solenoid valve, but scenario"),
+        (
+            "enfield-ls-v05s",
+            "festo-vovg-5v-pair",
+            "'festo-vovg-5v-pair' is a solenoid valve, but scenario 'torque-task-proportional' needs a proportional "
+            "valve; a design file compares valves of one kind: name 'festo-vovg-5v-pair' in a second file, with "
+            "scenario = 'torque-task-solenoid'",
+        ),
         ("co2-3_5oz", "co2-3oz", "bottles has no part 'co2-3oz', did you mean 'co2-3_5oz'?"),
         ("repetitions = 100", "", "[use]: give either repetitions or hours"),
         ("repetitions = 100", "repetitions = 100\nhours = 1.0", "[use]: give either repetitions or hours"),
