@@ -208,6 +208,23 @@ def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: 
     assert (excess(metered, base, columns).follows == 1.0).tolist() == alone
 
 
+def test_valves_that_swing_by_more_than_their_limit_do_not_follow_in_a_run_or_an_ensemble() -> None:
+    base = load_scenario("torque-task-solenoid", ["valve.area=5 mm^2"])
+    columns = {"reference.level": np.array([2.0, 4.0])}
+    result = simulate(with_numbers(base, {"reference.level": 2.0}))
+    error = (result["torque"] - result["reference"])[result.recording.time >= 2.0 - 1e-9]
+    # RMS and mean error are within their limits of 25 % and 15 % of 2 N m; the swing is not within 60 %.
+    assert float(np.sqrt(np.mean(error**2))) < 0.5
+    assert abs(float(np.mean(error))) < 0.3
+    assert float(np.ptp(error)) > 1.2
+    assert result.tracking is not None
+    assert result.tracking.found == "the torque swings by 1.62 N m (requested change 2 N m) from 2 s on"
+    assert result.tracking.span == pytest.approx(float(np.ptp(error)))
+    metered = run_ensemble(base, columns, with_companions([], base)).metrics
+    assert excess(metered, base, columns).follows.tolist() == [0.0, 1.0]
+    assert simulate(with_numbers(base, {"reference.level": 4.0})).tracking is None
+
+
 RAMP = [
     "reference.kind=ramp_hold",
     "reference.start_level=90 deg",
@@ -548,7 +565,9 @@ def test_a_verdict_has_the_limits_by_which_it_was_judged_and_the_swing() -> None
     torque = simulate("torque-task-solenoid", ["reference.level=3 N m", "valve.area=3.45 mm^2"]).following
     allowed = r"\(0.75 N m allowed, because the valves are either open or shut\)"
     assert re.fullmatch(
-        rf"the torque follows its reference; from 2 s on: RMS error 0.\d+ N m {allowed}, swing 1?[.]?\d+ N m", torque
+        rf"the torque follows its reference; from 2 s on: RMS error 0.\d+ N m {allowed}, "
+        r"swing 1?[.]?\d+ N m \(1.8 N m allowed\)",
+        torque,
     )
     assert simulate("pressure-loop").following.endswith("0.15 bar allowed), swing 0 bar")
     angle = simulate("cylinder-servo").following

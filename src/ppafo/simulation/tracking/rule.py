@@ -31,6 +31,11 @@ LARGEST_SHARE_SWITCHED = 0.25
 """RMS error divided by the wanted change, above which an on/off controller, which swings by design, does not follow."""
 LARGEST_MEAN_SWITCHED = 0.15
 """Mean error divided by the wanted change, above which an on/off controller does not follow [-]."""
+LARGEST_SPAN_SWITCHED = 0.6
+"""Range of the error at rest divided by the wanted change, above which an on/off controller does not follow [-].
+
+An RMS error of a quarter is a range of 50 % in a square wave and of 87 % in a triangle.
+"""
 LARGEST_SHARE_MOVING = 0.2
 """RMS error divided by the wanted change, if the reference or the joint moves: every loop lags then [-]."""
 LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
@@ -312,13 +317,15 @@ def largest_error(settled: SettledPart, is_switched: bool) -> Floats:
     return limit
 
 
-def largest_deviation(settled: SettledPart) -> Floats:
+def largest_deviation(settled: SettledPart, is_switched: bool) -> Floats:
     """Largest range of the error while the reference rests, or largest error while it moves; inf without a limit.
 
-    An angle has both limits [rad], a smooth wave of another quantity the second one. The numbers of ``settled`` may be
-    arrays (runs,).
+    An angle has both limits [rad], a smooth wave of another quantity the second one, an on/off controller the first
+    one. The numbers of ``settled`` may be arrays (runs,).
     """
     rests, way = np.asarray(settled.rests), np.asarray(settled.way)
+    if is_switched:
+        return np.where(rests, LARGEST_SPAN_SWITCHED * np.asarray(settled.wanted), np.inf)
     # Degrees count for an angle, however far it goes.
     swing, error = (LARGEST_SWING_SHARE * way, LARGEST_ANGLE_SHARE * way)
     of_angle = np.where(rests, np.maximum(LARGEST_ANGLE_SWING, swing), np.maximum(LARGEST_ANGLE_ERROR, error))
@@ -334,14 +341,13 @@ def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
     (runs,).
     """
     rests, share = np.asarray(settled.rests), np.asarray(settled.share)
-    deviation: Floats = np.where(rests, settled.span, settled.worst) / largest_deviation(settled)
+    deviation: Floats = np.where(rests, settled.span, settled.worst) / largest_deviation(settled, is_switched)
     off = np.asarray(settled.error) / largest_error(settled, is_switched)
     if is_switched:
         # It swings about its reference by design: its mean error is to be less.
         beside = np.abs(settled.missing) / (LARGEST_MEAN_SWITCHED * settled.wanted)
         off = np.where(rests, np.maximum(off, beside), off)
-    else:
-        off = np.maximum(off, deviation)
+    off = np.maximum(off, deviation)
     # A run that ends on its ramp has no settled part: every loop is behind there.
     off = np.where(settled.ends_on_ramp, 0.0, off)
     if is_switched:

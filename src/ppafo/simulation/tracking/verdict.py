@@ -58,8 +58,8 @@ class Tracking:
     ``tried`` is the result of tried remedies, and ``mended`` the overrides with which the run follows. ``accepted`` is
     the scenario's reason for a reference beyond reach, else "". ``at_rest`` is true if reference and joint stand still.
     ``since`` [s] is the start of the settled part, 0 for a walk. ``span`` is the range of the error of an angle that
-    swings slowly, else 0. ``worst`` is the largest error beside a moving reference and ``allowed`` its limit, if the
-    RMS error alone would be within its own limit, else 0.
+    swings slowly, or of on/off valves whose RMS error alone is within its limit, else 0. ``worst`` is the largest error
+    beside a moving reference and ``allowed`` its limit, if the RMS error alone would be within its own limit, else 0.
     """
 
     kind: Failure
@@ -151,9 +151,11 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
     # A loop that is quiet at the end reversed before the part whose error is stated.
     is_over = turning > 1.0 and settled.reversals < _QUIET * per_second
     interval = "second of the whole run" if is_over else "second"
-    switches, largest = only_switches(scenario, scenario.law), float(largest_deviation(settled))
-    is_within = is_task and not switches and settled.error <= largest_error(settled, switches)
-    is_worst = is_within and not settled.rests and settled.worst > largest
+    switches = only_switches(scenario, scenario.law)
+    largest = float(largest_deviation(settled, switches))
+    is_within = is_task and settled.error <= float(largest_error(settled, switches))
+    is_worst = is_within and not switches and not settled.rests and settled.worst > largest
+    is_swing = (is_within and switches and settled.span > largest) or (settled.way > 0.0 and not settled.turns)
     return Tracking(
         kind=failure,
         controlled=scenario.controlled,
@@ -172,7 +174,7 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         since=settled.start,
         worst=settled.worst if is_worst else 0.0,
         allowed=largest if is_worst else 0.0,
-        span=settled.span if failure == "oscillates" and turning <= 1.0 and not settled.turns and settled.way else 0.0,
+        span=settled.span if failure == "oscillates" and turning <= 1.0 and is_swing else 0.0,
     )
 
 
@@ -212,8 +214,8 @@ def following_text(result: "RecordedResult") -> str:
         return begin + judged_text(*rms, LARGEST_SHARE_OF_WAVE * settled.wanted)
     # The limit of on/off valves is several times wider, so the swing is reported beside the error.
     why = ", because the valves are either open or shut" if case.only_switches else ""
-    largest = float(largest_deviation(settled))
-    limit = None if math.isinf(largest) or case.only_switches else largest
+    largest = float(largest_deviation(settled, case.only_switches))
+    limit = None if math.isinf(largest) else largest
     deviation = ("swing", settled.span) if settled.rests else ("largest error", settled.worst)
     texts = judged_text(*rms, float(largest_error(settled, case.only_switches)), why), judged_text(*deviation, limit)
     # A reference just beyond reach is missed by no more than is allowed.
