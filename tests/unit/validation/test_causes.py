@@ -469,7 +469,7 @@ def test_every_cause_as_near_as_the_nearest_is_named(bench: Recording) -> None:
         "friction.viscous_damping": (2796.0, (3.70, 5.88, 6.68)),
         "gain of all pressures": (2775.0, (2.55, 7.00, 7.31)),
         "gain of pressure_2": (2700.0, (2.55, 7.00, 7.33)),
-        # More than 5 % behind, and told apart only by a gain larger than the penalty of about 6.
+        # More than 5 % behind: as near only where the gain is less than the penalty of about 6 behind.
         "delay of angle": (3026.0, (2.70, 6.20, 8.00)),
         "delay of pressure_1": (3020.0, (2.70, 6.20, 8.00)),
     }
