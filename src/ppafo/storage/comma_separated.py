@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, refused_as
+from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, text_of, write_file
@@ -205,6 +205,18 @@ def _delimiter_of(header: str) -> str:
     return next((mark for mark in "\t;" if mark in header and all(map(_HEADER.fullmatch, header.split(mark)))), ",")
 
 
+def header_cells(cells: list[str], mark: str) -> list[str]:
+    """Return the cells of a header line; a unit that has the delimiter ``mark`` in its brackets stays in one cell."""
+    joined: list[str] = []
+    for cell in cells:
+        if joined and "[" in joined[-1] and "]" not in joined[-1]:
+            joined[-1] += mark + cell
+        else:
+            joined.append(cell)
+    # A bracket that is never closed, or opened twice, belongs to no unit.
+    return joined if all(cell.count("[") == cell.count("]") <= 1 for cell in joined) else cells
+
+
 def read_csv(
     path: str | Path,
     label: str | None = None,
@@ -229,13 +241,7 @@ def read_csv(
         head = next(islice(lines, first, None), "")
         mark = _delimiter_of(head)
         rows: Iterator[list[str]] = csv.reader(islice(lines, first, None), delimiter=mark, strict=True)
-        header: list[str] = []
-        for cell in next(rows, []):
-            # The pieces of a unit that has a comma in it are one cell.
-            if header and "[" in header[-1] and "]" not in header[-1]:
-                header[-1] += mark + cell
-            else:
-                header.append(cell)
+        header = header_cells(next(rows, []), mark)
         if not header and not any(lines[first:]):
             raise DataError("has no header; write the names of the columns in the first line")
         # A first column without a name is the row number that pandas writes.
@@ -280,15 +286,16 @@ def recording_of_columns(
 
     if not len(values[0]):
         raise DataError("has a header but no samples")
-    series = []
+    series, faults = list[Floats](), list[PpafoError]()
     for column, numbers in zip(columns, values, strict=True):
-        if column.si_unit == PLAIN_NUMBER and column.unit.removeprefix("m") in ("V", "A"):
-            raise DataError(
-                f"column '{column.name} [{column.unit}]': '{column.name}' is dimensionless; give factor in a column "
-                f"map (0.1 if 10 {column.unit} corresponds to 1)"
-            )
-        with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
+        with noted_in(faults), refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
+            if column.si_unit == PLAIN_NUMBER and column.unit.removeprefix("m") in ("V", "A"):
+                raise UnitError(
+                    f"'{column.name}' is dimensionless; give factor in a column map (0.1 if 10 {column.unit} "
+                    "corresponds to 1)"
+                )
             series.append(in_si(column, numbers, atmosphere))
+    raise_noted(faults)
     time = counted_on(series[0])
     check_clock(time, rows, noun)
     channels = {

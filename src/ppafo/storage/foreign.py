@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, refused_as
+from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
 from ppafo.storage.clock import clock_seconds, counted_on
@@ -83,12 +83,14 @@ def read_trials(
         else:
             table = read_mapped_matlab(content, columns, map_name)
         with in_map(map_name):
-            channels = {
-                name: _channel(name, mapped, table, atmosphere, gas)
-                for name, mapped in columns.channels.items()
-                if name != TIME
-            }
-            time = _time(columns.channels[TIME], table, atmosphere)
+            faults, channels = list[PpafoError](), dict[str, Channel]()
+            for name, mapped in columns.channels.items():
+                with noted_in(faults):
+                    if name == TIME:
+                        time = _time(mapped, table, atmosphere)
+                    else:
+                        channels[name] = _channel(name, mapped, table, atmosphere, gas)
+            raise_noted(faults)
             trials = {"": slice(None)} if columns.trial is None else _rows_of_trials(time, columns.trial)
         recordings = []
         for suffix_of_label, rows in trials.items():
@@ -146,13 +148,16 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     """Return the unit of a channel; a volume flow measured as mass flow gets its reference condition and gas."""
-    from ppafo.units import is_volume_flow, with_condition
+    from ppafo.units import flow_of, is_volume_flow, with_condition
+    from ppafo.units.reference import without_condition
 
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
         if mapped.at is not None or mapped.gas is not None:
             raise UnitError("'at' and 'gas' are allowed only for a volume flow, such as 'L/min'")
         return unit
+    if mapped.at is None and not flow_of(unit)[1]:
+        raise UnitError(without_condition(unit, gas))
     return with_condition(unit, mapped.at, mapped.gas or gas) if mapped.at else unit
 
 

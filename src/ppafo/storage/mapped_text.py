@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.signals.recording import TIME
 from ppafo.storage.clock import is_clock
 from ppafo.storage.column_map import ColumnMap, MappedTable, in_map, shown_names
-from ppafo.storage.comma_separated import SPLIT_NUMBERS, finite_number, kind_of_comments
+from ppafo.storage.comma_separated import SPLIT_NUMBERS, finite_number, header_cells, kind_of_comments
 from ppafo.storage.files import text_of
 from ppafo.wording import LONGEST_SHOWN, nearest_name, one_line
 
@@ -68,13 +68,14 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
     lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" for a Latin-1 file').splitlines()
     if any(map(_SERIAL_MONITOR.match, lines)):
         lines = _with_stamps_as_column(lines, columns)
+    faults, indices = list[PpafoError](), dict[str, int]()
     with in_map(map_name):
         table = _begin(lines, columns)
-        indices = {
-            name: _index_of(f"channels.{name}.column", mapped.column, table, lines)
-            for name, mapped in columns.channels.items()
-            if mapped.column is not None
-        }
+        for name, mapped in columns.channels.items():
+            with noted_in(faults):
+                if mapped.column is not None:
+                    indices[name] = _index_of(f"channels.{name}.column", mapped.column, table, lines)
+        raise_noted(faults)
         date = columns.channels[TIME].date
         date_index = None if date is None else _index_of(f"channels.{TIME}.date", date, table, lines)
     time_index = indices.get(TIME)
@@ -146,13 +147,16 @@ def _begin(lines: list[str], columns: ColumnMap) -> _StartedTable:
     if head is None:
         skipped = f"after skip_lines = {columns.skip_lines}" if columns.skip_lines else ""
         raise DataError(f"has no rows {skipped}".rstrip())
-    names = [name.strip() for name in head[1]] if columns.header else []
     rows = islice(rows if columns.header else chain([head], rows), columns.skip_rows, None)
     first = next(rows, None)
     if first is None:
         remedy = "; give header = false if the first line contains numbers" if columns.header else ""
         raise DataError(f"has no rows of numbers{remedy}")
-    return _StartedTable(names, first[1], chain([first], rows))
+    cells = head[1] if columns.header else []
+    # Brackets around several columns, such as 'x [left,right]', are no unit.
+    if columns.delimiter in _DELIMITERS and len(first[1]) != len(cells):
+        cells = header_cells(cells, _DELIMITERS[columns.delimiter])
+    return _StartedTable([name.strip() for name in cells], first[1], chain([first], rows))
 
 
 def _split(lines: list[str], columns: ColumnMap) -> Rows:
@@ -188,7 +192,11 @@ def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str
         remedy = _other_delimiter(names, lambda cells: column in cells)
         if not remedy:
             # A line further down may be the header.
-            split = ((number, name, line.split(mark)) for number, line in head for name, mark in _DELIMITERS.items())
+            split = (
+                (number, name, header_cells(line.split(mark), mark))
+                for number, line in head
+                for name, mark in _DELIMITERS.items()
+            )
             remedy = next(
                 (
                     f'; line {number + 1} contains this name: give skip_lines = {number} and delimiter = "{name}"'

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.signals.recording import TIME, Floats
 from ppafo.storage.column_map import ColumnMap, MappedTable, in_map, shown_names
 from ppafo.storage.files import read_bytes
@@ -262,14 +262,17 @@ def read_mapped_matlab(file: _MatlabFile, columns: ColumnMap, map_name: str) -> 
     clock: list[str] | None = None
     dates: list[str] | None = None
     with in_map(map_name):
+        faults = list[PpafoError]()
         for name, mapped in columns.channels.items():
-            if mapped.column is None:
-                continue
-            variable = _variable(f"channels.{name}.column", mapped.column, file)
-            if name == TIME and variable in file.texts:
-                clock = file.texts[variable]
-            else:
-                numbers[name] = file.columns[variable]
+            with noted_in(faults):
+                if mapped.column is None:
+                    continue
+                variable = _variable(f"channels.{name}.column", mapped.column, file)
+                if name == TIME and variable in file.texts:
+                    clock = file.texts[variable]
+                else:
+                    numbers[name] = file.columns[variable]
+        raise_noted(faults)
         date = columns.channels[TIME].date
         if date is not None:
             dates = file.texts.get(_variable(f"channels.{TIME}.date", date, file))

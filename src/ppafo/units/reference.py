@@ -139,13 +139,19 @@ def _molar_mass(word: str) -> float:
     return float(of_gas.in_base(Decimal(match[1])))
 
 
-def without_condition(unit: str) -> str:
-    """Return the message on a volume flow without reference condition and gas, given for a mass flow."""
+def without_condition(unit: str, gas: str = "") -> str:
+    """Return the message on a volume flow without reference condition and gas, given for a mass flow.
+
+    ``gas`` is the gas of the bench by name or molar mass, empty if unknown.
+    """
     named, normal, own = (with_condition(unit, at, "air") for at in ("ANR", "DIN 1343", _EXAMPLE))
+    other = f"where the gas is {gas}" if gas else "with another gas"
+    is_air = bool(gas) and abs(_molar_mass(gas) / MOLAR_MASSES["air"] - 1.0) < _AS_AIR
+    too = "" if is_air else f"; in a [[procedure]] {other}, give gas = 'air' too"
     return (
         f"'{unit}' is a volume flow, which is a mass flow only with a reference condition and a gas: write '{named}' "
         f"(20 degC, 1 bar), '{normal}' (0 degC, 1.01325 bar) or '{own}', as in the data sheet of the meter; in a "
-        "column map give at = 'ANR' and gas = 'air'"
+        f"column map give at = 'ANR' and gas = 'air'{too}"
     )
 
 

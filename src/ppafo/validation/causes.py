@@ -53,6 +53,9 @@ _TRIED_IN_LONG_RECORDINGS = (
     "numbers of the set and effects)"
 )
 
+_AS_NEAR = 1.05
+"""Largest ratio of the errors left by two causes [-] at which the second cause is as near as the first."""
+
 _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 """Trial initial values of a channel whose first samples are wrong, as fractions of its range [-].
 
@@ -68,7 +71,7 @@ class ResidualCause:
     ``left`` is the largest RMS error of any channel divided by its noise [-] under the cause. ``numbers`` has the
     changed parameters by path, each a value with its SI unit. ``is_usual`` is true if the error is within the usual
     error of sensors. ``is_of_samples`` is true for faulty samples, which are visible without a model. ``same`` are
-    other causes that the recordings cannot distinguish from this one.
+    other causes that the recordings cannot distinguish from this one; of the nearest cause those that are as near.
     """
 
     name: str
@@ -244,13 +247,21 @@ def _explained(
 def _unexplained(search: CauseSearch, tried: Sequence[SizedCause], kinds: str) -> Diagnosis:
     """Return the diagnosis without a cause, with the best of the causes ``tried``, of the ``kinds`` in words."""
     # What is wrong with samples is seen in them, whatever else is wrong; a misread unit is no hint beside other faults.
-    nearest = max(
-        (cause for cause in tried if not cause.candidate.is_of_unit),
-        key=lambda cause: (cause.candidate.is_of_samples, cause.gain),
-        default=None,
+    hints = sorted(
+        (_cause_of([cause], search.penalty) for cause in tried if not cause.candidate.is_of_unit),
+        key=lambda cause: (cause.is_of_samples, cause.gain),
+        reverse=True,
     )
-    nearest_cause = None if nearest is None else _cause_of([nearest], search.penalty)
-    return Diagnosis(nearest=nearest_cause, tried=len(tried), kinds=kinds)
+    if not hints:
+        return Diagnosis(tried=len(tried), kinds=kinds)
+    nearest, *others = hints
+    same = (
+        other
+        for other in others
+        if other.is_of_samples == nearest.is_of_samples
+        and (other.left <= _AS_NEAR * nearest.left or other.gain > nearest.gain - search.penalty)
+    )
+    return Diagnosis(nearest=replace(nearest, same=tuple(same)), tried=len(tried), kinds=kinds)
 
 
 def _in_other_unit(

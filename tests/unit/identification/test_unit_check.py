@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.analyses.identify.answer import Identification
 from ppafo.analyses.identify.question import identify
-from ppafo.errors import IdentificationError
+from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.unit_check import with_wrong_units
@@ -120,7 +120,7 @@ def iso_6358(upstream: np.ndarray, downstream: float, conductance: float, ratio:
     return conductance * 1.185 * upstream * np.sqrt(1.0 - subsonic**2)
 
 
-def flow_table(folder: Path, unit: str, gas: str, procedure: str = "") -> Identification:
+def flow_table(folder: Path, unit: str, gas: str, procedure: str = "", at: str = ', at = "ANR"') -> Identification:
     """Identify C and b from a table of ANR litres of air per minute at gauge pressures in psi, stated in ``unit``."""
     gauge = np.linspace(6.0, 90.0, 15)
     flow = iso_6358(101325.0 + 6894.757 * gauge, 101325.0, 2.0e-8, 0.3)
@@ -134,7 +134,7 @@ device.set = "cylinder-lever"
 [columns.meter.channels]
 upstream_pressure = {{ column = "p1", unit = "{unit}" }}
 downstream_pressure = {{ constant = "101.325 kPa_a" }}
-mass_flow = {{ column = "q", unit = "L/min", at = "ANR"{gas} }}
+mass_flow = {{ column = "q", unit = "L/min"{at}{gas} }}
 [[procedure]]
 kind = "open-valve-flow"
 recordings = ["flow.csv"]
@@ -190,3 +190,36 @@ def test_an_angle_that_would_turn_round_in_the_other_unit_has_its_own(largest: f
     angle = Recording("r", np.arange(3.0), {"angle": swing})
     judged = with_wrong_units(values(friction=1.0 / 55.0), {"friction": 1.0}, [angle])
     assert (judged[0].verdict == "unit probably wrong") == is_wrong
+
+
+def test_a_flow_without_its_condition_is_told_every_key_that_its_gas_needs(tmp_path: Path) -> None:
+    gas, at, procedure = ', gas = "air"', ', at = "ANR"', 'gas = "air"'
+    remedy = r"give at = 'ANR' and gas = 'air'"
+    with pytest.raises(
+        DataError, match=rf"{remedy}; in a \[\[procedure\]\] where the gas is CO2, give gas = 'air' too"
+    ):
+        flow_table(tmp_path, "psi_g", "", 'gas = "CO2"', at="")
+    # The set has air.
+    with pytest.raises(DataError, match=rf"{remedy}$"):
+        flow_table(tmp_path, "psi_g", "", at="")
+    found = flow_table(tmp_path, "psi_g", gas, procedure, at)
+    assert found.estimates[0].value == pytest.approx(2.0e-8, rel=0.01)
+
+
+def test_a_channel_that_a_map_leaves_out_is_asked_for_with_its_line(tmp_path: Path) -> None:
+    (tmp_path / "flow.csv").write_text("upstream_pressure [psi_g],mass_flow [L/min (ANR, air)]\n5,125.16\n")
+    (tmp_path / "problem.toml").write_text(
+        """schema_version = 1
+name = "valve"
+device.set = "cylinder-lever"
+[columns.part.channels]
+downstream_pressure = { constant = "0 kPa_g" }
+[[procedure]]
+kind = "open-valve-flow"
+recordings = ["flow.csv"]
+columns = "part"
+"""
+    )
+    line = r'upstream_pressure = { column = "HEADER", unit = "kPa_g" }'
+    with pytest.raises(IdentificationError, match=f"a column map must list every channel to be read: {line}"):
+        identify(tmp_path / "problem.toml")

@@ -1,5 +1,6 @@
 """Files in the form in which real instruments and programs write them: LabVIEW, Arduino, Excel, MATLAB and Simulink."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -146,6 +147,54 @@ def test_a_header_may_state_condition_and_gas(tmp_path: Path) -> None:
     assert np.allclose(read_recording(path)["mass_flow"], 1.185e-3)
 
 
+METERED = "mass_flow [L/min (ANR, air)]"
+
+
+@pytest.mark.parametrize("name", [METERED, f'"{METERED}"'])
+@pytest.mark.parametrize("lines", [0, 2])
+def test_a_unit_with_the_delimiter_is_one_cell_through_a_map_too(tmp_path: Path, name: str, lines: int) -> None:
+    path = written(tmp_path, "flow.csv", "made by,a meter\n" * lines + f"time [s],{name},angle [deg]\n0,60,1\n1,60,2\n")
+    flow = {"column": METERED, "unit": "L/min (ANR, air)"}
+    angle = {"column": "angle [deg]", "unit": "deg"}
+    channels = {"time": {"column": "time [s]", "unit": "s"}, "mass_flow": flow, "angle": angle}
+    found = read_foreign(path, columns(channels, skip_lines=lines))
+    assert np.allclose(found["mass_flow"], 1.185e-3)
+    assert np.allclose(np.degrees(found["angle"]), [1.0, 2.0])
+    if lines:
+        with pytest.raises(DataError, match=r"line 3 contains this name: give skip_lines = 2"):
+            read_foreign(path, columns(channels))
+
+
+def test_brackets_around_several_columns_are_no_unit(tmp_path: Path) -> None:
+    path = written(tmp_path, "force.csv", "t,force [left,right],angle [deg\n0,1,10,3\n1,2,20,4\n")
+    channels = {"time": {"column": "t", "unit": "s"}, "torque": {"column": "right]", "unit": "N m"}}
+    assert read_foreign(path, columns(channels))["torque"].tolist() == [10.0, 20.0]
+    path = written(tmp_path, "open.csv", "time [s],angle [deg,torque [N m]\n0,1,2\n")
+    with pytest.raises(DataError, match=r"not as 'angle \[deg'"):
+        read_recording(path)
+
+
+def test_faults_of_several_columns_come_in_one_refusal(tmp_path: Path) -> None:
+    path = written(tmp_path, "flow.csv", "t,p,Q\n0,60,1\n1,120,1\n")
+    faults = {"time": {"column": "t", "unit": "bar_g"}, "pressure_1": {"column": "p", "unit": "psi"}}
+    with pytest.raises(DataError, match="3 things are wrong") as caught:
+        read_foreign(path, columns({**faults, "mass_flow": LITRES}), gas="0.044 kg/mol")
+    text = str(caught.value)
+    assert re.findall(r"\(\d\) channels\.(\w+)\.unit", text) == ["time", "pressure_1", "mass_flow"]
+    assert "write psi_g for gauge or psi_a for absolute" in text
+    assert "in a [[procedure]] where the gas is 0.044 kg/mol, give gas = 'air' too" in text
+    channels = {"time": {"column": "t", "unit": "s"}, "pressure_1": {"column": "p1"}, "mass_flow": {"column": "Q2"}}
+    with pytest.raises(
+        DataError, match=r"\(1\) channels\.pressure_1\.column = 'p1'.*\(2\) channels\.mass_flow\.column"
+    ):
+        read_foreign(path, columns(channels))
+    path = written(tmp_path, "header.csv", "time [s],pressure_1 [psi],mass_flow [L/min],command [V]\n0,60,1,0\n")
+    with pytest.raises(
+        DataError, match=r"3 things .*\[psi\]'.*\(2\) column 'mass_flow.*\(3\) .*'command' is dimensionl"
+    ):
+        read_recording(path)
+
+
 @pytest.mark.parametrize("mark", ["\t", ";", ","])
 def test_a_txt_file_is_a_table_of_what_separates_its_columns(tmp_path: Path, mark: str) -> None:
     text = "time [ms],pressure_1 [barg]\n0,1.5\n10,1.6\n".replace(",", mark)
@@ -282,6 +331,10 @@ def test_a_variable_that_is_not_there_is_named_with_its_key(matlab: Path, column
     with pytest.raises(DataError) as caught:
         read_foreign(matlab, columns(channels))
     assert message in str(caught.value)
+    with pytest.raises(
+        DataError, match=r"\(1\) channels\.pressure_1\.column.*\(2\) channels\.torque\.column = 'T': the"
+    ):
+        read_foreign(matlab, columns({**channels, "torque": {"column": "T", "unit": "N m"}}))
 
 
 def test_an_object_of_matlab_is_named_with_what_to_save(tmp_path: Path) -> None:

@@ -110,8 +110,10 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
     explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
     if nearest is None or not explains:
         return f"no single change explains the residual{tried}"
-    nearest_text = f"{in_words(nearest)}, which leaves {_times(nearest.left)} times the noise"
-    return f"no single change explains the residual; nearest: {nearest_text}{tried}"
+    texts = [
+        f"{in_words(cause)}, which leaves {_times(cause.left)} times the noise" for cause in (nearest, *nearest.same)
+    ]
+    return f"no single change explains the residual; nearest: {', or '.join(texts)}{tried}"
 
 
 def _times(size: float) -> str:

@@ -42,12 +42,14 @@ def check_sources(
             if name not in recording:
                 known = CHANNELS[name]
                 hint = nearest_name(name, [other for other in recording.names if other not in channels])
-                zero = ' (at atmospheric pressure: { constant = "0 kPa_g" })' if known.unit == "Pa" else ""
+                zero = ', or { constant = "0 kPa_g" } at atmospheric pressure' if known.unit == "Pa" else ""
+                unit = "kPa_g" if known.unit == "Pa" else known.unit
                 derived = ', or derive it: direction.of = "pressure_difference", with a threshold and a window'
                 raise IdentificationError(
-                    f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; the "
-                    f"file has {', '.join(recording.names) or 'only time'}; a column map can assign a column to "
-                    f"'{name}'{zero}{derived if name == 'direction' else ''}"
+                    f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
+                    f"channels read: {', '.join(recording.names) or 'only time'}; a column map must list every channel "
+                    f'to be read: {name} = {{ column = "HEADER", unit = "{unit}" }}'
+                    f"{zero}{derived if name == 'direction' else ''}"
                 )
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
             worst = int(np.argmax(np.abs(values)))
