@@ -21,7 +21,8 @@ from ppafo.control.walking.assistance import PEAKS
 from ppafo.documents.json_text import plain
 from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
-from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
+from ppafo.parameters.bottles.fluid import list_fluids
 from ppafo.remedy_trials import tried
 from ppafo.report.display_units import quantity_text
 from ppafo.report.finding import Column, Finding, Section, columns_of
@@ -35,6 +36,7 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import duration_text, lasted
+from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.gait_strip import strip_figure
 from ppafo.walking.figures.legs import frames_figure
@@ -226,7 +228,12 @@ def _bottle_remark(worn: WalkResult) -> str:
         return f"bottle {worn.supply.supply.bottle.label}: {duration}{worn.supply.ending.message}"
     if "gas" not in worn.metrics or worn.metrics["gas"].value <= 0.0:
         return ""
-    with_bottle = argument_text("bottle", PAPER_BOTTLE)
+    gas, names = worn.scenario.device.gas, (PAPER_BOTTLE, *list_bottles())
+    fitting = next((name for name in names if is_of_bottle(gas.molar_mass, load_bottle(name))), None)
+    if fitting is None:
+        known = " or ".join(list_fluids())
+        return f"the supply pressure is constant here: bottles contain {known}, but the device uses {gas.species}"
+    with_bottle = argument_text("bottle", fitting)
     return f"the supply pressure is constant here; give {with_bottle} to see how long a bottle lasts"
 
 
