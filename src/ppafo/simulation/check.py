@@ -101,7 +101,9 @@ class ErrorEstimate:
         of_metrics = f"; at most {self.share:.1e} of a metric's value ({self.largest})" if self.largest else ""
         beyond = ""
         if self.over_promise > 1.0:
-            remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it" if self.tolerance else ""
+            remedy = ", which no smaller `run.tolerance` is sure to reduce"
+            if self.tolerance:
+                remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it"
             beyond = f" That is {self.over_promise:.2g} times the promised accuracy of a run{remedy}."
         return f"Estimated error of the time steps: at most {over_time} over time{of_metrics}.{beyond}"
 
@@ -255,7 +257,11 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
         errors[signal.unit] / (signal.promised_error * _signal_range(result, signal.unit)) for signal in signals
     )
     # The error is proportional to the tolerance: half of the tolerance that just meets the promise is proposed.
-    tolerance = result.scenario.run.tolerance
+    # A loop that oscillates amplifies small differences, whatever the tolerance.
+    from ppafo.simulation.tracking import tracking_in
+
+    tracking = tracking_in(result) if fine.status.is_completed and over_promise > 1.0 else None
+    tolerance = 0.0 if tracking is not None and tracking.kind == "oscillates" else result.scenario.run.tolerance
     smaller = max(0.5 * tolerance / over_promise, SMALLEST_TOLERANCE) if over_promise > 0.0 else tolerance
     return ErrorEstimate(
         angle=errors["rad"],

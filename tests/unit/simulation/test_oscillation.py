@@ -119,3 +119,44 @@ def test_find_counts_what_oscillates_as_not_met() -> None:
     ).found
     assert found.value is not None
     assert found.value < 60.0
+
+
+def test_a_joint_that_moves_far_oscillates_where_its_chamber_is_smallest(tmp_path: Path) -> None:
+    """A knee of 100 deg: the gain of the middle is too large at the stop, where chamber 1 has its 2 cm^3 alone."""
+    text = """
+        schema_version = 1
+        name = "knee"
+        description = "Knee torque on a hanging shank"
+        [device]
+        set = "cylinder-lever"
+        overrides = ["actuator.bore=32 mm", "actuator.rod_diameter=12 mm", "actuator.lever_length=45 mm",
+            "actuator.base_distance=200 mm", "actuator.lever_offset=-40 deg", "actuator.angle_min=80 deg",
+            "actuator.angle_max=180 deg", "actuator.dead_volume_1=2 cm^3", "actuator.dead_volume_2=2 cm^3",
+            "foot_plate.inertia=350 g m^2", "foot_plate.gravity_torque=0 N m", "supply.pressure=7 bar_g",
+            "friction.static_torque=0.28 N m", "friction.dynamic_torque=0.22 N m",
+            "friction.viscous_damping=0.02 N m s/rad", "effects.joint_load.weight=10 N m"]
+        [run]
+        duration = "6 s"
+        [motion]
+        kind = "free"
+        angle = "140 deg"
+        [controller]
+        kind = "pid"
+        rate = "1 kHz"
+        [reference]
+        kind = "sine"
+        level = "0 N m"
+        amplitude = "10 N m"
+        frequency = "0.5 Hz"
+    """
+    file = tmp_path / "knee.toml"
+    file.write_text(text)
+    result = simulate(load_scenario(file))
+    assert result.tracking is not None
+    assert result.tracking.kind == "oscillates"
+    assert result.tracking.cause.startswith("at 80 deg the chambers are so small that the loop is ")
+    # Small differences grow in this loop: the sixteenth of the error costs time and brings nothing.
+    assert result.error().over_promise > 1.0
+    assert "no smaller `run.tolerance` is sure to reduce" in result.error().sentence
+    larger = simulate(load_scenario(file, ["actuator.dead_volume_1=20 cm^3", "actuator.dead_volume_2=20 cm^3"]))
+    assert larger.tracking is None

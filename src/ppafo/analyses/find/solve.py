@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import ScenarioError, StudyError, UnitError, at_fault, refused_as
+from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, at_fault, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
 from ppafo.running import simulate
@@ -242,6 +242,13 @@ def _verdicts(search: FindResult, base: Scenario) -> tuple[tuple[float, str], ..
     values = [search.nearest if index is None else float(search.tried["value"][index])]
     if neighbour is not None:
         values.append(neighbour)
-    results = [simulate(with_overrides(base, [f"{search.path.path}={value!r} {SI}"])) for value in values]
-    verdicts = [result.following if result.tracking is None else result.tracking.found for result in results]
-    return tuple(zip(values, verdicts, strict=True))
+    return tuple((value, _verdict(base, f"{search.path.path}={value!r} {SI}")) for value in values)
+
+
+def _verdict(base: Scenario, override: str) -> str:
+    """Return the verdict on a run with an override, or the refusal of its value."""
+    try:
+        result = simulate(with_overrides(base, [override]))
+    except (ParameterError, ScenarioError) as error:
+        return f"the value is refused: {error}"
+    return result.following if result.tracking is None else result.tracking.found

@@ -114,10 +114,15 @@ def oscillation(case: Case) -> TrackingCause | None:
         return None
     if law is None:
         return TrackingCause("the controller is user-defined", (), "reduce its gains")
-    angle = float(np.mean(case.recording["angle"][case.settled.samples]))
+    visited = case.recording["angle"][case.settled.samples]
+    # A joint that moves far oscillates where its loop is fastest, near a stop.
+    extremes = () if case.only_switches else (np.min, np.max)
+    angles = [float(of(visited)) for of in (np.mean, *extremes)]
+    ratios = [quicker_at(scenario.device, angle, scenario.controlled) for angle in angles]
+    quicker, angle = max(zip(ratios, angles, strict=True))
     # Gains are those of where the joint is to be, where that is known.
-    is_known = scenario.motion.motion_kind.sees(scenario).places is not anywhere
-    quicker = 1.0 if is_known else quicker_at(scenario.device, angle, scenario.controlled)
+    if scenario.motion.motion_kind.sees(scenario).places is not anywhere:
+        quicker = 1.0
     if case.only_switches:
         # Full openings change the quantity during the dead time, however little is wanted.
         step, dead_time = pair_step(scenario, law)
@@ -142,17 +147,22 @@ def oscillation(case: Case) -> TrackingCause | None:
             "the controller is too fast for the delays of the loop", (), "reduce its gains or use a slower controller"
         )
     sensors = scenario.sensors
-    reason = "find the source of the delay (sensors, lines)"
+    reason = "its value is computed at constant volume and without load, so the motion of the joint causes it"
+    if sensors.delay or scenario.supply_lines is not None:
+        reason = "the delay of sensors or supply lines causes it"
     if sensors.angle_noise or sensors.pressure_noise:
         noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
         reason = f"sensor noise ({noise}) reverses the command"
-    slower = TrackingCause(f"`{names[0]}` suits this device: {reason}", slower_loops(scenario, law, (2.0, 4.0)))
+    text = f"`{names[0]}` is about the gain computed for this device: {reason}"
+    slower = TrackingCause(text, slower_loops(scenario, law, (2.0, 4.0)))
     if quicker > _QUICKER:
         text = (
             f"at {level_text('rad', angle)} the chambers are so small that the loop is {quicker:.2g} times "
             f"faster than at the angle for which `{names[0]}` is computed"
         )
-        slower = TrackingCause(text, slower_loops(scenario, law, (quicker, 2.0 * quicker)))
+        # Near a stop for a part of the time, a loop needs no gain for that place throughout.
+        factors = (quicker, 2.0 * quicker) if quicker == ratios[0] else (2.0, 4.0, quicker)
+        slower = TrackingCause(text, slower_loops(scenario, law, factors))
     return gains_of_another_device(case) or slower
 
 

@@ -122,6 +122,16 @@ def test_runs_that_fail_count_as_not_met_and_are_said(of_curve: Callable[..., Fi
         of_curve(lambda p: np.full_like(p, np.nan))
 
 
+def test_a_neighbour_that_is_refused_is_said_beside_the_value_found() -> None:
+    # The set refuses a dynamic friction above the static one.
+    varied = {"vary": "friction.dynamic_torque=0.01..4 N m", "such_that": "follows", "highest": True, "grid": 5}
+    answer = find("torque-task-proportional", overrides=["supply.pressure=70 psi_g"], **varied)
+    static = ppafo.load_device("ppafo2011").friction.static_torque
+    assert answer.found.value == pytest.approx(static, rel=1e-3)
+    assert "the value is refused: " in answer.said[2]
+    assert "must be at most friction.static_torque" in answer.said[2]
+
+
 def test_the_lower_end_takes_the_unit_of_the_upper_one() -> None:
     base = ppafo.load_scenario(TASK)
     for text in ("supply.pressure=20..90 psi_g", "supply.pressure = 20 psi_g .. 90 psi_g", RANGE):
