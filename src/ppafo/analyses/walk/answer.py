@@ -11,12 +11,7 @@ import numpy as np
 from ppafo.analyses.walk.benefit import benefit_sentence
 from ppafo.analyses.walk.bottle import bottle_data, bottle_parts
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes, versions, walk_document
-from ppafo.analyses.walk.task_sequence import (
-    segments_csv,
-    task_sequence_parts,
-    task_sequence_pictures,
-    trust_remark,
-)
+from ppafo.analyses.walk.task_sequence import segments_csv, task_sequence_parts, task_sequence_pictures, trust_remark
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.documents.json_text import plain
 from ppafo.loading import reloaded, usage_text
@@ -126,11 +121,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     torque, gains_text = worn.torque_sentence(verdict), "" if gains is None else gains.sentence
     said = (ended, benefit_sentence(comparison), torque, scenario.origin.replaced, gains_text)
     title = f" ({motion.gait.title})" if motion.gait.title else ""
-    set_up = (
-        scenario.description,
-        f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}",
-        law.summary,
-    )
+    set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
     mended = usage_text(reloaded(scenario, verdict.mended)) if verdict is not None and verdict.mended else ""
     assumed = [(assumption.path, assumption.note) for assumption in scenario.assumptions]
     return Finding(

@@ -70,11 +70,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
 
 
 def read_table(
-    path: str | Path,
-    longest_gap: float = 0.0,
-    start: float | None = None,
-    end: float | None = None,
-    form: str = "",
+    path: str | Path, longest_gap: float = 0.0, start: float | None = None, end: float | None = None, form: str = ""
 ) -> MotionTable:
     """Return the table in a file of any format, from ``start`` to ``end`` [s]; ``form`` names the format.
 
@@ -118,27 +114,23 @@ def _arranged(table: MotionTable, own: Set[str]) -> MotionTable:
 def _named_in(own: GaitMap | None) -> dict[str, list[str]]:
     """Return the columns that a user's map names, by curve, without their signs."""
     curves = {} if own is None else {name: getattr(own, name) for name in own.model_fields_set - {"schema_version"}}
-    return {
-        name: [column.removeprefix("-") for column in column_names(mapped)]
-        for name, mapped in curves.items()
-        if mapped is not None
-    }
+    named = {name: column_names(mapped) for name, mapped in curves.items() if mapped is not None}
+    return {name: [column.removeprefix("-") for column in columns] for name, columns in named.items()}
 
 
-def _completed_map(own: GaitMap, tables: Sequence[MotionTable], side: Side, body_mass: float) -> Convention:
-    """Return a user's map, with the curves that it leaves out as the file formats have them.
+def _completed_map(own: GaitMap | None, tables: Sequence[MotionTable], side: Side, body_mass: float) -> Convention:
+    """Return a user's map, if any, with the curves that it leaves out as the file formats have them.
 
     Raises DataError if the formats cannot interpret the files and the map does not name both angles.
     """
+    if own is None:
+        return find_convention(tables, side, body_mass)
     named, problems = _named_in(own), []
     # The format shall not judge the units of loads whose columns the map names.
     loads = {_COORDINATE.sub("", column) for name in LOADS for column in named.get(name, ())}
-    others = [
-        replace(
-            table, columns={key: table.columns[key] for key in table.columns if _COORDINATE.sub("", key) not in loads}
-        )
-        for table in tables
-    ]
+    kept = [[name for name in table.columns if _COORDINATE.sub("", name) not in loads] for table in tables]
+    pairs = zip(tables, kept, strict=True)
+    others = [replace(table, columns={name: table.columns[name] for name in names}) for table, names in pairs]
     try:
         usual = find_convention(others, side, body_mass)
     except DataError as error:
@@ -205,11 +197,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
     body_mass = settings.body_mass or 1.0
     try:
-        convention = (
-            find_convention(tables, settings.side, body_mass)
-            if own is None
-            else _completed_map(own, tables, settings.side, body_mass)
-        )
+        convention = _completed_map(own, tables, settings.side, body_mass)
     except DataError as error:
         raise_noted([*wrong, error])
     columns = convention.columns

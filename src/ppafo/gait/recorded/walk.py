@@ -16,15 +16,7 @@ from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible_angles import SHANK_RANGE
 from ppafo.gait.recorded.columns import LOADS, CurveColumns, check_recorded, find_columns, missing_column
 from ppafo.gait.recorded.knee import knee_signals
-from ppafo.gait.recorded.mapping import (
-    AngleMap,
-    ForceMap,
-    GaitMap,
-    MomentMap,
-    PressureMap,
-    ShankMap,
-    column_names,
-)
+from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, MomentMap, PressureMap, ShankMap, column_names
 from ppafo.gait.recorded.signal import Signal, with_absence, without_ends
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
