@@ -15,7 +15,7 @@ from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
-from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
+from ppafo.simulation.tracking.pair_step import unlimited_switching, warn_of_coarse_pairs
 from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, uncertainty_of
 from ppafo.studies.limits import CONFIDENCE, check_fraction
@@ -131,10 +131,13 @@ def compared(
     # With the seed of each scenario: what the tables call nominal is one realisation of its noise.
     results = simulate_many(list(scenarios.values()), draws.threads)
     cases: dict[str, list[ConfigurationResult]] = {task: [] for task, _ in named_tasks}
+    remarks: list[str] = []
     for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
         runs = drawn.get((task, name), _DrawnRuns())
         with said_of_configuration(name):
             tracking = tried(scenario, result.tracking)
+        if switching := unlimited_switching(result):
+            remarks.append(f"{name}, {task}: {switching}")
         cases[task].append(
             ConfigurationResult(
                 configuration=name,
@@ -163,7 +166,7 @@ def compared(
         ],
         metrics=tuple(metrics),
     )
-    remarks = remarks_of(comparison)
+    remarks += remarks_of(comparison)
     if study is not None and study.drawn and draws.requested is None and study.sample.runs != draws.count:
         remarks.append(
             f"study '{study.name}': sample.runs = {study.sample.runs} applies to 'ppafo sweep' only; 'compare' used "

@@ -1,9 +1,14 @@
 """Verdict on a walk: benefit of the device against the same walk without it, and a remedy if it does not help."""
 
 import contextlib
+import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.control.walking.fault_flags import FAULT_FLAGS, NOT_FLAT
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
 from ppafo.parameters.reach import torque_reach
@@ -33,6 +38,8 @@ _NEARLY = 0.95
 """Ratio of a torque to its limit from which the limit counts as reached [-]."""
 _MINUTES = 0.15
 """Duration of a walk with a remedy [min]: a few strides after the transient."""
+_AFTER_TOE_LOAD = 0.02
+"""Time between toe load and the start of foot-flat that a remedy sets [strides]."""
 
 
 def benefit_sentence(comparison: WalkComparison) -> str:
@@ -41,7 +48,7 @@ def benefit_sentence(comparison: WalkComparison) -> str:
     The device helps by net work in push-off, toes above the ground, and an ankle closer to the healthy angle.
     """
     worn, bare = comparison.with_device, comparison.without_device
-    reasons = [] if worn.is_helped else [worn.help_text, *event_lines(worn.events)[:1]]
+    reasons = [] if worn.is_helped else [worn.help_text, *event_lines(worn.events)[:1], *_later_flat_foot(worn)]
     if not comparison.is_completed or "net_push_off_work" not in worn.metrics:
         return f"the device does not help: {'; '.join(reasons)}" if reasons else ""
     numbers, without = ({name: metric.value for name, metric in walked.metrics.items()} for walked in (worn, bare))
@@ -84,10 +91,36 @@ def _remedied(worn: WalkResult, drags: bool) -> str:
             again = walk(reloaded(worn.scenario, overrides), minutes=_MINUTES)
             toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
             if again.status.is_completed and again.is_helped and work > 0.0 and (toes >= 0.0 or not drags):
-                changed = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
                 gain = f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}"
-                return f"; {cause}: with {changed}, {gain}, simulated in another walk"
+                return f"; {cause}: with {_changed(overrides)}, {gain}, simulated in another walk"
     return f"; {cause}, and {advice}"
+
+
+def _changed(overrides: Sequence[str]) -> str:
+    """Return overrides as words of a sentence."""
+    return " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
+
+
+def _later_flat_foot(worn: WalkResult) -> list[str]:
+    """Return the start of foot-flat with which another walk is assisted, if the toes load too late; else nothing."""
+    settings, starts = worn.scenario.controller.settings, worn.starts
+    flags = [event.fault_flag for event in worn.events if event.fault_flag is not None]
+    if not flags or flags[0] is not FAULT_FLAGS[NOT_FLAT] or walk_of(worn.scenario).bottle is not None:
+        return []
+    is_loaded = worn.recording["toe_force"] > settings["load_threshold"]
+    loads = [np.argmax(is_loaded[start:end]) / (end - start) for start, end in pairwise(starts)]
+    latest = max(loads, default=0.0) + settings["debounce"] / walk_of(worn.scenario).gait.stride_time
+    begin = math.ceil(100.0 * (latest + _AFTER_TOE_LOAD)) / 100.0
+    overrides = [f"controller.flat_from={begin:.2f}"]
+    if begin >= settings["flat_to"]:
+        overrides.append(f"controller.flat_to={begin + settings['flat_to'] - settings['flat_from']:.2f}")
+    if begin > settings["flat_from"]:
+        with contextlib.suppress(PpafoError):
+            again = walk(reloaded(worn.scenario, overrides), minutes=_MINUTES)
+            if again.status.is_completed and again.is_helped:
+                cause = f"the toes count as loaded up to {latest:.2g} strides after heel strike"
+                return [f"{cause}: with {_changed(overrides)}, {again.help_text}, simulated in another walk"]
+    return []
 
 
 def _cause(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...]], str]:

@@ -165,6 +165,15 @@ def test_a_loop_that_oscillates_is_said_and_is_on_no_front() -> None:
     assert "other values of controller.proportional_gain, controller.derivative_gain alone did not suffice" in said[0]
 
 
+def test_valves_that_switch_without_a_limit_are_remarked_on_as_in_a_run() -> None:
+    changes = ["valve.switching_interval=0 s", "controller.rate=1 kHz", "reference.level=3 N m"]
+    quick = ppafo.load_scenario("torque-task-solenoid", changes)
+    slow = ppafo.load_scenario("torque-task-solenoid", changes[2:])
+    (said,) = (text for text in ppafo.simulate(quick).warnings if "the valves are reversed" in text)
+    remarks = compare({"quick": quick, "slow": slow}).found.remarks
+    assert [text for text in remarks if "the valves are reversed" in text] == [f"quick, as written: {said}"]
+
+
 def test_a_remedy_that_is_said_was_tried() -> None:
     beyond = ppafo.load_scenario("torque-task-proportional", ["reference.level=9 N m"])
     remarks = compare({"beyond": beyond, "paper": ppafo.load_scenario("torque-task-proportional")}).found.remarks

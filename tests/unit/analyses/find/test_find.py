@@ -124,8 +124,9 @@ def test_runs_that_fail_count_as_not_met_and_are_said(of_curve: Callable[..., Fi
 
 def test_a_neighbour_that_is_refused_is_said_beside_the_value_found() -> None:
     # The set refuses a dynamic friction above the static one.
-    varied = {"vary": "friction.dynamic_torque=0.01..4 N m", "such_that": "follows", "highest": True, "grid": 5}
-    answer = find("torque-task-proportional", overrides=["supply.pressure=70 psi_g"], **varied)
+    vary, changes = "friction.dynamic_torque=0.01..4 N m", ["supply.pressure=70 psi_g"]
+    task = "torque-task-proportional"
+    answer = find(task, vary=vary, such_that="follows", highest=True, grid=5, overrides=changes)
     static = ppafo.load_device("ppafo2011").friction.static_torque
     assert answer.found.value == pytest.approx(static, rel=1e-3)
     assert "the value is refused: " in answer.said[2]

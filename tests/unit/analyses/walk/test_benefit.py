@@ -1,5 +1,6 @@
 """Second line of a walk: whether the device helps, with numbers of both walks, the cause if not, and a remedy."""
 
+import itertools
 import re
 
 import pytest
@@ -63,6 +64,20 @@ def test_strides_without_help_are_the_reason_and_the_first_fault_is_named() -> N
     stuck = ("faults.heel.kind=stuck", "faults.heel.time=3 s", "faults.heel.reading=0 N")
     said = sentence("proportional", *stuck, minutes=0.2)
     assert said.startswith("the device does not help: help in 2 of 10 strides: fewer than half; lift-only")
+
+
+@pytest.mark.parametrize("more", [(), ("controller.flat_to=0.06",)])
+def test_a_walk_paused_before_its_toes_are_loaded_is_told_a_later_start_of_foot_flat(more: tuple[str, ...]) -> None:
+    overrides = ("controller.flat_from=0.05", *more)
+    said = sentence("proportional", *overrides)
+    assert "no toe load in flat-foot stance" in said
+    remedy = [text.replace(" = ", "=") for text in re.findall(r"`(controller\.flat_\w+ = [\d.]+)`", said)]
+    assert len(remedy) == 1 + len(more)
+    again = ppafo.walk("proportional", minutes=0.1, overrides=remedy)
+    assert again.helped.all()
+    is_loaded, starts = again.recording["toe_force"] > 60.0, again.starts
+    shares = [is_loaded[a:b].nonzero()[0][0] / (b - a) for a, b in itertools.pairwise(starts)]
+    assert max(shares) < float(remedy[0].split("=")[1]) < max(shares) + 0.05
 
 
 def test_a_request_beyond_the_actuator_names_both_torques() -> None:
