@@ -206,10 +206,7 @@ def _delimiter_of(header: str) -> str:
 
 
 def read_csv(
-    path: str | Path,
-    label: str | None = None,
-    atmosphere: float = STANDARD_ATMOSPHERE,
-    row_time: float | None = None,
+    path: str | Path, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE, row_time: float | None = None
 ) -> Recording:
     """Read a recording from a CSV file, in SI units, labelled with the file name by default.
 
