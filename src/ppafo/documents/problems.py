@@ -60,6 +60,11 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
             problems.setdefault(key.path, (key, detail))
     ordered = sorted(problems.values(), key=lambda problem: problem[1]["type"] != "extra_forbidden")
     messages = [_message(key, detail, model) for key, detail in ordered[:_MAXIMUM_PROBLEMS]]
+    for number, message in enumerate(messages[:-1]):
+        # Unknown keys of one table have the same allowed keys, which the last of them lists.
+        start, mark, allowed = message.partition("; allowed here: ")
+        if mark and messages[number + 1].endswith(mark + allowed):
+            messages[number] = start
     if len(ordered) > _MAXIMUM_PROBLEMS:
         messages.append(f"and {len(ordered) - _MAXIMUM_PROBLEMS} more like these")
     if missing:

@@ -240,10 +240,13 @@ class Device:
                 f"{plantar}, supply.dorsiflexion_pressure = {dorsi}{remedy}"
             )
 
-    def check_torque_constant(self, what: str) -> None:
-        """Raise ParameterError if the torque is not proportional to the pressure difference, as ``what`` needs."""
+    def check_torque_constant(self, what: str, remedy: str = "") -> None:
+        """Raise ParameterError, with a remedy, if the torque is not proportional to the pressure difference.
+
+        ``what`` names the computation that needs a proportional torque.
+        """
         if not self.has_torque_constant:
             raise ParameterError(
                 f"{what} needs a torque proportional to the pressure difference, as of a vane; the torque of the "
-                f"actuator '{self.actuator.kind}' of '{self.name}' also depends on the angle"
+                f"actuator '{self.actuator.kind}' of '{self.name}' also depends on the angle{remedy}"
             )

@@ -77,3 +77,19 @@ def test_parts_are_listed_with_what_is_doubtful_and_what_is_not_known(capsys: py
     printed = capsys.readouterr().out
     assert "31.6 mm^2  published" in printed
     assert "unknown figures: largest_pressure, nominal_flow, spool_frequency" in printed
+
+
+def test_a_figure_that_is_left_out_of_a_catalogue_is_listed_as_unknown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    figure = '= { value = %s, unit = "%s", origin = "datasheet", source = "its sheet" }'
+    lines = ["schema_version = 1", 'name = "own"', 'title = "own"', "[valves.both]", 'kind = "solenoid"']
+    lines += ['maker = "Acme"', 'model = "S2"', f"mass {figure % (120.0, 'g')}", f"area {figure % (3.0, 'mm^2')}"]
+    lines += [f"discharge_coefficient {figure % (0.6, '')}", f"closing_delay {figure % (6.0, 'ms')}"]
+    (tmp_path / "own.toml").write_text("\n".join([*lines, f"switching_interval {figure % (5.0, 'ms')}\n"]))
+    missing = "opening_delay, largest_pressure"
+    assert main(["sets", "parts", "--catalogue", str(tmp_path / "own.toml")]) == 0
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("both ")]
+    assert row.endswith(f"none              {missing}")
+    assert main(["sets", "parts", "--catalogue", str(tmp_path / "own.toml"), "both"]) == 0
+    assert f"\nunknown figures: {missing}\n" in capsys.readouterr().out

@@ -107,6 +107,10 @@ def test_a_search_and_a_walk_with_a_torque_controller_tell_of_a_pair_too_coarse_
     found = ppafo.find("torque-task-solenoid", vary="reference.level=2..6 N m", such_that="rms_error >= 0 N m", grid=3)
     assert found.found.runs > 0
     assert caplog.text.count("the pair of valves changes the torque by 2.19 N m") == 1
+    # A search over the size of the valve replaces this valve.
+    caplog.clear()
+    ppafo.find("torque-task-solenoid", vary="valve.area=2..12 mm^2", such_that="rms_error >= 0 N m", grid=3)
+    assert "pair of valves" not in caplog.text
     # The walk's own controller holds one state of the pair for each phase: it tracks no torque.
     assert coarse_pair(load_scenario("solenoid")) == ""
     assert "0.32 times the requested 5 N m" in coarse_pair(load_scenario("solenoid", ["controller.kind=on_off"]))

@@ -85,7 +85,6 @@ def design(
     from ppafo.arguments.reading import units_given
     from ppafo.errors import StudyError
     from ppafo.parameters.parts.catalogue import DEFAULT
-    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.walking.wearer import STATURES
 
     report = progress or report_nothing
@@ -121,5 +120,4 @@ def design(
             "requirements; omit one of them"
         )
     chosen = load_design(problem) if isinstance(problem, str | Path) else problem
-    warn_of_coarse_pairs([chosen.scenario])
     return profile.finding_of(size_for_profile(chosen, threads, report))

@@ -76,7 +76,7 @@ def find(
     from ppafo.studies.study import with_overrides
 
     base = with_overrides(scenario_or_load(scenario), overrides)
-    warn_of_coarse_pairs([base])
+    warn_of_coarse_pairs([base], [vary.partition("=")[0].strip()])
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
     ranged = vary.rpartition("..")[2] if vary.strip().startswith(PATHS_THAT_SET_UNITS) else ""
     given = units_of_texts((ranged, such_that.rpartition("=")[2]))

@@ -52,7 +52,7 @@ def finding_of_catalogue(catalogue: Catalogue) -> Finding[Parts]:
     tables = []
     for group, members in catalogue.groups.items():
         rows = [
-            (part.name, part.title, part.full_mass, ", ".join(part.doubtful) or _NO, ", ".join(part.unknown) or _NO)
+            (part.name, part.title, part.full_mass, ", ".join(part.doubtful) or _NO, _unknown_figures(part) or _NO)
             for part in members.values()
         ]
         tables.append(finding.Section(group.capitalize(), columns_of(head, rows), left=len(head)))
@@ -67,6 +67,11 @@ def finding_of_catalogue(catalogue: Catalogue) -> Finding[Parts]:
     )
 
 
+def _unknown_figures(part: Part) -> str:
+    """Return the figures that the catalogue states as unknown, then those without a value, which count as ideal."""
+    return ", ".join(dict.fromkeys((*part.unknown, *part.ideal)))
+
+
 def finding_of_part(catalogue: Catalogue, part: Part) -> Finding[Parts]:
     """Return a part as a finding: a table of all figures as stated, with origin and source."""
     kind = f", {part.kind}" if part.kind else ""
@@ -75,7 +80,7 @@ def finding_of_part(catalogue: Catalogue, part: Part) -> Finding[Parts]:
         for name, figure in part.figures.items()
     ]
     remarks = [f"{name}: {figure.note}" for name, figure in part.figures.items() if figure.note]
-    remarks += [f"unknown figures: {', '.join(part.unknown)}"] if part.unknown else []
+    remarks += [f"unknown figures: {unknown}"] if (unknown := _unknown_figures(part)) else []
     head = ("figure", "value", "origin", "source")
     return Finding(
         name="parts",

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from typing import Any
 
 from ppafo.parameters.parts import Part
-from ppafo.parameters.parts.catalogue import RATING, figures_of
 from ppafo.report import finding
 from ppafo.report.finding import facts
 
@@ -25,13 +24,7 @@ def parts_to_check(doubtful: Iterable[tuple[Part, str]], used: Iterable[Part]) -
     """
     unknown = []
     for part in {(part.group, part.name): part for part in used}.values():
-        ideal = [quantity.name for quantity in figures_of(part.group, part.kind) if quantity.default == 0.0]
-        ideal += [RATING.name] if part.group in ("valves", "actuators") else []
-        unknown += [
-            f"{part.name}: {name.replace('_', ' ')} unknown, taken as ideal"
-            for name in ideal
-            if name not in part.values
-        ]
+        unknown += [f"{part.name}: {name.replace('_', ' ')} unknown, taken as ideal" for name in part.ideal]
     sections = [finding.Section("Unknown data of the parts", remarks=unknown)] if unknown else []
     pairs = tuple(doubtful)
     if not pairs:

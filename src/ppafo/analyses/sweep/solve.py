@@ -256,12 +256,10 @@ def sweep(
     kept = temporary_folder("ppafo-study") if out is None else None
     folder = study_folder(kept.name if kept is not None else str(out))
     for configuration in chosen.configurations:
-        varied = {*chosen.paths, *chosen.same}
+        varied = [path for path in {*chosen.paths, *chosen.same} if chosen.varies(path, configuration.name)]
         with said_of_configuration(configuration.name):
-            warn_of_coarse_pairs([configuration.scenario])
-            warn_of_following_gains(
-                configuration.scenario, [path for path in varied if chosen.varies(path, configuration.name)]
-            )
+            warn_of_coarse_pairs([configuration.scenario], varied)
+            warn_of_following_gains(configuration.scenario, varied)
     report = progress or report_nothing
     store = StudyStore.claim(chosen, folder, agreed, threads, report)
     _compute_missing_chunks(store, threads, progress)

@@ -271,7 +271,7 @@ def remarks_of(
         f"candidates, {runs:,} runs; {settled} of {len(starts)} converged before the maximum number of "
         "generations"
     ]
-    if coarse := coarse_pair(problem.scenario):
+    if coarse := coarse_pair(problem.scenario, problem.before):
         remarks.append(coarse)
     for path, bound in reached.items():
         remarks.append(

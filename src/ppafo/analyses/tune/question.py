@@ -63,5 +63,5 @@ def tune(
     problem = tuning if isinstance(tuning, Problem) else load_tuning(tuning, overrides)
     if seed is not None:
         problem = problem.with_seed(seed)
-    warn_of_coarse_pairs([problem.scenario])
+    warn_of_coarse_pairs([problem.scenario], problem.before)
     return finding_of(solve_tuning(problem, threads, progress))

@@ -1,7 +1,7 @@
 """Smallest change of the controlled quantity by a pair of on/off valves: the change during their dead time."""
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import TYPE_CHECKING
 
 from ppafo.control.catalog import CONTROLLERS
@@ -42,6 +42,8 @@ A second-order spool takes half of its natural period, a limited slew rate two f
 """
 _REPORTED_SWITCHING = 20.0
 """Switching frequency of the solenoid valves of the paper [Hz], the only one that it reports."""
+_SIZES = frozenset(("valve.area", "valve.sonic_conductance"))
+"""Paths that set the size of the valve's orifice."""
 _LARGEST_STEP = 0.25
 """Step of a pair divided by the wanted change, above which a warning is logged [-]."""
 
@@ -80,22 +82,25 @@ def unlimited_switching(result: "RecordedResult") -> str:
     return f"{reversals}, and no value of the parameter set limits this rate ({missing} are 0): give these values"
 
 
-def warn_of_coarse_pairs(scenarios: Iterable[Scenario]) -> None:
-    """Log a warning for each scenario with a too coarse pair of valves, before the runs; equal warnings once."""
-    for text in dict.fromkeys(map(coarse_pair, scenarios)):
+def warn_of_coarse_pairs(scenarios: Iterable[Scenario], varied: Collection[str] = ()) -> None:
+    """Log a warning for each scenario with a too coarse pair of valves, before the runs; equal warnings once.
+
+    ``varied`` are the paths that the runs vary: none is logged if these include the size of the valve.
+    """
+    for text in dict.fromkeys(coarse_pair(scenario, varied) for scenario in scenarios):
         if text:
             logger.warning("ppafo: %s", text)
 
 
-@in_units(lambda scenario: scenario.device.shown)
-def coarse_pair(scenario: Scenario) -> str:
+@in_units(lambda scenario, *_: scenario.device.shown)
+def coarse_pair(scenario: Scenario, varied: Collection[str] = ()) -> str:
     """Warning for a pair whose step exceeds a quarter of the wanted change of torque or pressure; "" without one.
 
     In a walk the wanted change is the largest torque of a torque controller. Angle loops are not checked, because their
-    step depends on the joint as much as on the pair.
+    step depends on the joint as much as on the pair; nor are runs whose ``varied`` paths replace the valve's size.
     """
     law, controlled = scenario.law, CONTROLLED[scenario.controlled]
-    if law is None or not is_pair(scenario) or controlled.name == ANGLE:
+    if law is None or not is_pair(scenario) or controlled.name == ANGLE or not _SIZES.isdisjoint(varied):
         return ""
     if scenario.follows_reference:
         initial = scenario.initial

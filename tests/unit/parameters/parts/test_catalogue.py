@@ -122,6 +122,15 @@ def test_every_mistake_is_one_line_with_file_key_and_value(before: str, after: s
     assert "\n" not in str(caught.value)
 
 
+def test_two_unknown_keys_of_a_table_list_the_allowed_keys_once() -> None:
+    with pytest.raises(ParameterError) as caught:
+        parse_catalogue(GOOD.replace('model = "S"', 'model = "S"\nheight = 1\nwidth = 2').encode(), "mine.toml")
+    assert str(caught.value) == (
+        "mine.toml: unknown key 'bottles.small.height'; unknown key 'bottles.small.width'; allowed here: maker, model, "
+        "document, note, unknown, content, empty_mass"
+    )
+
+
 def test_every_key_that_parts_lack_is_in_one_refusal() -> None:
     two = GOOD.replace('note = "scaled"', "").replace('title = "Mine"', f'title = "Mine"\n{VALVE}')
     with pytest.raises(ParameterError) as caught:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.analyses.design.profile.problem import SizingProblem
-from ppafo.analyses.design.profile.search import LIMITS, Limit
+from ppafo.analyses.design.profile.search import LIMITS, Limit, ceiling
 from ppafo.analyses.parts.sections import doubts_data, part_titles, parts_to_check
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.parameters.parts import Part
+from ppafo.parameters.parts import Part, rated_pressure
 from ppafo.report import finding
 from ppafo.report.finding import Cell, Finding, columns_of
 from ppafo.report.kind import TIME, Kind
@@ -359,18 +359,36 @@ def suggestion_sentence(sizing: Sizing) -> str:
     """Return a sentence with the suggestion and its reason, or the reason why there is none."""
     choice = sizing.choice
     if choice is None:
-        if any(sized.works for sized in sizing.valves):
-            return "no suggestion: valves keep the error limit, but no bottle holds enough gas for the requested use"
-        return "no suggestion: no valve keeps the error limit at any of the pressures"
+        working = [sized for sized in sizing.valves if sized.works]
+        said = "valves keep the error limit, but no bottle holds enough gas for the requested use"
+        peaks = (
+            f"; {sized.valve.name} at {PRESSURE.text(sized.pressure)}, {cut}"
+            for sized in working or sizing.valves
+            if (cut := _cut_peak(sizing, sized))
+        )
+        nothing = "no valve keeps the error limit at any of the pressures"
+        return f"no suggestion: {said if working else nothing}{''.join(peaks)}"
     bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
-    cut = 0.0 if choice.margins is None else -choice.margins.torque
-    problem, largest = sizing.problem, sizing.problem.profile.largest
-    whole = PRESSURE.text(problem.atmosphere + largest / problem.torque_constant)
-    most = TORQUE.text((1.0 - cut) * largest)
-    at_most = f"at most {most} of {TORQUE.text(largest)}; the whole peak needs pressure.lowest = '{whole}'"
-    peak = f", with {100.0 * cut:.0f} % of the peak cut off ({at_most})" if cut > _WHOLE_PEAK else ""
+    cut = _cut_peak(sizing, choice)
     return (
         f"suggested: {choice.valve.name} at {PRESSURE.text(choice.pressure)}{bottle}, the lightest that lasts "
-        f"and keeps the error limit{peak}, {_MASS.text(choice.mass or 0.0, '.0f')}; a lower pressure is "
-        f"prevented by {LIMITS[choice.limit]}"
+        f"and keeps the error limit{f', {cut}' if cut else ''}, {_MASS.text(choice.mass or 0.0, '.0f')}; a lower "
+        f"pressure is prevented by {LIMITS[choice.limit]}"
     )
+
+
+def _cut_peak(sizing: Sizing, sized: SizedValve) -> str:
+    """Return the fraction of the peak torque that a valve's pressure cuts off, with a remedy; "" for a whole peak."""
+    problem, largest = sizing.problem, sizing.problem.profile.largest
+    most = ceiling(problem, sized.pressure)
+    cut = 1.0 - most / largest
+    if cut <= _WHOLE_PEAK or np.isnan(sized.error):
+        return ""
+    whole, rated = problem.atmosphere + largest / problem.torque_constant, rated_pressure(sized.valve, *problem.carried)
+    needs = f"pressure.lowest = '{PRESSURE.text(whole)}'"
+    if whole > rated:
+        needs = f"{PRESSURE.text(whole)}, but its parts are rated for {PRESSURE.text(rated)}: name other parts"
+    elif whole >= problem.highest_pressure:
+        needs += " and a higher pressure.highest"
+    at_most = f"at most {TORQUE.text(most)} of {TORQUE.text(largest)}; the whole peak needs {needs}"
+    return f"with {100.0 * cut:.0f} % of the peak cut off ({at_most})"

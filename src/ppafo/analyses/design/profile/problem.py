@@ -17,7 +17,7 @@ from ppafo.documents.toml_text import beside
 from ppafo.errors import DataError, PpafoError, StudyError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.loading import reloaded
 from ppafo.parameters.parts import Part, load_catalogue
-from ppafo.parameters.parts.catalogue import DEFAULT
+from ppafo.parameters.parts.catalogue import DEFAULT, pressure_search
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
@@ -298,10 +298,12 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
             source = catalogue if catalogue.groups[group] else load_catalogue()
             chosen[group].append(source.part(group, name))
     kind = scenario.device.valve.kind
+    others = {name: f"scenario = 'torque-task-{name}'" for name in ("proportional", "solenoid")}
     wrong += [
         StudyError(
             f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{scenario.name}' "
-            f"needs a {kind} valve"
+            f"needs a {kind} valve; a design file compares valves of one kind: name '{valve.name}' in a second file, "
+            f"with {others.get(valve.kind, f'a scenario that has a {valve.kind} valve')}"
         )
         for valve in chosen["valves"]
         if valve.kind != kind
@@ -357,7 +359,9 @@ def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file:
     """Load the scenario with the profile as its reference; it ends with a whole controller and output sample."""
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
-    plain.device.check_torque_constant("the size of a device")
+    plain.device.check_torque_constant(
+        "the size of a device", f"; {pressure_search(str(name), document.overrides, plain.device.valve.kind)}"
+    )
     if plain.controller.is_open_loop:
         raise StudyError(
             f"{file}: scenario '{plain.name}' has no reference (controller.kind = "

@@ -1,5 +1,6 @@
 """Sizing: what is planted is found, what limits is named, and bad files are one line."""
 
+import ast
 import dataclasses
 import re
 import tomllib
@@ -17,6 +18,7 @@ from ppafo.analyses.design.profile.problem import choose_knots
 from ppafo.analyses.design.profile.search import OSCILLATES, Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.analyses.design.profile.solve import _lasting_bottle, smallest_bottle
 from ppafo.analyses.design.question import design
+from ppafo.analyses.find.question import find
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.loading import load_scenario
@@ -265,10 +267,39 @@ def test_simulated_repetitions_are_covered_to_a_whole_sample(folder: Path) -> No
     assert dataclasses.asdict(problem.scenario.reference)["kind"] == "tabulated"
 
 
+def test_a_lever_cylinder_is_sized_by_the_search_that_its_refusal_names(tmp_path: Path) -> None:
+    changed = FILE.replace("simulated = 1", 'overrides = ["device.set=cylinder-lever"]\nsimulated = 1')
+    (tmp_path / "lever.toml").write_text(changed)
+    with pytest.raises(PpafoError, match="needs a torque proportional to the pressure difference") as refused:
+        load_design(tmp_path / "lever.toml")
+    figure = '= { value = 32.0, unit = "mm", origin = "datasheet", source = "its sheet" }\n'
+    table = '[actuators.own]\nmaker = "Acme"\nmodel = "C32"\n'
+    part = f'schema_version = 1\nname = "own"\ntitle = "own"\n{table}bore {figure}lever_length {figure}'
+    (tmp_path / "own.toml").write_text(part)
+    with pytest.raises(PpafoError) as unknown:
+        load_catalogue(tmp_path / "own.toml")
+    assert "actuators.own: bore, lever_length not allowed: a catalogue has actuators whose torque" in str(unknown.value)
+    (named,) = {str(error.value).partition("search its supply pressure: ")[2] for error in (refused, unknown)}
+    name, arguments = ast.parse(named, mode="eval").body.args[0], ast.parse(named, mode="eval").body.keywords
+    given = {argument.arg: ast.literal_eval(argument.value) for argument in arguments}
+    found = find(ast.literal_eval(name), grid=9, **given).found
+    # A bore of 25.7 mm, 5.1875 cm^2, on a lever of 25 mm gives at most 12.97 cm^3: 5 N m of the 6 N m need 385 kPa.
+    assert found.value is not None
+    assert found.value - ATMOSPHERE > 385.0e3
+    assert found.metric_at_value is not None
+    assert found.metric_at_value <= 0.5
+
+
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("enfield-ls-v05s", "festo-vovg-5v-pair", "'festo-vovg-5v-pair' is a solenoid valve, but scenario"),
+        (
+            "enfield-ls-v05s",
+            "festo-vovg-5v-pair",
+            "'festo-vovg-5v-pair' is a solenoid valve, but scenario 'torque-task-proportional' needs a proportional "
+            "valve; a design file compares valves of one kind: name 'festo-vovg-5v-pair' in a second file, with "
+            "scenario = 'torque-task-solenoid'",
+        ),
         ("co2-3_5oz", "co2-3oz", "bottles has no part 'co2-3oz', did you mean 'co2-3_5oz'?"),
         ("repetitions = 100", "", "[use]: give either repetitions or hours"),
         ("repetitions = 100", "repetitions = 100\nhours = 1.0", "[use]: give either repetitions or hours"),
@@ -410,6 +441,40 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
     assert whole.choice is not None
     assert TORQUE_CONSTANT * (whole.choice.pressure - ATMOSPHERE) == pytest.approx(5.0, rel=5e-3)
     assert "cut off" not in suggestion_sentence(whole)
+
+
+def test_a_cut_peak_is_told_without_a_bottle_and_without_a_pressure_that_suffices_and_no_replaced_valve_is_warned_of(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    document = (
+        FILE.replace("proportional", "solenoid")
+        .replace("enfield-ls-v05s", "festo-vovg-5v-pair")
+        .replace("repetitions = 100", "hours = 20.0")
+        .replace("co2-3_5oz", "pipeline-jacpac-9oz")
+        .replace('"0.4 N m"', '"1.2 N m"')
+    )
+    (tmp_path / "long.toml").write_text(document)
+    sizing = design(tmp_path / "long.toml").found
+    assert isinstance(sizing, Sizing)
+    assert "pair of valves" not in caplog.text
+    (sized,) = sizing.valves
+    assert (sized.works, sized.bottle) == (True, None)
+    # Equation (2): 4 N m / 14.51 cm^3 = 275.7 kPa, 39.98 psi above the atmosphere.
+    most = sizing.problem.torque_constant * (sized.pressure - ATMOSPHERE)
+    said = f"(at most {most:.3g} N m of 4 N m; the whole peak needs pressure.lowest = '40 psi_g'"
+    assert f"% of the peak cut off {said})" in suggestion_sentence(sizing)
+    (tmp_path / "weak.toml").write_text(f'{document.replace("1.2 N m", "0.1 N m")}[pressure]\nhighest = "20 psi_g"\n')
+    weak = design(tmp_path / "weak.toml").found
+    assert isinstance(weak, Sizing)
+    (sized,) = weak.valves
+    assert not sized.works
+    # 20 psi give 137.9 kPa x 14.51 cm^3 = 2.001 N m: half of the peak.
+    assert sized.pressure == pytest.approx(ATMOSPHERE + 20.0 * 6894.757)
+    assert suggestion_sentence(weak) == (
+        "no suggestion: no valve keeps the error limit at any of the pressures; festo-vovg-5v-pair at 20 psi_g, with "
+        "50 % of the peak cut off (at most 2 N m of 4 N m; the whole peak needs pressure.lowest = '40 psi_g' and a "
+        "higher pressure.highest)"
+    )
 
 
 def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
