@@ -110,10 +110,7 @@ def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
 
 
 def quantities(
-    valve_kinds: Mapping[str, str],
-    actuator_kind: str = VANE.name,
-    species: str = "",
-    has_one_chamber: bool = False,
+    valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name, species: str = "", has_one_chamber: bool = False
 ) -> Mapping[str, Quantity]:
     """Return the declarations of all numbers by path, given valve kinds by name, actuator and gas."""
     # Effects are part of the key: another package's may be loaded between two calls.

@@ -290,9 +290,7 @@ def _with_species(parameter_set: ParameterSet, path: str, override: Override) ->
     }
     chosen = TextEntry(value=override.text, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
     return replace(
-        parameter_set,
-        numbers={**parameter_set.numbers, **numbers},
-        texts={**parameter_set.texts, path: chosen},
+        parameter_set, numbers={**parameter_set.numbers, **numbers}, texts={**parameter_set.texts, path: chosen}
     )
 
 

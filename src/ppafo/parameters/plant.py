@@ -22,11 +22,7 @@ class Restriction(NamedTuple):
 def area_restriction(orifice: Orifice, gas: Gas, linear_ratio: float) -> Restriction:
     """Return the paper's orifice for a gas, with linear flow above ``linear_ratio`` [-]; equations (6), (7)."""
     conductance = area_conductance(
-        orifice.area,
-        orifice.discharge_coefficient,
-        gas.heat_capacity_ratio,
-        gas.specific_gas_constant,
-        gas.temperature,
+        orifice.area, orifice.discharge_coefficient, gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
     )
     return Restriction(conductance, isentropic_curve(gas.heat_capacity_ratio, linear_ratio))
 

@@ -98,11 +98,7 @@ _QUANTITIES = (
 
 
 def recording_figure(
-    recording: Recording,
-    title: str = "",
-    remark: str = "",
-    valve: str = "",
-    joint: JointNames = ANKLE,
+    recording: Recording, title: str = "", remark: str = "", valve: str = "", joint: JointNames = ANKLE
 ) -> "Figure":
     """Return the figure of a recording, with a panel for every quantity in it.
 

@@ -218,10 +218,7 @@ def header_cells(cells: list[str], mark: str) -> list[str]:
 
 
 def read_csv(
-    path: str | Path,
-    label: str | None = None,
-    atmosphere: float = STANDARD_ATMOSPHERE,
-    row_time: float | None = None,
+    path: str | Path, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE, row_time: float | None = None
 ) -> Recording:
     """Read a recording from a CSV file, in SI units, labelled with the file name by default.
 

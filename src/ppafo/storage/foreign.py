@@ -13,14 +13,7 @@ from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
 from ppafo.storage.clock import clock_seconds, counted_on
-from ppafo.storage.column_map import (
-    ColumnMap,
-    MappedChannel,
-    MappedDirection,
-    MappedTable,
-    check_sources,
-    in_map,
-)
+from ppafo.storage.column_map import ColumnMap, MappedChannel, MappedDirection, MappedTable, check_sources, in_map
 from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si
 from ppafo.storage.files import read_bytes
 from ppafo.storage.frames import remedy_for

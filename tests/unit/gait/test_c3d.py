@@ -12,7 +12,7 @@ from ppafo.errors import DataError
 from ppafo.gait import Gait
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.forms.c3d import open_c3d
-from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, ShankMap
+from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, MomentMap, ShankMap
 from ppafo.gait.recorded.source import read_table
 from ppafo.gait.recorded.table import without_lost_markers
 from ppafo.signals import Recording
@@ -116,6 +116,23 @@ def test_a_walk_the_other_way_is_seen_in_the_markers_and_a_map_may_name_axes_and
     forwards = columns.model_copy(update={"shank_angle": ShankMap(knee="RKNE", ankle="RANK", forward="x")})
     with pytest.raises(DataError, match="shank_angle increases by 13 deg in mid-stance"):
         import_gait([path], ImportSettings(normative.body_mass, columns=forwards))
+
+
+def test_what_a_map_leaves_out_is_read_from_the_outputs_of_the_model(
+    written: Callable[..., Path], normative: Gait, walk: Recording
+) -> None:
+    moment = walk.resample(np.arange(0.0, walk.duration, 0.01))["ankle_moment"]
+    # In kN m/kg: the format refuses the column, and a map of the moment alone mends it.
+    path = written({"RAnkleMoment": np.array([1e-3 * moment, 0.0 * moment, 0.0 * moment])}, walk_along=-1.0)
+    with pytest.raises(
+        DataError, match="implausible for a moment in walking; give the unit of the column in a gait map"
+    ):
+        import_gait([path], ImportSettings(normative.body_mass))
+    named = GaitMap(ankle_moment=MomentMap(terms=("RAnkleMoment.x",), positive="plantarflexion", unit="kN m/kg"))
+    found = import_gait([path], ImportSettings(normative.body_mass, columns=named))
+    assert same(found.gait, normative)
+    assert knee_error(found.gait, normative) < 0.15
+    assert "walking direction is -x, upwards is z" in found.remarks
 
 
 @pytest.mark.parametrize("stored", [1.0, -1.0])

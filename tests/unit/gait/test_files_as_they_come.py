@@ -396,7 +396,7 @@ def test_a_map_of_the_ankle_alone_leaves_the_shank_to_the_form_of_the_file(tmp_p
     columns_map.write_text("[ankle_angle]\nterms = ['Ankle']\npositive = 'dorsiflexion'\n")
     mapped = replace(PERSON, columns=load_map(columns_map))
     assert_true(import_gait([path], mapped).gait, ("shank_angle", "ankle_angle"))
-    with pytest.raises(DataError, match="read as the right foot unless a gait map names both angles"):
+    with pytest.raises(DataError, match="columns of both angles in a gait map"):
         import_gait([path], replace(mapped, side="left"))
 
 

@@ -97,6 +97,36 @@ def test_a_map_names_columns_signs_and_zero(
     assert_same(import_gait([csv_of(changed)], ImportSettings(62.0, columns=columns_map)).gait, normative)
 
 
+DORSIFLEXION = AngleMap(terms=("ankle_angle",), positive="dorsiflexion")
+
+
+def test_what_a_map_leaves_out_of_a_csv_file_is_read_by_its_names(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], normative: Gait
+) -> None:
+    turned = columns | {"ankle_angle [rad]": 0.5 * np.pi - columns["ankle_angle [rad]"]}
+    found = import_gait([csv_of(turned)], ImportSettings(62.0, columns=GaitMap(ankle_angle=DORSIFLEXION)))
+    assert_same(found.gait, normative)
+    assert found.events == "vertical_force"
+    assert "ankle_moment from 'ankle_moment'; vertical_force from 'vertical_force'" in "\n".join(found.remarks)
+    # Columns of the package are of the right foot: a map of the left foot adds none of them.
+    both = GaitMap(shank_angle=ShankMap(terms=("shank_angle",)), ankle_angle=DORSIFLEXION)
+    left = import_gait([csv_of(turned)], ImportSettings(62.0, columns=both, side="left"))
+    assert "ankle_moment" not in left.gait.curves
+    assert "only the curves of the gait map are imported" in "\n".join(left.remarks)
+
+
+def test_what_a_map_leaves_out_of_opensim_tables_is_read_by_their_labels(
+    opensim_files: dict[str, Path], normative: Gait
+) -> None:
+    path = opensim_files["ik"]
+    path.write_text(path.read_text().replace("ankle_angle_r", "Ankle"))
+    named = GaitMap(ankle_angle=AngleMap(terms=("Ankle",), positive="dorsiflexion"))
+    settings = ImportSettings(normative.body_mass, columns=named, stature=0.4 / 0.245)
+    found = import_gait(list(opensim_files.values()), settings).gait
+    assert_same(found, normative)
+    assert all(largest_difference(found, normative, name) < 0.3 for name in KNEE)
+
+
 def test_opensim_tables_of_one_walk(opensim_files: dict[str, Path], normative: Gait) -> None:
     found = import_gait(list(opensim_files.values()), ImportSettings(normative.body_mass))
     assert_same(found.gait, normative)

@@ -221,10 +221,7 @@ def _facts(endurance: Endurance) -> list[tuple[str, str]]:
     use = "of use" if endurance.is_of_recording else "of walking"
     rows = [
         ("run time", f"{duration_text(result.walking_time)} {use}, {duration_text(result.total_time)} in total"),
-        (
-            "strides" if counted == "stride" else f"repetitions of the {repeated}",
-            strides_text(result.strides),
-        ),
+        ("strides" if counted == "stride" else f"repetitions of the {repeated}", strides_text(result.strides)),
         (
             f"{counted}s without cooling",
             f"{strides_text(endurance.strides_when_warm)} (a bottle that stays at room temperature)",

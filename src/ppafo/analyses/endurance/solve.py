@@ -10,7 +10,7 @@ from ppafo.analyses.endurance.discharge import check_schedule, discharge, discha
 from ppafo.analyses.endurance.gas_demand import GasDemand, demand_of_recording
 from ppafo.analyses.endurance.walk_gas import WALK_FILE, WalkGas, demand_of_walk, read_walk_gas, walk_gas
 from ppafo.arguments import checked
-from ppafo.errors import DataError, ParameterError
+from ppafo.errors import DataError, ParameterError, PpafoError, refused_as
 from ppafo.loading import reloaded, usage_text
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
@@ -22,9 +22,10 @@ from ppafo.signals import Recording
 from ppafo.storage.owned_folder import read_json
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import RUN_FILE
+from ppafo.units.shown import shown_text
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle.coupling import Schedule
-from ppafo.walking.bottle.supply import is_of_bottle
+from ppafo.walking.bottle.supply import BOTTLE_NAME, is_of_bottle, other_pressure
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
@@ -36,6 +37,8 @@ STRIDE_TIME = 1.1
 """Default stride time [s]."""
 LONGEST = 24.0 * 3600.0
 """Default of the longest simulated time [s]: one day."""
+_SAME_TIME = 1.0e-3
+"""Relative difference up to which two durations of a walk count as equal."""
 WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 GasUse = str | Path | Recording | WalkResult
 """Gas use of a device: a walk or its result folder, or a recording, its file or its folder."""
@@ -145,8 +148,19 @@ def endurance_of_walk_gas(
         bottle = PAPER_BOTTLE
     full, device = None if bottle is None else load_bottle(bottle), gas.scenario.device
     if full is not None and not is_of_bottle(device.gas.molar_mass, full):
-        fed, again = device.gas.species, reloaded(gas.scenario, [f"{SPECIES_PATH}={full.fluid.name}"])
-        command = usage_text(again).partition("\n")[0]
+        fed, changes = device.gas.species, [f"{SPECIES_PATH}={full.fluid.name}"]
+        if walk_of(gas.scenario).bottle is not None:
+            changes.append(f"{BOTTLE_NAME}={bottle}")
+        pressure = other_pressure(str(bottle), full, device)
+        if pressure is not None:
+            room, unit = device.supply.atmospheric_pressure, full.entries["regulator.set_pressure"].unit
+            changes.append(f"supply.pressure={shown_text(pressure, 'Pa_a', atmosphere=room, unit=unit)}")
+        problem = f"walk '{gas.name}' uses {fed}, and cannot be repeated on bottle '{full.name}' of {full.fluid.name}"
+        with refused_as(DataError, problem, PpafoError):
+            again = reloaded(gas.scenario, changes)
+        command, seconds = usage_text(again).partition("\n")[0], float(gas.recording.time[-1])
+        if abs(seconds - again.run.duration) > _SAME_TIME * seconds:
+            command += f" --minutes {seconds / 60.0:.6g}"
         raise DataError(
             f"walk '{gas.name}': the device uses {fed}, but bottle '{full.name}' contains {full.fluid.name}; "
             f"repeat the walk with '{command} --out FOLDER' and give FOLDER, or choose a bottle of {fed}"

@@ -11,17 +11,13 @@ import numpy as np
 from ppafo.analyses.walk.benefit import benefit_sentence
 from ppafo.analyses.walk.bottle import bottle_data, bottle_parts
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes, versions, walk_document
-from ppafo.analyses.walk.task_sequence import (
-    segments_csv,
-    task_sequence_parts,
-    task_sequence_pictures,
-    trust_remark,
-)
+from ppafo.analyses.walk.task_sequence import segments_csv, task_sequence_parts, task_sequence_pictures, trust_remark
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.documents.json_text import plain
 from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
-from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
+from ppafo.parameters.bottles.fluid import list_fluids
 from ppafo.remedy_trials import tried
 from ppafo.report.display_units import quantity_text
 from ppafo.report.finding import Column, Finding, Section, columns_of
@@ -35,6 +31,7 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import duration_text, lasted
+from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.gait_strip import strip_figure
 from ppafo.walking.figures.legs import frames_figure
@@ -124,11 +121,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     torque, gains_text = worn.torque_sentence(verdict), "" if gains is None else gains.sentence
     said = (ended, benefit_sentence(comparison), torque, scenario.origin.replaced, gains_text)
     title = f" ({motion.gait.title})" if motion.gait.title else ""
-    set_up = (
-        scenario.description,
-        f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}",
-        law.summary,
-    )
+    set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
     mended = usage_text(reloaded(scenario, verdict.mended)) if verdict is not None and verdict.mended else ""
     assumed = [(assumption.path, assumption.note) for assumption in scenario.assumptions]
     return Finding(
@@ -226,7 +219,12 @@ def _bottle_remark(worn: WalkResult) -> str:
         return f"bottle {worn.supply.supply.bottle.label}: {duration}{worn.supply.ending.message}"
     if "gas" not in worn.metrics or worn.metrics["gas"].value <= 0.0:
         return ""
-    with_bottle = argument_text("bottle", PAPER_BOTTLE)
+    gas, names = worn.scenario.device.gas, (PAPER_BOTTLE, *list_bottles())
+    fitting = next((name for name in names if is_of_bottle(gas.molar_mass, load_bottle(name))), None)
+    if fitting is None:
+        known = " or ".join(list_fluids())
+        return f"the supply pressure is constant here: bottles contain {known}, but the device uses {gas.species}"
+    with_bottle = argument_text("bottle", fitting)
     return f"the supply pressure is constant here; give {with_bottle} to see how long a bottle lasts"
 
 

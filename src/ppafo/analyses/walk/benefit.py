@@ -26,10 +26,7 @@ from ppafo.walking.walk import WalkComparison, walk
 _WORK, _SHARE = Kind("", "J", "energy", ".3g"), Kind("", "1", "fraction", ".2g")
 _ANGLE, _HEIGHT = Kind("", "rad", "angle", ".3g"), Kind("", "m", "length", ".2g")
 _TORQUE = Kind("", "N m", "torque", ".3g")
-_LAWS = (
-    ("controller.kind=event_proportional",),
-    ("controller.kind=event_proportional", "device.valve=proportional"),
-)
+_LAWS = (("controller.kind=event_proportional",), ("controller.kind=event_proportional", "device.valve=proportional"))
 """Overrides that are tried for a walk without a controller: the controller alone, and with the valve it needs."""
 _PRESSURES = (1.2, 1.4, 1.7, 2.0, 3.0, 5.0)
 """Factors on the gauge pressures of the supplies that are tried if the toes would drag."""

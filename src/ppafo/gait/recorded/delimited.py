@@ -119,8 +119,7 @@ def table_of(
         check_clock(time, numbers, may_have_trials=False)
     twins = {name: others for name, others in doubled(written, distinct).items() if name != clock}
     columns = without_copies(
-        {name: values[:, column] for column, name in enumerate(distinct) if column != time_column},
-        twins,
+        {name: values[:, column] for column, name in enumerate(distinct) if column != time_column}, twins
     )
     written_units = [unit for name, unit in zip(names, units, strict=True) if name]
     stated = dict(zip((*distinct, *written), (*written_units, *written_units), strict=True))

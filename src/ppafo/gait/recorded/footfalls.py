@@ -79,10 +79,7 @@ class Footfalls:
 
 
 def find_footfalls(
-    walk: Mapping[str, Signal],
-    tables: Sequence[MotionTable],
-    side: Side,
-    given_least: int | None,
+    walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, given_least: int | None
 ) -> Footfalls:
     """Return the strides of a walk: from the force if it shows enough, otherwise from the source with more strides."""
     least = given_least or LEAST_STRIDES

@@ -9,10 +9,7 @@ from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.gait import HARMONICS
 from ppafo.gait.mean_stride import SignSource, other_sign
 from ppafo.gait.recorded.columns import find_columns
-from ppafo.gait.recorded.mapping import (
-    KneeMap,
-    setting_text,
-)
+from ppafo.gait.recorded.mapping import KneeMap, setting_text
 from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats

@@ -128,13 +128,13 @@ class KneeMap(StrictTable):
         return self
 
 
-_OF_THE_FORM = "default: the column and sign of the file format"
+_OF_THE_FORM = "default: the columns and sign of the file format"
 
 
 class GaitMap(StrictTable):
     """Gait map: meaning of the columns of recorded files.
 
-    An angle that is not listed has the column of the file format; any other curve that is not listed is not imported.
+    A curve that is not listed has the columns, signs and units of the file format.
     """
 
     schema_version: SchemaVersion = 1
@@ -143,10 +143,10 @@ class GaitMap(StrictTable):
         default_factory=lambda: AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
         description=_OF_THE_FORM,
     )
-    ankle_moment: MomentMap | None = None
-    vertical_force: ForceMap | None = None
-    centre_of_pressure: PressureMap | None = None
-    knee: KneeMap | None = None
+    ankle_moment: MomentMap | None = Field(None, description=_OF_THE_FORM)
+    vertical_force: ForceMap | None = Field(None, description=_OF_THE_FORM)
+    centre_of_pressure: PressureMap | None = Field(None, description=_OF_THE_FORM)
+    knee: KneeMap | None = Field(None, description=_OF_THE_FORM)
 
 
 def column_names(mapped: object) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """Recording from which a gait is imported: tables, gait map and signals of its files, gaps filled, and remarks."""
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,6 +24,9 @@ from ppafo.plugins import nearest_kind
 from ppafo.storage.frames import written_as_csv
 from ppafo.units import format_quantity
 from ppafo.wording import one_line
+
+_COORDINATE = re.compile(r"\.[xyz]$")
+"""Suffix of a coordinate of a marker or load."""
 
 # The forms of gait recordings, tables of files in any of them, and the one map of files that come without one.
 
@@ -66,11 +70,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
 
 
 def read_table(
-    path: str | Path,
-    longest_gap: float = 0.0,
-    start: float | None = None,
-    end: float | None = None,
-    form: str = "",
+    path: str | Path, longest_gap: float = 0.0, start: float | None = None, end: float | None = None, form: str = ""
 ) -> MotionTable:
     """Return the table in a file of any format, from ``start`` to ``end`` [s]; ``form`` names the format.
 
@@ -101,6 +101,51 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
     # A force by the name of this foot is surer than contacts chosen by the lean of the shank.
     has_force = any(_is_there(columns["vertical_force"], table) for table in tables)
     return Convention(GaitMap(**columns), () if has_force else plates, remarks)
+
+
+def _arranged(table: MotionTable, own: Set[str]) -> MotionTable:
+    """Return a table as its format arranges it, with the columns ``own`` that a gait map names as the file has them."""
+    found = FORMS[table.form].arrange(table)
+    kept = own & table.columns.keys()
+    units = {**found.units, **{name: table.units[name] for name in kept}}
+    return replace(found, columns={**found.columns, **{name: table.columns[name] for name in kept}}, units=units)
+
+
+def _named_in(own: GaitMap | None) -> dict[str, list[str]]:
+    """Return the columns that a user's map names, by curve, without their signs."""
+    curves = {} if own is None else {name: getattr(own, name) for name in own.model_fields_set - {"schema_version"}}
+    named = {name: column_names(mapped) for name, mapped in curves.items() if mapped is not None}
+    return {name: [column.removeprefix("-") for column in columns] for name, columns in named.items()}
+
+
+def _completed_map(own: GaitMap | None, tables: Sequence[MotionTable], side: Side, body_mass: float) -> Convention:
+    """Return a user's map, if any, with the curves that it leaves out as the file formats have them.
+
+    Raises DataError if the formats cannot interpret the files and the map does not name both angles.
+    """
+    if own is None:
+        return find_convention(tables, side, body_mass)
+    named, problems = _named_in(own), []
+    # The format shall not judge the units of loads whose columns the map names.
+    loads = {_COORDINATE.sub("", column) for name in LOADS for column in named.get(name, ())}
+    kept = [[name for name in table.columns if _COORDINATE.sub("", name) not in loads] for table in tables]
+    pairs = zip(tables, kept, strict=True)
+    others = [replace(table, columns={name: table.columns[name] for name in names}) for table, names in pairs]
+    try:
+        usual = find_convention(others, side, body_mass)
+    except DataError as error:
+        if not named.keys() >= set(REQUIRED):
+            raise
+        usual = Convention(own)
+        problems = [f"only the curves of the gait map are imported: {error}"]
+    columns = usual.columns.model_copy(update={name: getattr(own, name) for name in own.model_fields_set})
+    found = convention_of_map(columns, tables, side)
+    # Remarks on curves that the map replaces: by the name of the curve or of its column.
+    texts = [name.replace("_", " ") for name in named]
+    texts += [repr(column) for name, terms in _named_in(usual.columns).items() if name in named for column in terms]
+    remarks = [remark for remark in usual.remarks if not any(text in remark for text in texts)]
+    plates = () if FORCE in named else found.plates or usual.plates
+    return Convention(found.columns, plates, tuple(dict.fromkeys([*found.remarks, *remarks, *problems])))
 
 
 def _is_there(mapped: object, table: MotionTable) -> bool:
@@ -144,19 +189,15 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         raise_noted(wrong)
     wrong += [DataError(table.problem) for table in tables if table.problem]
     is_usable = not wrong
-    if settings.columns is None:
-        # Only without a map: a user's map names the columns as the file has them.
-        tables = [FORMS[table.form].arrange(table) for table in tables]
+    own = settings.columns
+    named = _named_in(own)
+    # A user's map names columns as the file has them; the convention of the format names them as arranged.
+    tables = [_arranged(table, {column for columns in named.values() for column in columns}) for table in tables]
     settings, remarks = _with_subject(settings, tables, wrong)
     # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
     body_mass = settings.body_mass or 1.0
-    own = settings.columns
     try:
-        if own is None or not own.model_fields_set >= set(REQUIRED):
-            convention = find_convention(tables, settings.side, body_mass)
-        if own is not None:
-            filled = {name: getattr(convention.columns, name) for name in REQUIRED if name not in own.model_fields_set}
-            convention = convention_of_map(own.model_copy(update=filled), tables, settings.side)
+        convention = _completed_map(own, tables, settings.side, body_mass)
     except DataError as error:
         raise_noted([*wrong, error])
     columns = convention.columns
@@ -164,12 +205,16 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         neutral = {"neutral": format_quantity(settings.ankle_neutral, "rad")}
         columns = columns.model_copy(update={"ankle_angle": columns.ankle_angle.model_copy(update=neutral)})
     # Only the columns in use: a gap elsewhere needs no word. A load of exactly 0 is a foot off the plate.
-    mapped = {name: getattr(columns, name) for name in GaitMap.model_fields if name != "schema_version"}
-    used = {name: column_names(curve) for name, curve in mapped.items() if curve is not None}
-    names = [column.removeprefix("-") for terms in used.values() for column in terms]
-    moved = [column.removeprefix("-") for name, terms in used.items() if name not in LOADS for column in terms]
+    used = _named_in(columns)
+    names = [column for terms in used.values() for column in terms]
+    moved = [column for name, terms in used.items() if name not in LOADS for column in terms]
     tables = [fill_gaps(without_lost_markers(table, moved), names, settings.longest_gap) for table in tables]
-    walk = walk_signals(tables, columns, body_mass, settings.stature, settings.columns is None, wrong)
+    walk = walk_signals(tables, columns, body_mass, settings.stature, named.keys(), wrong)
+    # The knee is one entry of a map, but two curves.
+    added = {name: each.columns for name, each in walk.items() if not {name, name.partition("_")[0]} & named.keys()}
+    if own is not None and added:
+        shown = "; ".join(f"{name} from {', '.join(map(repr, names))}" for name, names in added.items())
+        remarks.append(f"not in the gait map, read as the {settings.side} foot by the file format: {shown}")
     if not is_usable:
         raise_noted(wrong)
     if settings.body_mass is None:

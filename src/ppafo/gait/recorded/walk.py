@@ -5,7 +5,7 @@ and ankle angle of the foot relative to the shank), or, for the knee, from hip a
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -16,15 +16,7 @@ from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible_angles import SHANK_RANGE
 from ppafo.gait.recorded.columns import LOADS, CurveColumns, check_recorded, find_columns, missing_column
 from ppafo.gait.recorded.knee import knee_signals
-from ppafo.gait.recorded.mapping import (
-    AngleMap,
-    ForceMap,
-    GaitMap,
-    MomentMap,
-    PressureMap,
-    ShankMap,
-    column_names,
-)
+from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, MomentMap, PressureMap, ShankMap, column_names
 from ppafo.gait.recorded.signal import Signal, with_absence, without_ends
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
@@ -59,23 +51,23 @@ def walk_signals(
     columns: GaitMap,
     body_mass: float,
     stature: float | None,
-    is_default: bool,
+    required: Set[str],
     wrong: list[PpafoError],
 ) -> dict[str, Signal]:
     """Return the signals of a recorded walk by curve; problems with their columns are added to ``wrong``.
 
     Loads are divided by ``body_mass`` [kg] or by the body weight; ``stature`` [m] gives the length of the thigh.
 
-    For a default convention (``is_default``), only both angles are required; all curves in a map of the user are
-    required. A motion starts at its first valid sample and ends at its last; a load is 0 where it was not measured.
+    Both angles and the curves of a user's map (``required``) must have columns; the others may be absent. A motion
+    starts at its first valid sample and ends at its last; a load is 0 where it was not measured.
     Raises DataError if an angle cannot be used, with all problems in ``wrong``.
     """
     try:
-        required = {
+        angles = {
             name: [column.removeprefix("-") for column in column_names(getattr(columns, name))] for name in REQUIRED
         }
-        if not any(table.columns.keys() >= set(names) for table in tables for names in required.values()):
-            raise DataError(missing_column(required, tables))
+        if not any(table.columns.keys() >= set(names) for table in tables for names in angles.values()):
+            raise DataError(missing_column(angles, tables))
     except DataError as error:
         raise_noted([*wrong, error])
     walk: dict[str, Signal] = {}
@@ -85,7 +77,7 @@ def walk_signals(
         if mapped is None:
             continue
         with noted_in(wrong):
-            found = find_columns(name, column_names(mapped), tables, is_default and name not in REQUIRED)
+            found = find_columns(name, column_names(mapped), tables, name not in {*required, *REQUIRED})
             if found is None:
                 continue
             if not isinstance(mapped, AngleMap) or mapped.terms is not None:
@@ -100,7 +92,7 @@ def walk_signals(
             # Nothing else that is wrong matters in what is no walk.
             check_walks(walk[name], found, mapped)
     with noted_in(wrong):
-        knee = {} if columns.knee is None else knee_signals(columns.knee, tables, stature, is_default)
+        knee = {} if columns.knee is None else knee_signals(columns.knee, tables, stature, "knee" not in required)
         walk |= {name: without_ends(signal) for name, signal in knee.items()}
     if any(name not in walk for name in REQUIRED):
         raise_noted(wrong)

@@ -78,11 +78,7 @@ class BottleLife:
 
 
 def run_on_bottle(
-    run: Run,
-    device: Device,
-    supply: BottleSupply,
-    stride_time: float,
-    progress: Callable[[float, float], None],
+    run: Run, device: Device, supply: BottleSupply, stride_time: float, progress: Callable[[float, float], None]
 ) -> tuple[BatchResult, SupplyCourse]:
     """Simulate a walk on a bottle until either ends; return states and records of the walk, and the supply over time.
 

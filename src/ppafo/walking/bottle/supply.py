@@ -152,10 +152,7 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
         path = Path(name)
         is_file = path.suffix == ".toml" or is_of_catalogue(path)
         bottle = load_bottle(folder / path if is_file and not path.is_absolute() else name, own)
-    pressure, stated = device.supply.pressure, bottle.entries[_SET_PRESSURE]
-    # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
-    own_pressure = to_si(stated.value, stated.unit, "Pa_a", device.supply.atmospheric_pressure)
-    # A bottle of the package is set to the paper's pressure, which says nothing of this walk; a user's file does.
+    pressure, own_pressure = device.supply.pressure, other_pressure(path, bottle, device)
     wrong: list[PpafoError] = []
     if not is_of_bottle(device.gas.molar_mass, bottle):
         species = bottle.fluid.name
@@ -166,7 +163,7 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
                 f"choose a bottle of {device.gas.species}",
             )
         )
-    if path.suffix == ".toml" and abs(own_pressure - pressure) > _SAME_PRESSURE * pressure:
+    if own_pressure is not None:
         room = device.supply.atmospheric_pressure
         own_text, text = (shown_text(each, "Pa_a", atmosphere=room) for each in (own_pressure, pressure))
         problem = f"{name} sets {_SET_PRESSURE} to {own_text}, but supply.pressure is {text}: make both equal"
@@ -209,6 +206,17 @@ def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle
             f"reduce {BOTTLE}.fill or {BOTTLE}.temperature, or increase {BOTTLE}.volume"
         )
     return numbers
+
+
+def other_pressure(name: str | Path, bottle: Bottle, device: Device) -> float | None:
+    """Return the regulator's set pressure [Pa absolute] in a bottle file, None if it agrees with the supply pressure.
+
+    A bottle of the package is set to the paper's pressure, which does not apply to other devices: None.
+    """
+    pressure, stated = device.supply.pressure, bottle.entries[_SET_PRESSURE]
+    # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
+    own = to_si(stated.value, stated.unit, "Pa_a", device.supply.atmospheric_pressure)
+    return own if Path(name).suffix == ".toml" and abs(own - pressure) > _SAME_PRESSURE * pressure else None
 
 
 def is_of_bottle(molar_mass: float, bottle: Bottle) -> bool:

@@ -1,5 +1,7 @@
 """How a run ends and why, rests, and gas uses from recordings."""
 
+import re
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +13,10 @@ from ppafo.analyses.endurance.answer import Endurance, Endurances
 from ppafo.analyses.endurance.gas_demand import demand_of_numbers, demand_of_recording
 from ppafo.analyses.endurance.question import bottle as endurance
 from ppafo.analyses.endurance.solve import follow_bottle
+from ppafo.analyses.walk.question import walk_with_and_without
+from ppafo.cli.main import main
 from ppafo.errors import DataError, ParameterError
+from ppafo.parameters.bottles.bottle import FILE as BOTTLES
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle.coupling import Schedule
@@ -191,12 +196,52 @@ def test_a_walk_on_another_gas_than_the_bottle_holds_is_told_the_command_that_fe
     walked = ppafo.walk("proportional", minutes=0.1, overrides=["controller.vent_time=0.1 s"])
     with pytest.raises(DataError, match="the device uses CO2, but bottle 'air-48ci-3000psi' contains air") as caught:
         endurance(walked, bottle="air-48ci-3000psi")
-    told = "'ppafo walk proportional --set 'controller.vent_time=0.1 s' --set gas.species=air --out FOLDER'"
+    told = (
+        "'ppafo walk proportional --set 'controller.vent_time=0.1 s' --set gas.species=air --minutes 0.1 --out FOLDER'"
+    )
     assert told in str(caught.value)
     again = ppafo.walk("proportional", minutes=0.1, overrides=["gas.species=air"])
     lasting_on_air = endurance(again, bottle="air-48ci-3000psi", longest=20.0).found
     assert isinstance(lasting_on_air, Endurance)
     assert lasting_on_air.discharge.walking_time > 0.0
+
+
+def test_the_command_for_another_gas_carries_pressure_duration_and_bottle_of_the_walk(tmp_path: Path) -> None:
+    file = tmp_path / "air.toml"
+    shipped = (Path(str(BOTTLES.shipped)) / "air-48ci-3000psi.toml").read_text(encoding="utf-8")
+    file.write_text(
+        re.sub(r"(?s)(\[regulator\.set_pressure\]\nvalue = )\S+(\nunit = )\S+", r'\g<1>6.0\2"bar_g"', shipped)
+    )
+    for own in (None, "co2-25g"):
+        walked = ppafo.walk("proportional", minutes=0.1, bottle=own)
+        with pytest.raises(
+            DataError, match="the device uses CO2, but bottle 'air-48ci-3000psi' contains air"
+        ) as caught:
+            endurance(walked, bottle=file)
+        command = shlex.split(str(re.findall(r"'ppafo (walk .*) --out FOLDER'", str(caught.value))[0]))
+        given = ["gas.species=air", "supply.pressure=6 bar_g", *([] if own is None else [f"bottle.name={file}"])]
+        assert set(command[3:-2:2]) == set(given)
+        assert command[-2:] == ["--minutes", "0.1"]
+    # The command as it stands, on the command line: the walk runs, and the bottle then lasts for a time.
+    assert main([*command, "--out", str(tmp_path / "again")]) == 0
+    lasting = endurance(tmp_path / "again", bottle=file, longest=20.0).found
+    assert isinstance(lasting, Endurance)
+    assert lasting.discharge.walking_time > 0.0
+
+
+@pytest.mark.parametrize(
+    ("gas", "told"),
+    [
+        ("CO2", "bottle='paper-co2-9oz' to"),
+        ("air", "'air-48ci-3000psi' to"),
+        ("N2", "'n2-48ci-3000psi' to"),
+        ("He", "uses He"),
+    ],
+)
+def test_a_walk_recommends_a_bottle_of_its_own_gas(gas: str, told: str) -> None:
+    shown = str(walk_with_and_without("solenoid", overrides=[f"gas.species={gas}"], minutes=0.1))
+    assert told in shown
+    assert ("paper-co2-9oz" in shown) == (gas == "CO2")
 
 
 @pytest.mark.parametrize("typed", ["gas.species", "gas", "gas.value", "bottle.gas"])

@@ -32,8 +32,8 @@ def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Conventio
     """Return the map of the package's column names and signs; raises DataError for a left foot."""
     if side != "right":
         raise DataError(
-            "a CSV file is read as the right foot unless a gait map names both angles; omit "
-            f"{setting_text('side')}, or give such a map ({setting_text('columns')})"
+            "the package's column names in a CSV file are of the right foot; for the left foot, name columns of both "
+            f"angles in a gait map ({setting_text('columns')}), or omit {setting_text('side')}"
         )
     return Convention(package_map())
 

@@ -63,7 +63,8 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
     pairs = (tuple(_label(labels, f"{foot}{name}") for name in names) for names in zip(_KNEES, _ANKLES, strict=True))
     # Where there are none Plug-in Gait's, for the message that says so.
     usual = (f"{foot.upper()}KNE", f"{foot.upper()}ANK")
-    knee, ankle = next(((str(knee), str(ankle)) for knee, ankle in pairs if knee and ankle), usual)
+    shin = next(((str(knee), str(ankle)) for knee, ankle in pairs if knee and ankle), None)
+    knee, ankle = shin or usual
     forward, vertical, remarks = _axes(table, knee, ankle, foot, labels)
     backwards = "-" if forward.startswith("-") else ""
     angles = _label(labels, foot + _ANGLES)
@@ -71,12 +72,14 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
     ankle_remarks: tuple[str, ...] = ()
     # The model's own angle is preferred: its zero comes from a static trial.
     if angles is None and heel is not None and toe is not None:
-        angle = AngleMap(heel=heel, toe=toe, forward=forward, vertical=vertical, positive="plantarflexion")
+        # Without markers of the shank the axes are unknown: those of a gait map's shank follow later.
+        axes: dict[str, Any] = {"forward": forward, "vertical": vertical} if shin else {}
+        angle = AngleMap(heel=heel, toe=toe, positive="plantarflexion", **axes)
         ankle_remarks = (f"ankle angle from the markers {heel} and {toe}; zero from the flat foot",)
     else:
         column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
         angle = AngleMap(terms=(column,), positive="dorsiflexion", unit="deg")
-    loads, units = _load_maps(table, labels, foot, vertical, body_mass)
+    loads, units = _load_maps(table, labels, foot, vertical if shin else "", body_mass)
     columns = GaitMap(
         shank_angle=ShankMap(knee=knee, ankle=ankle, forward=forward, vertical=vertical),
         ankle_angle=angle,
@@ -139,7 +142,10 @@ def _first(labels: Sequence[str], foot: str, names: Sequence[str]) -> str | None
 def _load_maps(
     table: MotionTable, labels: Sequence[str], foot: str, vertical: str, body_mass: float
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the maps of the measured loads, each with the unit inferred from its magnitude, and remarks."""
+    """Return the maps of the measured loads, each with the unit inferred from its magnitude, and remarks.
+
+    There is no force if ``vertical``, the axis upwards, is unknown (empty).
+    """
     maps: dict[str, Any] = {}
     remarks: list[str] = []
     moment = _label(labels, foot + _MOMENTS)
@@ -149,7 +155,8 @@ def _load_maps(
         remarks += load_remarks
     reactions = (_label(labels, foot + name) for name in _REACTIONS)
     force = next(
-        (f"{name}.{vertical}" for name in reactions if name and _is_measured(table, f"{name}.{vertical}")), None
+        (f"{name}.{vertical}" for name in reactions if name and vertical and _is_measured(table, f"{name}.{vertical}")),
+        None,
     )
     if force is not None:
         unit, load_remarks = load_unit(table, force, "force", body_mass)

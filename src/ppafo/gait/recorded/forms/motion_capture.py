@@ -13,14 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import DataError, refused_as
-from ppafo.gait.recorded.delimited import (
-    NumberBlock,
-    cells_of,
-    delimiter_of,
-    lines_of,
-    rows_of,
-    table_of,
-)
+from ppafo.gait.recorded.delimited import NumberBlock, cells_of, delimiter_of, lines_of, rows_of, table_of
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import AXES, MotionTable, bare_label
