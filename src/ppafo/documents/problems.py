@@ -60,11 +60,9 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
             problems.setdefault(key.path, (key, detail))
     ordered = sorted(problems.values(), key=lambda problem: problem[1]["type"] != "extra_forbidden")
     messages = [_message(key, detail, model) for key, detail in ordered[:_MAXIMUM_PROBLEMS]]
-    for number, message in enumerate(messages[:-1]):
-        # Unknown keys of one table have the same allowed keys, which the last of them lists.
-        start, mark, allowed = message.partition("; allowed here: ")
-        if mark and messages[number + 1].endswith(mark + allowed):
-            messages[number] = start
+    # Unknown keys of one table have the same allowed keys, which the last of them lists.
+    ends = [message.partition("; allowed here: ")[2] for message in messages[1:]]
+    messages = [text.removesuffix(f"; allowed here: {end}") for text, end in zip(messages, [*ends, ""], strict=False)]
     if len(ordered) > _MAXIMUM_PROBLEMS:
         messages.append(f"and {len(ordered) - _MAXIMUM_PROBLEMS} more like these")
     if missing:

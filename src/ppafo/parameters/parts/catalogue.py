@@ -1,7 +1,7 @@
 """Catalogue of commercial parts with data-sheet figures: file layout and loading."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib import resources
@@ -16,11 +16,11 @@ from ppafo.documents.models import SchemaVersion, StrictTable, make_schema, one_
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, PpafoError, noted_in, raise_noted
-from ppafo.model.catalog import ACTUATORS, VALVES
+from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM
 from ppafo.parameters.parameter_set import allowed_number
-from ppafo.wording import argument_text, known_names, override_text
+from ppafo.wording import known_names
 
 MASS = Quantity("mass", "kg", "mass of the part, of both valves for a pair", minimum=0.0, maximum=100.0)
 RATING = Quantity(
@@ -260,41 +260,14 @@ def parse_catalogue(content: bytes, file: str) -> Catalogue:
 
     Raises ParameterError if the catalogue is not usable.
     """
-    document, wrong = _FILE.parse(content, file), list[PpafoError]()
-    tables = document["actuators"] if isinstance(document.get("actuators"), dict) else {}
-    of_lever = {quantity.name for quantity in ACTUATORS["cylinder"].quantities}
-    for name, keys in tables.items():
-        given = [key for key in keys if key in of_lever] if isinstance(keys, dict) else []
-        if given:
-            search = pressure_search("torque-task-proportional", ["device.set=cylinder-lever"], "proportional")
-            wrong.append(
-                ParameterError(
-                    f"{file}: actuators.{name}: {', '.join(given)} not allowed: a catalogue has actuators whose torque "
-                    f"is proportional to the pressure difference (vanes, torque_constant); for a lever cylinder write "
-                    f"a parameter set and {search}"
-                )
-            )
-    raise_noted(wrong)
-    parsed: Any = validate(CATALOGUE_FILE, document, file, ParameterError)
+    parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
+    wrong: list[PpafoError] = []
     groups = {
         group: {name: _part(file, group, name, table, wrong) for name, table in getattr(parsed, group).items()}
         for group in GROUPS
     }
     raise_noted(wrong)
     return Catalogue(file, parsed.name, parsed.title, parsed.notes, groups)
-
-
-def pressure_search(scenario: str, overrides: Iterable[str], valve: str) -> str:
-    """Return the remedy for an actuator that design cannot size: a search of the supply pressure with a scenario.
-
-    ``valve`` is the kind of the scenario's valve: the gain of ``damped_proportional`` follows the device.
-    """
-    controllers = ["controller.kind=damped_proportional"] if valve == "proportional" else []
-    changes = override_text([*overrides, *controllers])
-    vary, goal = "supply.pressure=20..120 psi_g", "rms_error <= 0.5 N m"
-    words = [changes, argument_text("vary", vary), argument_text("such_that", goal)]
-    python, command = f"ppafo.find({', '.join([repr(scenario), *words])})", f"ppafo find {scenario} {' '.join(words)}"
-    return f"search its supply pressure: {command if words[1].startswith('--') else python}"
 
 
 def _part(file: str, group: str, name: str, parsed: Any, wrong: list[PpafoError]) -> Part:

@@ -348,9 +348,10 @@ def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
         margins.append((name, *fractions, ", ".join(gains) or "none to choose"))
     fraction = Kind(quantity="fraction", form=".0f")
     head: list[str | tuple[str, Kind]] = ["valve", *((f"{name} margin", fraction) for name in _MARGINS), "gains"]
-    chosen = () if sizing.suggested is None else (sizing.suggested,)
     return (
-        finding.Section("Valves", columns_of(_HEAD, rows), marked=chosen),
+        finding.Section(
+            "Valves", columns_of(_HEAD, rows), marked=() if sizing.suggested is None else (sizing.suggested,)
+        ),
         finding.Section("Margins" if margins else "", columns_of(head, margins), marked=marked),
     )
 
@@ -360,19 +361,16 @@ def suggestion_sentence(sizing: Sizing) -> str:
     choice = sizing.choice
     if choice is None:
         working = [sized for sized in sizing.valves if sized.works]
-        said = "valves keep the error limit, but no bottle holds enough gas for the requested use"
-        peaks = (
-            f"; {sized.valve.name} at {PRESSURE.text(sized.pressure)}, {cut}"
-            for sized in working or sizing.valves
-            if (cut := _cut_peak(sizing, sized))
-        )
-        nothing = "no valve keeps the error limit at any of the pressures"
-        return f"no suggestion: {said if working else nothing}{''.join(peaks)}"
+        kept = "valves keep the error limit, but no bottle holds enough gas for the requested use"
+        reasons = [kept if working else "no valve keeps the error limit at any of the pressures"]
+        reasons += [
+            f"{sized.valve.name}{cut}" for sized in working or sizing.valves if (cut := _cut_peak(sizing, sized))
+        ]
+        return f"no suggestion: {'; '.join(reasons)}"
     bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
-    cut = _cut_peak(sizing, choice)
     return (
         f"suggested: {choice.valve.name} at {PRESSURE.text(choice.pressure)}{bottle}, the lightest that lasts "
-        f"and keeps the error limit{f', {cut}' if cut else ''}, {_MASS.text(choice.mass or 0.0, '.0f')}; a lower "
+        f"and keeps the error limit{_cut_peak(sizing, choice)}, {_MASS.text(choice.mass or 0.0, '.0f')}; a lower "
         f"pressure is prevented by {LIMITS[choice.limit]}"
     )
 
@@ -380,15 +378,13 @@ def suggestion_sentence(sizing: Sizing) -> str:
 def _cut_peak(sizing: Sizing, sized: SizedValve) -> str:
     """Return the fraction of the peak torque that a valve's pressure cuts off, with a remedy; "" for a whole peak."""
     problem, largest = sizing.problem, sizing.problem.profile.largest
-    most = ceiling(problem, sized.pressure)
-    cut = 1.0 - most / largest
+    cut = 1.0 - ceiling(problem, sized.pressure) / largest
     if cut <= _WHOLE_PEAK or np.isnan(sized.error):
         return ""
     whole, rated = problem.atmosphere + largest / problem.torque_constant, rated_pressure(sized.valve, *problem.carried)
-    needs = f"pressure.lowest = '{PRESSURE.text(whole)}'"
+    higher = " and a higher pressure.highest" * bool(whole >= problem.highest_pressure)
+    needs = f"pressure.lowest = '{PRESSURE.text(whole)}'{higher}"
     if whole > rated:
         needs = f"{PRESSURE.text(whole)}, but its parts are rated for {PRESSURE.text(rated)}: name other parts"
-    elif whole >= problem.highest_pressure:
-        needs += " and a higher pressure.highest"
-    at_most = f"at most {TORQUE.text(most)} of {TORQUE.text(largest)}; the whole peak needs {needs}"
-    return f"with {100.0 * cut:.0f} % of the peak cut off ({at_most})"
+    at_most = f"at most {TORQUE.text((1.0 - cut) * largest)} of {TORQUE.text(largest)}; the whole peak needs {needs}"
+    return f", with {100.0 * cut:.0f} % of the peak cut off ({at_most})"

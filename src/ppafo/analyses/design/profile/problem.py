@@ -17,7 +17,7 @@ from ppafo.documents.toml_text import beside
 from ppafo.errors import DataError, PpafoError, StudyError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.loading import reloaded
 from ppafo.parameters.parts import Part, load_catalogue
-from ppafo.parameters.parts.catalogue import DEFAULT, pressure_search
+from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
@@ -27,6 +27,7 @@ from ppafo.units import parse_quantity, split_quantity
 _TORQUE = "N m"
 _ROUNDING = 1.0e-9
 """Fraction of the range of a profile below which a difference counts as rounding."""
+_FOR_A_LEVER = "; search supply.pressure by 'ppafo find' with controller.kind=damped_proportional"
 _MOMENT = 1.0e-5
 """Duration [s] of the torque step between two repetitions if the end differs from the start."""
 
@@ -298,12 +299,10 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
             source = catalogue if catalogue.groups[group] else load_catalogue()
             chosen[group].append(source.part(group, name))
     kind = scenario.device.valve.kind
-    others = {name: f"scenario = 'torque-task-{name}'" for name in ("proportional", "solenoid")}
     wrong += [
         StudyError(
             f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{scenario.name}' "
-            f"needs a {kind} valve; a design file compares valves of one kind: name '{valve.name}' in a second file, "
-            f"with {others.get(valve.kind, f'a scenario that has a {valve.kind} valve')}"
+            f"needs a {kind} valve; name it in a second file (scenario torque-task-proportional or -solenoid)"
         )
         for valve in chosen["valves"]
         if valve.kind != kind
@@ -359,9 +358,7 @@ def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file:
     """Load the scenario with the profile as its reference; it ends with a whole controller and output sample."""
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
-    plain.device.check_torque_constant(
-        "the size of a device", f"; {pressure_search(str(name), document.overrides, plain.device.valve.kind)}"
-    )
+    plain.device.check_torque_constant("the size of a device", _FOR_A_LEVER)
     if plain.controller.is_open_loop:
         raise StudyError(
             f"{file}: scenario '{plain.name}' has no reference (controller.kind = "
