@@ -71,6 +71,7 @@ def test_the_probability_over_wearers_is_that_of_the_draws_below_the_limit() -> 
     assert 0.3 < above.mean() < 0.9
 
 
+@pytest.mark.thorough
 def test_the_push_off_is_tuned_for_the_bad_end_of_people() -> None:
     problem = load_tuning("push-off")
     assert problem.spread is not None

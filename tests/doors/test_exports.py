@@ -67,6 +67,7 @@ def printed(folder: Path, files: dict[str, bytes]) -> tuple[dict[str, Floats], d
     return channels, {name: float(value or "nan") for name, value in metrics.items()}
 
 
+@pytest.mark.thorough
 @needs_gcc
 @pytest.mark.parametrize("case", parameters(EXPORTED))
 def test_a_program_in_c_has_the_bits_of_python(case: Case, tmp_path: Path) -> None:
@@ -108,6 +109,7 @@ def of_both_versions() -> list[Any]:
     ]
 
 
+@pytest.mark.thorough
 @needs_gcc
 @pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")
 @pytest.mark.usefixtures("quick_units", "_of_one_text")

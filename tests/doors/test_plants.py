@@ -47,6 +47,7 @@ def replayed(file: str, time: Floats, channels: dict[str, Floats]) -> dict[str, 
     return dict(zip(names, np.array(rows).T, strict=True))
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("quick_units")
 @pytest.mark.parametrize("case", parameters())
 def test_a_plant_under_recorded_inputs_has_the_bits_of_the_loop(case: Case, tmp_path: Path) -> None:

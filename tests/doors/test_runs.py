@@ -32,6 +32,7 @@ from tests.doors.table import CASES, Case
 VARIED = "supply.pressure"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", parameters())
 def test_compiled_code_has_the_bits_of_python(case: Case) -> None:
     answer, found = python_answer(case), answer_of(compiled_result(case))
@@ -47,6 +48,7 @@ def of_ensembles() -> list[Any]:
     return [parameter(case, suite="long" if case.suite == "short" and case.walks else "") for case in CASES]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", of_ensembles())
 def test_a_run_of_an_ensemble_has_the_bits_of_the_run_alone(case: Case) -> None:
     """Among others, of which one has another supply; those of short vanes are run by Python, which is quick enough."""
@@ -66,6 +68,7 @@ def test_a_run_of_an_ensemble_has_the_bits_of_the_run_alone(case: Case) -> None:
     assert acts or answer.channels["supplied_mass"][-1] == 0.0, "the supply acts where gas is taken from it"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", parameters())
 def test_a_result_that_was_stored_is_read_with_its_bits(case: Case, tmp_path: Path) -> None:
     answer = python_answer(case)

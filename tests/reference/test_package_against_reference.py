@@ -25,7 +25,8 @@ COSTLY = {"dead volumes": (range(3), range(3, 5)), "loops without friction": (ra
 """The same of families whose reference takes many seconds for each."""
 
 
-@pytest.mark.parametrize("part", [0, pytest.param(1, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("part", [0, 1])
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name != "mixed"])
 def test_determined_draws_are_within_the_limits(family: str, part: int) -> None:
     draws = COSTLY.get(family, DRAWS)[part]

@@ -100,6 +100,7 @@ COPIES: dict[str, Callable[[Any], Any]] = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", [*MADE, *IN_A_FOLDER])
 def test_a_result_can_be_pickled_and_copied_and_still_prints_and_draws_itself(name: str, tmp_path: Path) -> None:
     result = MADE[name]() if name in MADE else IN_A_FOLDER[name](tmp_path)

@@ -167,6 +167,7 @@ def batches(name: str, overrides: tuple[str, ...]) -> list[tuple[Values, Batch]]
     return found
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "overrides"), VARIED)
 def test_c_makes_the_numbers_of_a_walk_that_python_makes(name: str, overrides: tuple[str, ...], tmp_path: Path) -> None:
     library = built(name, overrides, tmp_path)

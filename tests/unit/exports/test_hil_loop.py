@@ -185,6 +185,7 @@ def test_an_answer_to_something_else_does_nothing_but_be_counted(run: int, shift
 SHARES = st.sampled_from([0.0, 0.02, 0.2, 0.6, 1.0])
 
 
+@pytest.mark.thorough
 @settings(max_examples=8)
 @given(st.builds(faults, SHARES, SHARES, SHARES, SHARES), st.integers(0, 2**32), st.booleans())
 def test_no_disturbance_of_the_wire_crashes_or_holds_pressure(fault: Fault, seed: int, is_stream: bool) -> None:

@@ -30,6 +30,7 @@ MOVED = (
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
 
 
+@pytest.mark.thorough
 @needs_node
 @pytest.mark.parametrize("name", list_scenarios())
 def test_a_module_gives_the_bits_of_python(name: str) -> None:
@@ -156,6 +157,7 @@ def as_it_is(number: float) -> float:
     return number
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("place", "value"),
     [
