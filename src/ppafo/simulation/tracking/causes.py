@@ -64,6 +64,8 @@ _LARGER_VALVES = (3.0, 10.0, 100.0, 2000.0)
 """Factors by which a valve is enlarged in a trial; the last one for a unit mistaken by 1000 [-]."""
 _USUAL_RATE = 1000.0
 """Rate assumed for the paper's controller of a proportional valve [Hz]."""
+_MOVING = 0.02
+"""Range of the angle [rad] above which the volumes of the chambers are not constant."""
 _QUICKER = 1.3
 """Loop rate at an angle, divided by the rate used for the gains, above which it causes oscillation [-]."""
 
@@ -147,7 +149,9 @@ def oscillation(case: Case) -> TrackingCause | None:
             "the controller is too fast for the delays of the loop", (), "reduce its gains or use a slower controller"
         )
     sensors = scenario.sensors
-    reason = "its value is computed at constant volume and without load, so the motion of the joint causes it"
+    reason = "the loop has delays that this gain does not include"
+    if np.ptp(visited) > _MOVING:
+        reason = "it is computed at constant volume and without load, but the joint moves"
     if sensors.delay or scenario.supply_lines is not None:
         reason = "the delay of sensors or supply lines causes it"
     if sensors.angle_noise or sensors.pressure_noise:
