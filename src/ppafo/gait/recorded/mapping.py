@@ -205,7 +205,10 @@ def opensim_map(side: Side) -> GaitMap:
 
 def load_map(path: str | Path) -> GaitMap:
     """Load a gait map from a TOML file; raises DataError if it cannot be used."""
-    return read_model(_FILE, GaitMap, path)[0]
+    loaded = read_model(_FILE, GaitMap, path)[0]
+    if loaded.model_fields_set <= {"schema_version"}:
+        raise DataError(f"{path}: the gait map has no curve; add a table such as [ankle_angle], or omit the map")
+    return loaded
 
 
 json_schema = partial(make_schema, GaitMap, "ppafo gait map")
