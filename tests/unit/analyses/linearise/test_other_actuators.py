@@ -62,7 +62,7 @@ def test_the_columns_of_a_linear_model_are_differences_of_its_rates(case: str) -
     plant = plant_of(run, way, known)
     for column, variable in enumerate(model.states):
         step = 1.0e-6 * max(abs(variable.value), 1.0)
-        more, less = (plant.at({**known, variable.name: variable.value + sign * step}).rates for sign in (1, -1))
+        more, less = (plant.at({**known, variable.name: variable.value + sign * step})[0] for sign in (1, -1))
         difference = np.array([(more[item.name] - less[item.name]) / (2.0 * step) for item in model.states])
         scale = np.max(np.abs(difference)) + 1e-9
         assert model.a[:, column] == pytest.approx(difference, abs=1e-4 * scale), variable.name
