@@ -144,7 +144,7 @@ def _load(
     """Build a study from a document, into which changes, draws and seed from the command line are written."""
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():
-        # The key tells the kind, which files leave out.
+        # Files omit the kind of a table with the key `same_as`.
         if isinstance(table, dict) and "same_as" in table:
             table.setdefault("kind", "same_as")
     parsed = validate(declared.StudyFile, document, source.file, StudyError)
