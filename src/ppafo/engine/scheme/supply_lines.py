@@ -76,7 +76,15 @@ def with_lines(linear: Linearisation, ratio_1: float, ratio_2: float) -> Lineari
     a, d = linear.a - added_1, linear.d - added_2
     scale = 1.0 / (a * d - linear.b * linear.c)
     supplied_by_1, supplied_by_2 = linear.supplied_by_1 + added_1, linear.supplied_by_2 + added_2
-    return Linearisation(a, linear.b, linear.c, d, scale, supplied_by_1, supplied_by_2)
+    return Linearisation(
+        a=a,
+        b=linear.b,
+        c=linear.c,
+        d=d,
+        scale=scale,
+        supplied_by_1=supplied_by_1,
+        supplied_by_2=supplied_by_2,
+    )
 
 
 def begin_fed_gas(
