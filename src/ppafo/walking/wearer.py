@@ -142,6 +142,7 @@ _SHARES: Mapping[str, float] = {
 } | {"shank_length": SHANK_SHARE}
 """Numbers of the paper subject's leg divided by the powers of body mass and stature from ``SCALING``."""
 
+
 class _SegmentParts(NamedTuple):
     """Number of a segment divided by the powers of body mass and stature with which the number scales."""
 
