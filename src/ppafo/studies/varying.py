@@ -65,7 +65,9 @@ class VariedPath:
         if not is_within(number, self.quantity):
             given = split_quantity(value)[1] if isinstance(value, str) else ""
             raise UnitError(f"{self.path} {range_rule(self.quantity, given)}")
-        return _parse(str(value), self.quantity, 0.0) if self.is_gauge else number
+        if self.is_gauge:
+            return in_first_unit(self.quantity, lambda unit: parse_quantity(str(value), unit, 0.0))
+        return number
 
     def distance(self, value: str | float) -> float:
         """Convert a difference of two values of the path to SI, such as a standard deviation."""

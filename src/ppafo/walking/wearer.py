@@ -125,9 +125,26 @@ def scaled(leg: Wearer | LegParameters, mass: Any, stature: Any) -> dict[str, An
 
 def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
     """Return the leg of a wearer as parameters of the engine."""
-    of_heel = {"heel_lever": rocker.raised, "flat_heel_lever": rocker.flat, "heel_roll_angle": rocker.half}
-    of_wearer = {name: getattr(wearer, name) for name in LegParameters._fields if hasattr(wearer, name)}
-    return LegParameters(**{**of_wearer, **of_heel}, gravity=STANDARD_GRAVITY)
+    return LegParameters(
+        shank_length=wearer.shank_length,
+        shank_mass_centre=wearer.shank_mass_centre,
+        shank_mass=wearer.shank_mass,
+        shank_inertia=wearer.shank_inertia,
+        foot_mass_centre=wearer.foot_mass_centre,
+        foot_mass=wearer.foot_mass,
+        foot_inertia=wearer.foot_inertia,
+        body_mass=wearer.body_mass,
+        ankle_stiffness=wearer.ankle_stiffness,
+        ankle_rest_angle=wearer.ankle_rest_angle,
+        ankle_damping=wearer.ankle_damping,
+        residual_share=wearer.residual_share,
+        keeps_gait=wearer.keeps_gait,
+        heel_lever=rocker.raised,
+        flat_heel_lever=rocker.flat,
+        heel_roll_angle=rocker.half,
+        toe_lever=wearer.toe_lever,
+        gravity=STANDARD_GRAVITY,
+    )
 
 
 def paper_subject() -> Wearer:
