@@ -751,10 +751,10 @@ def test_the_largest_error_is_said_where_it_decided() -> None:
     assert run.tracking.allowed == pytest.approx(math.radians(4.0), rel=1e-3)
 
 
-def test_a_swing_that_a_law_causes_itself_is_not_blamed_on_its_valves(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(ppafo.__file__).parent / "examples" / "add-a-controller"))
+def test_a_swing_that_a_law_causes_itself_is_not_blamed_on_its_valves() -> None:
+    file = Path(ppafo.__file__).parent / "examples" / "add-a-controller" / "my_laws" / "hysteresis.py"
     law = ["controller.kind=my_laws.hysteresis:KIND", "reference.level=3 N m"]
-    scenario = load_scenario(TASK, [*law, "controller.band=1 N m"])
+    scenario = load_scenario(TASK, [*law, "controller.band=1 N m"], plugins=[file])
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     # Twice the band, and what the valves add on either side in their dead time.
@@ -763,4 +763,4 @@ def test_a_swing_that_a_law_causes_itself_is_not_blamed_on_its_valves(monkeypatc
         "`hysteresis` itself lets it swing, by `band = 1 N m`: the valves cause a step of only"
     )
     (narrower,) = verdict.mended
-    assert simulate(load_scenario(TASK, [*law, narrower])).tracking is None
+    assert simulate(TASK, [*law, narrower], plugins=[file]).tracking is None
