@@ -301,7 +301,8 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     wrong += [
         StudyError(
             f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{scenario.name}' "
-            f"needs a {kind} valve; name it in a second file (scenario torque-task-proportional or -solenoid)"
+            f"needs a {kind} valve; name it in a second file, with scenario = 'torque-task-"
+            f"{valve.kind.partition('_')[0]}' and overrides = ['device.valve={valve.kind}']"
         )
         for valve in chosen["valves"]
         if valve.kind != kind
