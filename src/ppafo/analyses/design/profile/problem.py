@@ -324,7 +324,6 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     use = document.use
     if (use.repetitions is None) == (use.hours is None):
         raise StudyError(f"{file}: [use]: give either repetitions or hours")
-    hours = _SECONDS_PER_HOUR * float(use.hours or 0.0)
     limit = document.limits.rms_error
     try:
         relative = split_quantity(limit)[1] in ("%", "percent")
@@ -340,7 +339,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
         scenario=scenario,
         profile=profile,
         simulated=document.simulated,
-        repetitions=float(use.repetitions) if use.repetitions else hours / profile.period,
+        repetitions=float(use.repetitions or _SECONDS_PER_HOUR * float(use.hours or 0.0) / profile.period),
         reserve=use.reserve,
         largest_error=largest_error,
         valves=tuple(chosen["valves"]),
