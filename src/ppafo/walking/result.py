@@ -69,11 +69,7 @@ def led_leg(run: Run) -> Walk:
 
 
 def recording_of_walk(
-    configuration: Scenario,
-    run: Run,
-    time: Floats,
-    record: Mapping[str, Floats],
-    supply: SupplyCourse | None = None,
+    configuration: Scenario, run: Run, time: Floats, record: Mapping[str, Floats], supply: SupplyCourse | None = None
 ) -> Recording:
     """Return the recording of a walk [SI] from its rows (samples,) by path at these times [s] and its supply."""
     led, plant, actuator = led_leg(run), run.plant, run.program.actuator
@@ -364,10 +360,7 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
     motion, control, law = walk_of(scenario), scenario.controller.kind, scenario.law
     needs = kind.needs
     reasons = (
-        (
-            bool(kind.of_reference),
-            "a walk has no single torque reference; push_off_error is the error in push-off",
-        ),
+        (bool(kind.of_reference), "a walk has no single torque reference; push_off_error is the error in push-off"),
         (bool(kind.traced), "the metric needs the whole run over time, which a walk does not keep"),
         (LED_SHANK in needs, "the metric needs a leg without ground contact, whose shank follows a gait"),
         (

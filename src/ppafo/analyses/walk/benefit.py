@@ -36,6 +36,8 @@ _STIFFER = (2.0, 4.0)
 """Factors on the stiffness with which a controller lifts the foot, tried if the requested torque is too small."""
 _NEARLY = 0.95
 """Ratio of a torque to its limit from which the limit counts as reached [-]."""
+_EXAMPLE = " (an example, no limit)"
+"""Words behind a remedy: the numbers that were tried are not the least ones that suffice."""
 _MINUTES = 0.15
 """Duration of a walk with a remedy [min]: a few strides after the transient."""
 _AFTER_TOE_LOAD = 0.02
@@ -92,7 +94,7 @@ def _remedied(worn: WalkResult, drags: bool) -> str:
             toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
             if again.status.is_completed and again.is_helped and work > 0.0 and (toes >= 0.0 or not drags):
                 gain = f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}"
-                return f"; {cause}: with {_changed(overrides)}, {gain}, simulated in another walk"
+                return f"; {cause}: with {_changed(overrides)}, {gain}, simulated in another walk{_EXAMPLE}"
     return f"; {cause}, and {advice}"
 
 
@@ -119,7 +121,7 @@ def _later_flat_foot(worn: WalkResult) -> list[str]:
             again = walk(reloaded(worn.scenario, overrides), minutes=_MINUTES)
             if again.status.is_completed and again.is_helped:
                 cause = f"the toes count as loaded up to {latest:.2g} strides after heel strike"
-                return [f"{cause}: with {_changed(overrides)}, {again.help_text}, simulated in another walk"]
+                return [f"{cause}: with {_changed(overrides)}, {again.help_text}, simulated in another walk{_EXAMPLE}"]
     return []
 
 
