@@ -11,8 +11,7 @@ from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_uni
 from ppafo.rig.folder import RIG_FILE
 from ppafo.storage.owned_folder import MARK, entries_of, marking_command, read_json
 from ppafo.storage.reading import read_recording
-from ppafo.storage.result_folder import NETCDF_FILE, RUN_FILE
-from ppafo.study.manifest import MANIFEST
+from ppafo.storage.result_folder import MANIFEST, NETCDF_FILE, RUN_FILE
 from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:

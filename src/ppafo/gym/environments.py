@@ -20,6 +20,19 @@ PICTURE = "rgb_array"
 """Render mode of Gymnasium for pictures."""
 
 
+def _state_of(environment: Any) -> dict[str, Any]:
+    """Return the state of an environment for copies and pickle: task and settings, and the episodes."""
+    return {**vars(environment), "_lanes": environment._lanes.state()}
+
+
+def _resume(environment: Any, state: dict[str, Any]) -> None:
+    """Restore the state of a copy or a pickle, in new lanes."""
+    lane_state: Mapping[str, Any] = state["_lanes"]
+    lanes = state["world"].lanes(len(lane_state["actions"]))
+    lanes.resume(lane_state)
+    vars(environment).update(state, _lanes=lanes)
+
+
 class PneumaticEnv(gymnasium.Env[Observations, Any]):
     """Single environment: device commanded by an agent, with a step per sample period of its scenario or walk.
 
@@ -49,16 +62,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._period = 0.0
         self._frames: list[EpisodeFrame] = []
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the state for pickle: task and settings, and the episode."""
-        return {**vars(self), "_lanes": self._lanes.state()}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore the state of a copy or a pickle."""
-        self.__dict__.update(state)
-        if isinstance(self._lanes, Mapping):
-            lane_state, self._lanes = self._lanes, self.world.lanes(1)
-            self._lanes.resume(lane_state)
+    __getstate__, __setstate__ = _state_of, _resume
 
     def reset(
         self,
@@ -144,16 +148,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._last: Observations = np.zeros(self.observation_space.shape, dtype=np.float32)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the state for pickle: task and settings, and the episodes."""
-        return {**vars(self), "_lanes": self._lanes.state()}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore the state of a pickle, in new environments."""
-        self.__dict__.update(state)
-        if isinstance(self._lanes, Mapping):
-            lane_state, self._lanes = self._lanes, self.world.lanes(self.num_envs)
-            self._lanes.resume(lane_state)
+    __getstate__, __setstate__ = _state_of, _resume
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None

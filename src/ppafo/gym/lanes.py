@@ -101,7 +101,6 @@ class Environments:
     def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: RewardWeights) -> None:
         self.count = count
         self._clock, self._judging = clock, judging
-        self._program, self._task = program, task
         # Lanes in whole vectors: a few environments need no block of full width.
         width = min(lanes_of(program), -(-count // VECTOR) * VECTOR)
         blocks = -(-count // width)
@@ -132,13 +131,6 @@ class Environments:
             own = self._own[block], self._chosen[block]
             judge = with_arrays(module.judge, states, parameters, *own, *shown, signals)
             self._blocks.append((command, advance, judge))
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Environments":
-        """Return independent environments in the same state; they share the compiled program."""
-        other = Environments(self._program, self._clock, self._task, self.count, self._judging)
-        other.resume(self.state())
-        memo[id(self)] = other
-        return other
 
     def state(self) -> dict[str, Floats | int]:
         """Return the variable state: copies of the arrays, and the step number."""

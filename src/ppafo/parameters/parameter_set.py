@@ -2,7 +2,7 @@
 
 import contextlib
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -314,10 +314,15 @@ def with_followers(parameter_set: ParameterSet) -> ParameterSet:
 
 def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
     """Convert the value of an entry to the SI unit of its quantity. Raises UnitError for a wrong dimension."""
-    refused: UnitError | None = None
+    return in_first_unit(quantity, lambda unit: to_si(entry.value, entry.unit, unit, atmosphere))
+
+
+def in_first_unit(quantity: Quantity, convert: Callable[[str], float]) -> float:
+    """Convert to the first SI unit of a quantity that ``convert`` accepts. Raises UnitError for a wrong dimension."""
+    refused: UnitError | None = None  # the first refusal: it names the unit that the declaration prefers
     for unit in alternatives(quantity):
         try:
-            return to_si(entry.value, entry.unit, unit, atmosphere)
+            return convert(unit)
         except UnitError as error:
             refused = refused or error
     raise refused or UnitError(f"'{quantity.name}' has no unit")

@@ -121,13 +121,7 @@ def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary
     """Update the start of the final hold in the summary of a monotone reference, with a new sample."""
     # Sample by sample, because a run is not kept; the last value and the largest are known from the profile before.
     away = is_away(sample.reference, course.last, course.tolerance)
-    return ReferenceSummary(
-        last=course.last,
-        largest=course.largest,
-        tolerance=course.tolerance,
-        hold_start=sample.number + 1.0 if away else course.hold_start,
-        samples=course.samples,
-    )
+    return course._replace(hold_start=sample.number + 1.0 if away else course.hold_start)
 
 
 @dataclass(frozen=True, slots=True)

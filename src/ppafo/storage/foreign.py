@@ -3,6 +3,7 @@
 Error messages name file, line and column of an invalid cell, and the key of an error in the map.
 """
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +24,8 @@ from ppafo.wording import one_line
 
 _SHORTEST = 1e-12
 """Least time [s] between the two means of samples that give a slope; a shorter time is rounding."""
-_MASS_FLOW = "kg/s"
+_MASS_FLOW, _SAME_DENSITY = "kg/s", 5.0e-3
+"""Unit of a mass flow, and relative difference [-] below which two reference densities count as the same."""
 
 
 def read_foreign(
@@ -142,16 +144,22 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     """Return the unit of a channel; a volume flow measured as mass flow gets its reference condition and gas."""
     from ppafo.units import flow_of, is_volume_flow, with_condition
-    from ppafo.units.reference import without_condition
+    from ppafo.units.reference import condition_and_gases, read_unit, without_condition
 
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
         if mapped.at is not None or mapped.gas is not None:
             raise UnitError("'at' and 'gas' are allowed only for a volume flow, such as 'L/min'")
         return unit
-    if mapped.at is None and not flow_of(unit)[1]:
+    flow, words, _ = flow_of(unit)
+    condition, gases = condition_and_gases(words)
+    if not (mapped.at or condition):
         raise UnitError(without_condition(unit, gas))
-    return with_condition(unit, mapped.at, mapped.gas or gas) if mapped.at else unit
+    by_unit = with_condition(unit, mapped.at or "", mapped.gas or gas)
+    by_map = with_condition(flow, mapped.at or condition, mapped.gas or "".join(gases[:1]) or gas)
+    if not math.isclose(read_unit(by_unit)[0].scale, read_unit(by_map)[0].scale, rel_tol=_SAME_DENSITY):
+        raise UnitError(f"means '{by_map}' by 'at' and 'gas', but '{by_unit}' by 'unit'; give each only once")
+    return by_unit
 
 
 def _time(mapped: MappedChannel, table: MappedTable, atmosphere: float) -> Floats:

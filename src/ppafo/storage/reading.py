@@ -9,7 +9,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, refused_as
 from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import read_csv
-from ppafo.storage.result_folder import CSV_FILE, NETCDF_FILE, RUN_FILE, read_document, read_stored
+from ppafo.storage.result_folder import CSV_FILE, MANIFEST, NETCDF_FILE, RUN_FILE, read_document, read_stored
 from ppafo.wording import argument_text
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def read_recording(
 
         column_map, map_name = column_map_of(columns)
         return read_foreign(file, column_map, atmosphere=atmosphere, map_name=map_name)
-    if file.is_dir() and (file / RUN_FILE).exists():
+    if file.is_dir() and ((file / RUN_FILE).exists() or (file / MANIFEST).exists()):
         return read_stored(file).recording
     if file.is_dir():
         if not (file / NETCDF_FILE).is_file():

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RUN_FILE = "run.json"
+MANIFEST = "study.json"
 NETCDF_FILE = "recording.nc"
 CSV_FILE = "recording.csv"
 FORMAT = "ppafo result"
@@ -118,6 +119,8 @@ def read_stored(folder: str | Path) -> StoredResult:
             f"{folder}: is a result of 'ppafo {command}', not of a run; use its JSON file for numbers, read_recording "
             "for a recording in it, and 'ppafo export figure' for its figures"
         )
+    if not (folder_path / RUN_FILE).is_file() and (folder_path / MANIFEST).is_file():
+        raise DataError(f"{folder}: contains the results of a study, not of a run; read them by load_study_results")
     document = read_document(folder_path)
     if sha256(read_bytes(folder_path / NETCDF_FILE)).hexdigest() != document["recording"].get("sha256"):
         # Refused before it is opened: the HDF5 library can hang on a damaged one.

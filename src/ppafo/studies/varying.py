@@ -11,9 +11,9 @@ import numpy as np
 from ppafo.errors import ScenarioError, UnitError, refused_as
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import alternatives, fits, is_within, range_rule
+from ppafo.parameters.declaration import fits, is_within, range_rule
 from ppafo.parameters.graph import counts_from, gauge_link
-from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, unit_in
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, in_first_unit, unit_in
 from ppafo.simulation.document import PLAIN
 from ppafo.simulation.hardware import parameter_set_of
 from ppafo.simulation.numbers import WHOLE_NUMBERS, declared_numbers, number_at
@@ -65,7 +65,9 @@ class VariedPath:
         if not is_within(number, self.quantity):
             given = split_quantity(value)[1] if isinstance(value, str) else ""
             raise UnitError(f"{self.path} {range_rule(self.quantity, given)}")
-        return _parse(str(value), self.quantity, 0.0) if self.is_gauge else number
+        if self.is_gauge:
+            return in_first_unit(self.quantity, lambda unit: parse_quantity(str(value), unit, 0.0))
+        return number
 
     def distance(self, value: str | float) -> float:
         """Convert a difference of two values of the path to SI, such as a standard deviation."""
@@ -83,23 +85,12 @@ class VariedPath:
 
     def _in_si(self, value: str | float, quantity: Quantity) -> float:
         if isinstance(value, str):
-            return _parse(value, quantity, self.atmosphere)
+            return in_first_unit(quantity, lambda unit: parse_quantity(value, unit, self.atmosphere))
         if quantity.unit not in PLAIN:
             raise UnitError(
                 f"has no unit; write the number and its unit in quotes, with a unit such as {quantity.unit}"
             )
         return float(value)
-
-
-def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
-    """Convert a text to SI; accepts every unit that a parameter set may use for the quantity."""
-    refused: UnitError | None = None  # the first refusal: it names the unit that the declaration prefers
-    for unit in alternatives(quantity):
-        try:
-            return parse_quantity(text, unit, atmosphere)
-        except UnitError as error:
-            refused = refused or error
-    raise refused or UnitError(f"'{quantity.name}' has no unit")
 
 
 def varied_path(path: str, scenario: Scenario) -> VariedPath:

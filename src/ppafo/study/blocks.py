@@ -5,6 +5,7 @@ fastest), and within a grid point draw by draw. A chunk never contains runs of t
 """
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,12 +22,12 @@ _FEWEST_RUNS_OF_CHUNK = 512
 """Smallest number of runs of a chunk when its size is reduced to limit memory or time."""
 _CHUNKS_OF_SMALL_STUDY, _FEWEST_STEPS = 16, 2**22
 """Number of chunks of each configuration of a small study, so that an interrupt loses little, and smallest number of
-time steps of such a chunk: some tenths of a second of processor time."""
+time steps of a full chunk, which keeps the processors busy: some tenths of a second to some seconds."""
 _MAXIMUM_STEPS = 2**25
 """Largest number of time steps, summed over runs, between two progress reports: some seconds of processor time."""
-_SLOW_RUNS_OF_CHUNK = 64
-"""Number of runs of a chunk with a Python controller: a few seconds, so that an interrupt loses little. Also the
-smallest number of runs of an automatic chunk, which keeps two processors busy."""
+_FIRST_RUNS_OF_CHUNK = 64
+"""Number of runs of the first chunk of a configuration, and of every chunk with a Python controller. Later chunks
+double up to the full size, so that an interrupt loses at most about half of the computing time."""
 _MAXIMUM_BYTES_OF_TRACES = 48_000_000
 """Largest size of the traces of a chunk during computation [bytes]."""
 
@@ -50,17 +51,14 @@ def chunk_size(study: Study) -> int:
     if study.runs_of_chunk is not None:
         return study.runs_of_chunk
     if any(configuration.scenario.controller.custom is not None for configuration in study.configurations):
-        return _SLOW_RUNS_OF_CHUNK
-    bytes_of_run = (
-        8 * len(study.outputs.traces) * max(samples_of(study, configuration) for configuration in study.configurations)
-    )
+        return _FIRST_RUNS_OF_CHUNK
+    numbers = len(study.outputs.traces) * max(samples_of(study, each) for each in study.configurations)
     size = min(runs_at_once(configuration.scenario, MAXIMUM_RUNS_OF_CHUNK) for configuration in study.configurations)
-    while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:
+    while size > _FEWEST_RUNS_OF_CHUNK and 8 * size * numbers > _MAXIMUM_BYTES_OF_TRACES:
         size //= 2
-    runs = [configuration.scenario.run for configuration in study.configurations]
-    steps = max(run.duration / run.step for run in runs)
+    steps = max(each.scenario.run.duration / each.scenario.run.step for each in study.configurations)
     share = math.ceil(study.runs_of_configuration / _CHUNKS_OF_SMALL_STUDY)
-    return min(size, max(share, _SLOW_RUNS_OF_CHUNK, math.ceil(_FEWEST_STEPS / steps)))
+    return min(size, max(share, _FIRST_RUNS_OF_CHUNK, math.ceil(_FEWEST_STEPS / steps)))
 
 
 def runs_at_once(scenario: Scenario, most: int) -> int:
@@ -76,17 +74,25 @@ def samples_of(study: Study, configuration: Configuration) -> int:
     return int(configuration.scenario.run.duration / study.outputs.every + 1.0e-9) + 1
 
 
+def _first_run(study: Study, index: int) -> int:
+    """Return the index of the first run of a chunk within its configuration: full chunks follow doubling ones."""
+    size = chunk_size(study)
+    first = size if study.runs_of_chunk is not None else min(size, _FIRST_RUNS_OF_CHUNK)
+    doublings = (math.ceil(size / first) - 1).bit_length()
+    return first * ((1 << min(index, doublings)) - 1) + size * max(0, index - doublings)
+
+
 def chunk_count(study: Study) -> int:
-    """Return the number of chunks of a study over all configurations."""
-    return len(study.configurations) * -(-study.runs_of_configuration // chunk_size(study))
+    """Return the number of chunks of a study over all configurations, each with the same number."""
+    runs = study.runs_of_configuration
+    return len(study.configurations) * bisect_left(range(runs), runs, key=lambda index: _first_run(study, index))
 
 
 def chunk(study: Study, number: int) -> Chunk:
     """Return a chunk by its number, counted over all configurations from 0."""
-    size = chunk_size(study)
-    configuration, index = divmod(number, -(-study.runs_of_configuration // size))
-    first = index * size
-    return Chunk(number, configuration, first, min(size, study.runs_of_configuration - first))
+    configuration, index = divmod(number, chunk_count(study) // len(study.configurations))
+    first, end = _first_run(study, index), _first_run(study, index + 1)
+    return Chunk(number, configuration, first, min(end, study.runs_of_configuration) - first)
 
 
 def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:

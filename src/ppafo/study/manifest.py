@@ -17,6 +17,7 @@ from ppafo.parameters.declaration import fits
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
+from ppafo.storage.result_folder import MANIFEST, RUN_FILE
 from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, chunk_size
@@ -27,7 +28,6 @@ from ppafo.units.shown import GAUGE_ZERO
 from ppafo.version import __version__
 from ppafo.wording import one_line
 
-MANIFEST = "study.json"
 STUDY_COPY = "study.toml"
 FORMAT = "ppafo study results"
 SCHEMA_VERSION = 2
@@ -87,7 +87,8 @@ def read_manifest(folder: StudyFolder) -> dict[str, Any]:
     try:
         document = folder.read_document(MANIFEST)
     except (OSError, ValueError) as error:
-        raise DataError(f"{folder.path}: contains no study results ({MANIFEST} cannot be read)") from error
+        remedy = "; read the result of a run by read_result" * (folder.path / RUN_FILE).is_file()
+        raise DataError(f"{folder.path}: contains no study results ({MANIFEST} cannot be read){remedy}") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{folder.path}: {MANIFEST} does not describe a study; choose the folder of a study")
     if document.get("schema_version") != SCHEMA_VERSION:

@@ -103,7 +103,7 @@ class Runs:
             parts.append(rows)
             self._parts.append({**part, **rows})
             self.reason = self.reason or reason
-            count, failures = rows[FAILED].size, failures_of(rows)
+            count, failures = rows[FAILED].size, int(rows[FAILED].sum())
             self.count += count
             self.failures += failures
             self._counter.add(count, failures)
@@ -119,7 +119,7 @@ class Runs:
 
         Statistics of the remaining runs would be biased. ``subject`` names the rows in the message.
         """
-        failures, runs = failures_of(rows), rows[FAILED].size
+        failures, runs = int(rows[FAILED].sum()), rows[FAILED].size
         if failures > maximum_failed * runs:
             raise StudyError(
                 f"{subject}: {failures:,} of {runs:,} runs failed ({100.0 * failures / runs:.3g} %), more than the "
@@ -166,11 +166,6 @@ def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:
 def joined(parts: Sequence[Rows]) -> Rows:
     """Concatenate tables of rows in order."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def failures_of(rows: Rows) -> int:
-    """Return the number of failed runs in a table."""
-    return int(np.count_nonzero(rows[FAILED]))
 
 
 def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:

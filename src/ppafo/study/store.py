@@ -28,11 +28,12 @@ from ppafo.storage.parquet import (
     table_of,
     texts_of_some,
 )
+from ppafo.storage.result_folder import MANIFEST
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Study
 from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
 from ppafo.study.folder import StudyFolder
-from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
+from ppafo.study.manifest import STUDY_COPY, check_same_study, manifest, read_manifest
 from ppafo.study.runs import excess, unvaried, with_companions
 from ppafo.wording import argument_text, one_line
 
@@ -49,12 +50,9 @@ OSCILLATES, FOLLOWS = "oscillates", "follows"
 _TEXT_COLUMNS = ("configuration", "status", "reason", "channel")
 ASKED_ABOVE = 10_000_000_000
 """Size [bytes] above which a study only starts with ``--yes``."""
-_FIXED_BYTES_OF_ROW = 3
-"""Bytes of the texts of a row, each stored as an index into a list of texts."""
-_BYTES_OF_NUMBER = 8
-"""Bytes per number of a row."""
-_BYTES_OF_SAMPLE = 4
-"""Bytes per sample of a trace, stored in single precision unless needed for bands."""
+_FIXED_BYTES_OF_ROW, _BYTES_OF_NUMBER, _BYTES_OF_SAMPLE = 3, 8, 4
+"""Bytes of the texts of a row, each stored as an index into a list of texts, per number of a row, and per sample of a
+trace, which has single precision unless needed for bands."""
 _BYTES_OF_FILE = 12_000
 """Overhead of a chunk file and its note [bytes]: names, units and meanings of the columns."""
 

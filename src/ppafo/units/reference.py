@@ -85,7 +85,7 @@ def is_volume_flow(unit: str) -> bool:
 def with_condition(unit: str, condition: str, gas: str) -> str:
     """Add reference condition and gas to a unit of volume flow."""
     flow, words, is_normal = flow_of(unit)
-    place, own = _condition_and_gases(words)
+    place, own = condition_and_gases(words)
     name = unit.strip() if not words else unit.strip().removesuffix(")").removesuffix(words).rstrip(" (_")
     whole = ", ".join(filter(None, (place or condition, *(own or (gas,)))))
     return f"{name if is_normal else flow} ({whole})" if whole else unit
@@ -106,7 +106,7 @@ def read_unit(unit: str) -> tuple[ParsedUnit, str]:
         raise UnitError(f"'{unit}': a reference condition belongs to a volume flow, such as 'L/min (ANR, air)'")
     if not words:
         raise UnitError(without_condition(unit))
-    place, gases = _condition_and_gases(words)
+    place, gases = condition_and_gases(words)
     condition = condition_of(place, unit)
     if len(gases) != 1:
         example = with_condition(unit, "", "air") if not gases else "L/min (ANR, air)"
@@ -123,7 +123,7 @@ def molar_mass_in(unit: str) -> float | None:
 
     None for a unit without a gas.
     """
-    gases = _condition_and_gases(flow_of(unit)[1])[1]
+    gases = condition_and_gases(flow_of(unit)[1])[1]
     return _molar_mass(gases[0]) if gases else None
 
 
@@ -199,7 +199,7 @@ def _split(words: str) -> list[str]:
     return re.split(r"(?<!\d),|,(?!\d)|;|\band\b|&|@", words)
 
 
-def _condition_and_gases(words: str) -> tuple[str, list[str]]:
+def condition_and_gases(words: str) -> tuple[str, list[str]]:
     """Split the words after a flow into reference condition, and gases or molar masses."""
     said = [word.strip() for word in _split(words) if word.strip()]
     known = [name.lower() for name in MOLAR_MASSES]

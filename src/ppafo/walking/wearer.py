@@ -8,14 +8,15 @@ a walk file is the subject of the named gait, or the paper's subject if no gait 
 stature, all segments without a stated value are scaled with body mass and stature.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
-from ppafo.model.declaration import Number, Quantity, quantities_of
+from ppafo.model.binding import made_of
+from ppafo.model.declaration import Number, PlainFunction, Quantity, quantities_of
 from ppafo.model.leg import LegParameters
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.simulation.declaration import FOOT
@@ -155,72 +156,43 @@ _PAPER = paper_subject()
 _SHARES: Mapping[str, float] = {
     name: getattr(_PAPER, name) / (_PAPER.body_mass**of_mass * _PAPER.stature**of_stature)
     for name, (of_mass, of_stature) in SCALING.items()
-}
+} | {"shank_length": SHANK_SHARE}
 """Numbers of the paper subject's leg divided by the powers of body mass and stature from ``SCALING``."""
 
-# Module constants, because the functions below are translated to C.
-_SHANK_CENTRE, _FOOT_CENTRE = _SHARES["shank_mass_centre"], _SHARES["foot_mass_centre"]
-_HEEL, _TOE = _SHARES["heel_lever"], _SHARES["toe_lever"]
-_SHANK_MASS, _FOOT_MASS = _SHARES["shank_mass"], _SHARES["foot_mass"]
-_SHANK_INERTIA, _FOOT_INERTIA = _SHARES["shank_inertia"], _SHARES["foot_inertia"]
+
+class _SegmentParts(NamedTuple):
+    """Number of a segment divided by the powers of body mass and stature with which the number scales."""
+
+    share: float
 
 
-def shank_length_of(stature: float) -> float:
-    """Return the shank length [m] for a stature [m]."""
-    return SHANK_SHARE * stature
+def segment_length(stature: float, *, parts: _SegmentParts) -> float:
+    """Return a length in the leg [m] for a stature [m]."""
+    return parts.share * stature
 
 
-def shank_mass_centre_of(stature: float) -> float:
-    """Return the distance from the knee to the mass centre of the shank [m], for a stature [m]."""
-    return _SHANK_CENTRE * stature
+def segment_mass(_stature: float, body_mass: float, *, parts: _SegmentParts) -> float:
+    """Return the mass of a segment [kg] for a body mass [kg]."""
+    return parts.share * body_mass
 
 
-def foot_mass_centre_of(stature: float) -> float:
-    """Return the distance from the ankle to the mass centre of the foot [m], for a stature [m]."""
-    return _FOOT_CENTRE * stature
+def segment_inertia(stature: float, body_mass: float, *, parts: _SegmentParts) -> float:
+    """Return the inertia of a segment about its mass centre [kg m^2], for a stature [m] and a body mass [kg]."""
+    return parts.share * body_mass * stature * stature
 
 
-def heel_lever_of(stature: float) -> float:
-    """Return the horizontal distance from the ankle back to the heel [m], for a stature [m]."""
-    return _HEEL * stature
-
-
-def toe_lever_of(stature: float) -> float:
-    """Return the horizontal distance from the ankle forward to the toes [m], for a stature [m]."""
-    return _TOE * stature
-
-
-def shank_mass_of(_stature: float, body_mass: float) -> float:
-    """Return the mass of the shank [kg] for a body mass [kg]."""
-    return _SHANK_MASS * body_mass
-
-
-def foot_mass_of(_stature: float, body_mass: float) -> float:
-    """Return the mass of the foot [kg] for a body mass [kg]."""
-    return _FOOT_MASS * body_mass
-
-
-def shank_inertia_of(stature: float, body_mass: float) -> float:
-    """Return the inertia of the shank about its mass centre [kg m^2], for a stature [m] and a body mass [kg]."""
-    return _SHANK_INERTIA * body_mass * stature * stature
-
-
-def foot_inertia_of(stature: float, body_mass: float) -> float:
-    """Return the inertia of the foot about its mass centre [kg m^2], for a stature [m] and a body mass [kg]."""
-    return _FOOT_INERTIA * body_mass * stature * stature
-
-
-_FOLLOWING: Mapping[str, Callable[..., float]] = {
-    "shank_length": shank_length_of,
-    "shank_mass_centre": shank_mass_centre_of,
-    "foot_mass_centre": foot_mass_centre_of,
-    "heel_lever": heel_lever_of,
-    "toe_lever": toe_lever_of,
-    "shank_mass": shank_mass_of,
-    "foot_mass": foot_mass_of,
-    "shank_inertia": shank_inertia_of,
-    "foot_inertia": foot_inertia_of,
+_BY_EXPONENTS: Mapping[tuple[int, int], PlainFunction] = {
+    (0, 1): segment_length,
+    (1, 0): segment_mass,
+    (1, 2): segment_inertia,
 }
+_FOLLOWING: Mapping[str, PlainFunction] = {
+    name: made_of(function, f"{name}_of", _SegmentParts(_SHARES[name]))
+    for exponents, function in _BY_EXPONENTS.items()
+    for name in SCALING
+    if SCALING[name] == exponents and name != "body_mass"
+}
+"""Functions of stature and body mass by segment number."""
 STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 
 

@@ -120,7 +120,9 @@ def iso_6358(upstream: np.ndarray, downstream: float, conductance: float, ratio:
     return conductance * 1.185 * upstream * np.sqrt(1.0 - subsonic**2)
 
 
-def flow_table(folder: Path, unit: str, gas: str, procedure: str = "", at: str = ', at = "ANR"') -> Identification:
+def flow_table(
+    folder: Path, unit: str, gas: str, procedure: str = "", at: str = ', at = "ANR"', condition: str = ""
+) -> Identification:
     """Identify C and b from a table of ANR litres of air per minute at gauge pressures in psi, stated in ``unit``."""
     gauge = np.linspace(6.0, 90.0, 15)
     flow = iso_6358(101325.0 + 6894.757 * gauge, 101325.0, 2.0e-8, 0.3)
@@ -134,7 +136,7 @@ device.set = "cylinder-lever"
 [columns.meter.channels]
 upstream_pressure = {{ column = "p1", unit = "{unit}" }}
 downstream_pressure = {{ constant = "101.325 kPa_a" }}
-mass_flow = {{ column = "q", unit = "L/min"{at}{gas} }}
+mass_flow = {{ column = "q", unit = "L/min{condition}"{at}{gas} }}
 [[procedure]]
 kind = "open-valve-flow"
 recordings = ["flow.csv"]
@@ -147,8 +149,11 @@ temperature = "20 degC"
     return identify(folder / "problem.toml").found
 
 
-def test_a_table_of_flow_gives_the_conductance_of_its_formula(tmp_path: Path) -> None:
-    found = flow_table(tmp_path, "psi_g", ', gas = "air"')
+@pytest.mark.parametrize(
+    ("at", "condition"), [(', at = "ANR"', ""), ("", " (ANR)"), (', at = "ANR"', " (ANR)"), ("", " (ANR, air)")]
+)
+def test_a_table_of_flow_gives_the_conductance_of_its_formula(tmp_path: Path, at: str, condition: str) -> None:
+    found = flow_table(tmp_path, "psi_g", ', gas = "air"', at=at, condition=condition)
     conductance, ratio = found.estimates
     assert conductance.value == pytest.approx(2.0e-8, rel=0.01)
     assert ratio.value == pytest.approx(0.3, abs=0.03)

@@ -114,17 +114,38 @@ LITRES = {"column": "Q", "unit": "L/min"}
         ({**LITRES, "at": "ANR", "gas": "air"}, 1.185),
         ({**LITRES, "unit": "Nl/min", "at": "DIN 1343", "gas": "air"}, 1.2923),
         ({**LITRES, "unit": "slm", "at": "0 degC, 1.01325 bar_a", "gas": "CO2"}, 1.9631),
+        ({**LITRES, "unit": "L/min (DIN 1343, CO2)"}, 1.9631),
         ({**LITRES, "unit": "L/min (DIN 1343)"}, 1.9631),
         ({**LITRES, "at": "ANR"}, 1.8052),
+        # Condition and gas in two places, or twice.
+        ({**LITRES, "unit": "L/min (ANR)", "gas": "air"}, 1.185),
+        ({**LITRES, "unit": "L/min (air)", "at": "ANR"}, 1.185),
+        ({**LITRES, "unit": "L/min (ANR, air)", "at": "ISO 8778", "gas": "0.02897 kg/mol"}, 1.185),
+        ({**LITRES, "unit": "Nl/min (DIN 1343, CO2)", "at": "0 degC, 1.01325 bar_a", "gas": "CO2"}, 1.9631),
     ],
 )
 def test_a_flow_meter_shows_volume_at_a_condition(tmp_path: Path, flow: dict[str, Any], density: float) -> None:
     path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
-    if "at" not in flow:
-        flow = {**flow, "unit": "L/min (DIN 1343, CO2)"}
     chosen = columns({"time": {"column": "t", "unit": "s"}, "mass_flow": flow})
     found = read_foreign(path, chosen, gas="0.044 kg/mol")
     assert np.allclose(found["mass_flow"], density * 1e-3 * np.array([1.0, 2.0]), rtol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("flow", "by_map"),
+    [
+        ({"unit": "L/min (ANR)", "at": "DIN 1343"}, "L/min (DIN 1343, air)"),
+        ({"unit": "L/min (ANR, air)", "gas": "CO2"}, "L/min (ANR, CO2)"),
+    ],
+)
+def test_a_condition_or_gas_that_contradicts_the_unit_is_refused(
+    tmp_path: Path, flow: dict[str, Any], by_map: str
+) -> None:
+    path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
+    chosen = columns({"time": {"column": "t", "unit": "s"}, "mass_flow": {"column": "Q", **flow}})
+    expected = f"means '{by_map}' by 'at' and 'gas', but 'L/min (ANR, air)' by 'unit'; give each only once"
+    with pytest.raises(DataError, match=re.escape(expected)):
+        read_foreign(path, chosen, gas="air")
 
 
 @pytest.mark.parametrize("unit", ["L/min", "Nl/min", "slm", "SCFM", "m^3/h"])

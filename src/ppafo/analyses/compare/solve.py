@@ -22,7 +22,7 @@ from ppafo.studies.limits import CONFIDENCE, check_fraction
 from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, configurations_with
 from ppafo.studies.varying import value_at, varied_path
-from ppafo.study.runs import Rows, RunCounter, failures_of, scenario_runs, unvaried
+from ppafo.study.runs import FAILED, Rows, RunCounter, scenario_runs, unvaried
 from ppafo.wording import argument_text, first_twice, known_names, said_of_configuration
 
 AS_WRITTEN = "as written"
@@ -144,7 +144,7 @@ def compared(
                 status=result.status,
                 metrics={metric: value for metric, value in result.metrics.items() if metric in COMPARED},
                 tracking=tracking,
-                failed_draws=0 if runs.rows is None else failures_of(runs.rows),
+                failed_draws=0 if runs.rows is None else int(runs.rows[FAILED].sum()),
                 reason=runs.failure,
                 scenario=scenario,
                 rows=runs.rows,

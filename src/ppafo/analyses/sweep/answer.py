@@ -13,9 +13,10 @@ from ppafo.arguments import checked
 from ppafo.documents.models import validate
 from ppafo.errors import DataError, at_fault
 from ppafo.report.finding import Finding, Section, columns_of, facts, files_of
+from ppafo.storage.result_folder import MANIFEST
 from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.study.folder import study_folder
-from ppafo.study.manifest import MANIFEST, read_manifest
+from ppafo.study.manifest import read_manifest
 from ppafo.units.shown import in_units
 
 # The summary of a study that is read again: what everybody may rely on in it, beside additional keys.

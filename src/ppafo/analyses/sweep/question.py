@@ -88,7 +88,7 @@ def sweep_into_folder(
             example = f"{argument_text('statistic', 'mean')} {argument_text('metric', 'rms_error')}"
             raise StudyError(f"{unused[0]}: needs a statistic, for example {example}")
         from ppafo.analyses.sweep.answer import write_sweep_report
-        from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
+        from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, sweep
 
         chosen = study_of(study, overrides, draws, seed)
         target = out or Path("out") / chosen.name
@@ -96,7 +96,8 @@ def sweep_into_folder(
             swept = sweep(chosen, threads=threads, out=target, agreed=agreed, progress=progress)
             write_sweep_report(swept.found)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(INTERRUPTED if is_begun(chosen, target) else INTERRUPTED_AT_ONCE) from None
+            is_begun = any(Path(target).glob("finished/chunk-*.json"))
+            raise KeyboardInterrupt(INTERRUPTED if is_begun else INTERRUPTED_AT_ONCE) from None
         return swept
     if metric is None:
         raise StudyError(f"statistic '{statistic}': needs a metric, for example {argument_text('metric', 'rms_error')}")

@@ -11,10 +11,9 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +37,7 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import study_of
 from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.study import Study, check_can_be_swept
-from ppafo.study.blocks import chunk_count, samples_of
+from ppafo.study.blocks import MAXIMUM_RUNS_OF_CHUNK, chunk_count, samples_of
 from ppafo.study.folder import study_folder
 from ppafo.study.manifest import read_manifest
 from ppafo.study.runs import RunCounter, is_to_follow, joined
@@ -49,7 +48,6 @@ from ppafo.study.store import (
     FinishedChunk,
     StudyStore,
     compute_chunk,
-    note_file,
     stored_unit,
     trace_column,
 )
@@ -62,8 +60,6 @@ QUANTILE_DEFINITION = (
 )
 MAXIMUM_IN_MEMORY = 16_000_000
 """Largest number of samples of a channel in memory when quantile bands are computed."""
-Parts = Callable[[], Iterator[Floats]]
-"""Function that yields the finite values of a column, in parts of constant order at every call."""
 
 
 def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
@@ -78,21 +74,14 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
                 failures += part.filter(~rows).slice(0, _EXAMPLES - len(failures)).to_pylist()
     # A run that diverged has a time at which it did; one that was refused never began.
     failed = study.runs - sum(completed.values())
-    diverged = sum(
-        part.size
-        for configuration in study.configurations
-        for part in results.parts(configuration.name, "failure_time")
-    )
+    diverged = sum(part.size for name in completed for part in results.parts(name, "failure_time"))
     # A reference that lies beyond reach on purpose is followed by no run, unless the study varies the reach.
     varied = {
         each.name: [path for path in study.paths if study.varies(path, each.name)] for each in study.configurations
     }
     judged = [each for each in study.configurations if is_to_follow(each.scenario, varied[each.name])]
-    parts = {each.name: list(results.parts(each.name, FOLLOWS)) for each in judged}
-    verdicts = {
-        name: (sum(int(np.count_nonzero(part == 0.0)) for part in own), sum(part.size for part in own))
-        for name, own in parts.items()
-    }
+    flags = {each.name: np.concatenate(list(results.parts(each.name, FOLLOWS))) for each in judged}
+    verdicts = {name: (int(np.count_nonzero(own == 0.0)), own.size) for name, own in flags.items()}
     return {
         "study": study.name,
         "runs": study.runs,
@@ -114,7 +103,7 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
         "configurations": {
             configuration.name: {
                 metric: {"unit": METRICS[metric].unit, "summary": METRICS[metric].summary}
-                | describe(partial(results.parts, configuration.name, metric), study.outputs.quantiles)
+                | describe(results.parts(configuration.name, metric), study.outputs.quantiles)
                 for metric in study.outputs.metrics
             }
             for configuration in study.configurations
@@ -179,25 +168,26 @@ def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequ
     return np.asarray(below + (places - low) * (above - below), dtype=np.float64)
 
 
-def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
-    """Return count, mean, standard deviation, extremes, and quantiles by fraction.
+def describe(parts: Iterable[Floats], fractions: Sequence[float]) -> dict[str, Any]:
+    """Return count, mean, standard deviation, extremes, and quantiles by fraction, for any division into parts.
 
     Without values there is only the count; the standard deviation needs two values.
     """
-    sums = [(part.size, float(np.sum(part)), float(part.min()), float(part.max())) for part in parts() if part.size]
-    count = sum(part[0] for part in sums)
+    values = np.concatenate([np.empty(0), *parts])
+    count = values.size
     if count == 0:
         return {"count": 0}
     # Squares about the mean, in a second pass: about 0 they would cancel where the spread is small.
-    mean = math.fsum(part[1] for part in sums) / count
-    levels = np.quantile(np.concatenate(list(parts())), fractions, method="linear", overwrite_input=True)
-    squares = math.fsum(float(np.sum((part - mean) ** 2)) for part in parts())
+    blocks = np.split(values, range(MAXIMUM_RUNS_OF_CHUNK, count, MAXIMUM_RUNS_OF_CHUNK))
+    mean = math.fsum(float(np.sum(block)) for block in blocks) / count
+    squares = math.fsum(float(np.sum((block - mean) ** 2)) for block in blocks)
+    levels = np.quantile(values, fractions, method="linear", overwrite_input=True)
     return {
         "count": count,
         "mean": mean,
         **({"sd": math.sqrt(squares / (count - 1))} if count > 1 else {}),
-        "minimum": min(part[2] for part in sums),
-        "maximum": max(part[3] for part in sums),
+        "minimum": float(values.min()),
+        "maximum": float(values.max()),
         "quantiles": dict(zip((f"{fraction:g}" for fraction in fractions), levels.tolist(), strict=True)),
     }
 
@@ -271,12 +261,6 @@ def sweep(
     # Last, because a study counts as finished once its summary is there.
     folder.write(SUMMARY, f"{json_text(summary)}\n".encode())
     return finding_of(replace(results, summary=summary))
-
-
-def is_begun(study: Study, folder: str | Path) -> bool:
-    """Return whether a folder contains a finished chunk of a study."""
-    names = study_folder(folder).names()
-    return any(note_file(number) in names for number in range(chunk_count(study)))
 
 
 def studies_of_the_package() -> list[dict[str, Any]]:

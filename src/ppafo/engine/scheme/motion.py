@@ -500,23 +500,13 @@ def depart_free(
 
 def with_motion(state: PlantState, angle: float, angular_velocity: float) -> PlantState:
     """State with a new angle [rad] and angular velocity [rad/s]."""
-    return PlantState(
-        angle=angle,
-        angular_velocity=angular_velocity,
-        mass_1=state.mass_1,
-        mass_2=state.mass_2,
-        supplied_mass=state.supplied_mass,
-        vented_mass=state.vented_mass,
-        leaked_mass=state.leaked_mass,
-    )
+    return state._replace(angle=angle, angular_velocity=angular_velocity)
 
 
 def with_gas(state: PlantState, gas: GasChange) -> PlantState:
     """State of the plant after adding the gas flows of a step, with the angle and the angular velocity unchanged."""
     vented = gas.supplied - gas.mass_1 - gas.mass_2
-    return PlantState(
-        angle=state.angle,
-        angular_velocity=state.angular_velocity,
+    return state._replace(
         mass_1=state.mass_1 + gas.mass_1,
         mass_2=state.mass_2 + gas.mass_2,
         supplied_mass=state.supplied_mass + gas.supplied,

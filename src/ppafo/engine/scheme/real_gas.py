@@ -113,9 +113,7 @@ def with_real_gas(state: PlantState, masses: TrueMasses, change: RealChange) -> 
     gas = change.gas
     vented = gas.supplied - gas.mass_1 - gas.mass_2
     return (
-        PlantState(
-            angle=state.angle,
-            angular_velocity=state.angular_velocity,
+        state._replace(
             mass_1=state.mass_1 + change.content_1,
             mass_2=state.mass_2 + change.content_2,
             supplied_mass=state.supplied_mass + gas.supplied,

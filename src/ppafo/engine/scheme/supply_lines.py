@@ -76,15 +76,7 @@ def with_lines(linear: Linearisation, ratio_1: float, ratio_2: float) -> Lineari
     a, d = linear.a - added_1, linear.d - added_2
     scale = 1.0 / (a * d - linear.b * linear.c)
     supplied_by_1, supplied_by_2 = linear.supplied_by_1 + added_1, linear.supplied_by_2 + added_2
-    return Linearisation(
-        a=a,
-        b=linear.b,
-        c=linear.c,
-        d=d,
-        scale=scale,
-        supplied_by_1=supplied_by_1,
-        supplied_by_2=supplied_by_2,
-    )
+    return linear._replace(a=a, d=d, scale=scale, supplied_by_1=supplied_by_1, supplied_by_2=supplied_by_2)
 
 
 def begin_fed_gas(
@@ -160,12 +152,7 @@ class FedThermalGas(NamedTuple):
 def with_line(flow: PortFlowSlopes, ratio: float) -> PortFlowSlopes:
     """Flow of a port with derivatives that include the gas lost by its line; ``ratio`` as in ``with_lines``."""
     added = flow.source_slope * ratio
-    return PortFlowSlopes(
-        total=flow.total,
-        total_slope=flow.total_slope + added,
-        from_source=flow.from_source,
-        source_slope=flow.source_slope + added,
-    )
+    return flow._replace(total_slope=flow.total_slope + added, source_slope=flow.source_slope + added)
 
 
 def mass_from_source(thermal: ThermalParameters, flow: float, state: PlantState, masses: ThermalState) -> float:

@@ -577,14 +577,9 @@ def after_motion(
     mean_1, mean_2 = 0.5 * (volume_1 + assumed_1), 0.5 * (volume_2 + assumed_2)
     work_1, work_2 = half * (volume_1 - assumed_1), half * (volume_2 - assumed_2)
     # The isentrope between two near volumes, to third order in their difference.
-    return PlantState(
-        angle=state.angle,
-        angular_velocity=state.angular_velocity,
+    return state._replace(
         mass_1=state.mass_1 * (mean_1 - work_1) / (mean_1 + work_1),
         mass_2=state.mass_2 * (mean_2 - work_2) / (mean_2 + work_2),
-        supplied_mass=state.supplied_mass,
-        vented_mass=state.vented_mass,
-        leaked_mass=state.leaked_mass,
     )
 
 
@@ -592,22 +587,19 @@ def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlo
     """Plant state, gas masses and energy totals after the changes [kg] of one step, without the work of the gas."""
     vented = change.supplied - change.mass_1 - change.mass_2
     return (
-        PlantState(
-            angle=state.angle,
-            angular_velocity=state.angular_velocity,
+        state._replace(
             mass_1=state.mass_1 + change.content_1,
             mass_2=state.mass_2 + change.content_2,
             supplied_mass=state.supplied_mass + change.supplied,
             vented_mass=state.vented_mass + vented,
             leaked_mass=state.leaked_mass + abs(change.leaked),
         ),
-        ThermalState(
+        masses._replace(
             mass_1=masses.mass_1 + change.mass_1,
             mass_2=masses.mass_2 + change.mass_2,
             supplied_content=masses.supplied_content + change.source_content,
             vented_content=masses.vented_content + change.source_content - change.port_content,
             heat_content=masses.heat_content + change.heat,
-            gas_work=masses.gas_work,
         ),
     )
 
@@ -618,14 +610,8 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
     after_1, after_2 = chamber_pressures(plant, after.angle, after.mass_1, after.mass_2)
     # The mean of the pressures at both ends, over the motion that happened: the trapezoidal rule, as for the vane.
     difference = 0.5 * (before_1 - before_2 + after_1 - after_2)
-    return ThermalState(
-        mass_1=masses.mass_1,
-        mass_2=masses.mass_2,
-        supplied_content=masses.supplied_content,
-        vented_content=masses.vented_content,
-        heat_content=masses.heat_content,
-        gas_work=masses.gas_work + difference * plant.displacement_per_radian * (after.angle - before.angle),
-    )
+    work = difference * plant.displacement_per_radian * (after.angle - before.angle)
+    return masses._replace(gas_work=masses.gas_work + work)
 
 
 def masses_at_start(

@@ -42,12 +42,8 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     lane["actuator"] = parts.section_row("actuator", *parts.vane_only_fields)(
         *(getattr(settings, name) for name in parts.setting_names("actuator")), *(0.0 for _ in parts.vane_only_fields)
     )
-    lane["friction"] = parts.section_row("friction")(
-        *(getattr(settings, name) for name in parts.setting_names("friction"))
-    )
-    lane["foot_plate"] = parts.section_row("foot_plate")(
-        *(getattr(settings, name) for name in parts.setting_names("foot_plate"))
-    )
+    for section in ("friction", "foot_plate"):
+        lane[section] = parts.section_row(section)(*(getattr(settings, name) for name in parts.setting_names(section)))
     lane["supply"] = parts.section_row("supply", "relieving")(
         *(getattr(settings, name) for name in parts.setting_names("supply")),
         # Lines have a check valve of their own, so that the valve may push gas back into them.
@@ -63,19 +59,12 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
             settings.flow_linear_ratio,
         )
     for effect in parts.program.effects:
+        names = parts.setting_names(effect.section, names_of(effect.quantities))
         if effect.prepare is None:
-            lane[effect.name] = effect.parameters(
-                *(getattr(settings, name) for name in parts.setting_names(effect.section, names_of(effect.quantities)))
-            )
+            lane[effect.name] = effect.parameters(*(getattr(settings, name) for name in names))
         else:
             lane[effect.name] = effect.prepare(
-                parts.effect_row(effect)(
-                    *(
-                        getattr(settings, name)
-                        for name in parts.setting_names(effect.section, names_of(effect.quantities))
-                    )
-                ),
-                lane.device,
+                parts.effect_row(effect)(*(getattr(settings, name) for name in names)), lane.device
             )
     is_led = parts.program.angle is not None or parts.program.walks
     lane[parts.plant_of_vane] = plant_with(

@@ -137,12 +137,9 @@ class Part:
     def model_numbers(self) -> dict[str, float]:
         """Numbers of a valve part by path [SI]; missing figures have the default of an ideal valve."""
         # A figure that is not given is left at the model's default, which is the ideal valve.
-        settings = {
-            quantity.name: quantity.default for quantity in VALVES[self.kind].quantities if quantity.default is not None
-        }
-        orifice = {quantity.name: self.values[quantity.name] for quantity in ORIFICE if quantity.name in self.values}
-        own = {name: self.values[name] for name in settings if name in self.values}
-        return {f"valve.{name}": number for name, number in (orifice | settings | own).items()}
+        declared = (*ORIFICE, *VALVES[self.kind].quantities)
+        numbers = {quantity.name: self.values.get(quantity.name, quantity.default) for quantity in declared}
+        return {f"valve.{name}": number for name, number in numbers.items() if number is not None}
 
 
 def rated_pressure(*parts: Part) -> float:
@@ -153,13 +150,6 @@ def rated_pressure(*parts: Part) -> float:
     return min(part.values.get(RATING.name, math.inf) for part in parts)
 
 
-_TITLES = {
-    "actuators": "Actuator",
-    "regulators": "Regulator",
-    "bottles": "Bottle",
-    "processors": "Processor",
-    "batteries": "Battery",
-}
 _NAMES = Annotated[tuple[str, ...], Field(strict=False)]
 
 
@@ -197,7 +187,8 @@ def _catalogue_file() -> type[BaseModel]:
                 ]
             )
         else:
-            parts = _part_table(_TITLES[group], group, quantities)
+            title = group.replace("ies", "ys").removesuffix("s").capitalize()
+            parts = _part_table(title, group, quantities)
         fields[group] = (GenericAlias(dict, (str, parts)), Field(default_factory=dict, description=f"{group} by name"))
     return table("CatalogueFile", fields)
 
@@ -215,7 +206,7 @@ DEFAULT = "parts"
 _FILE = TomlKind(
     "catalogue of parts", "parts", resources.files("ppafo.parameters.parts") / "catalogues", ParameterError
 )
-_NEEDS_A_REASON = ("derived", "assumed")
+FOR_A_CYLINDER = "search supply.pressure by 'ppafo find' with controller.kind=damped_proportional"
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,7 +251,13 @@ def parse_catalogue(content: bytes, file: str) -> Catalogue:
 
     Raises ParameterError if the catalogue is not usable.
     """
-    parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
+    try:
+        parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
+    except ParameterError as error:
+        if "unknown key 'actuators." in str(error):
+            own = "write a cylinder as a parameter set ('ppafo new set NAME --from cylinder-lever') and"
+            raise ParameterError(f"{error}; 'ppafo design' sizes vanes only: {own} {FOR_A_CYLINDER}") from error
+        raise
     wrong: list[PpafoError] = []
     groups = {
         group: {name: _part(file, group, name, table, wrong) for name, table in getattr(parsed, group).items()}
@@ -291,7 +288,7 @@ def _part(file: str, group: str, name: str, parsed: Any, wrong: list[PpafoError]
     for key, figure in figures.items():
         shown = f"{where}.{key} = {figure.value:g} {figure.unit}"
         # A guess without its reason cannot be checked by the next reader.
-        if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
+        if figure.origin in ("derived", "assumed") and not figure.note.strip():
             reason = f"give the reason for a value with origin '{figure.origin}'"
             wrong.append(ParameterError(f"{where}.{key}.note is missing; {reason}"))
         # Data sheets give gauge pressures at sea level.

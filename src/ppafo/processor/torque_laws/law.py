@@ -2,15 +2,16 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
 from ppafo.control.kind import ControllerKind
+from ppafo.engine.composer import each
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
-from ppafo.processor.fixed_point import SETTINGS, ConverterCounts, converter_of
+from ppafo.processor.fixed_point import OF_STEPS, SETTINGS, ConverterCounts, converter_of
 
 Sample = Callable[[Any, Any, ConverterCounts], tuple[int, Any]]
 """Law as a function of numbers, state and readings: command [steps], -1000 to 1000, and next state."""
@@ -95,23 +96,27 @@ def _span(ends: tuple[Any, Any], run: int) -> str:
     return " to ".join(f"{at(end, run):.6g} N m" for end in ends)
 
 
-def fixed_point_kind(
+def fixed_law(
     floats: ControllerKind,
-    parameters: type,
-    initial: Any,
+    rows: type,
+    begins: Any,
+    sample: Sample,
     update: Callable[[Any, Any, float, Any, float], tuple[float, Any]],
     plan: Numbers,
-) -> ControllerKind:
-    """Return the catalogue entry of a law's integer form, with settings of law and converter."""
-    return replace(
+    state_ranges: Mapping[str, tuple[int, int]],
+) -> FixedLaw:
+    """Return the integer form of a law, with settings of law and converter, from its row class with ``numbers``."""
+    kind = replace(
         floats,
         name=plan.name,
         summary=f"{floats.summary} In fixed point, as a small processor computes.",
         quantities=(*floats.quantities, *SETTINGS),
-        parameters=parameters,
-        initial=initial,
+        parameters=rows,
+        initial=each(float, begins),
         update=update,
         restart=None,
         controls=(TORQUE,),
         plan=plan,
     )
+    own = plan.quantities[len(OF_STEPS) :]
+    return FixedLaw(kind, sample, get_type_hints(rows)["numbers"], own, begins, state_ranges)

@@ -23,7 +23,7 @@ from ppafo.processor.fixed_point import (
     read,
     still_sound,
 )
-from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
+from ppafo.processor.torque_laws.law import Numbers, fixed_law
 
 
 class _OnOffNumbers(NamedTuple):
@@ -61,21 +61,16 @@ def on_off_update(
     return float(command) / COMMAND_STEPS, each(float, after)
 
 
-ON_OFF_FIXED_POINT = fixed_point_kind(
+ON_OFF = fixed_law(
     FLOAT_ON_OFF,
     _OnOffRows,
-    each(float, _OnOffCounts(1)),
+    _OnOffCounts(1),
+    on_off_sample,
     on_off_update,
     Numbers("on_off_fixed_point", (*OF_STEPS, *OF_LIMITS)),
+    {"sound": (0, 1)},
 )
-ON_OFF = FixedLaw(
-    kind=ON_OFF_FIXED_POINT,
-    sample=on_off_sample,
-    numbers=_OnOffNumbers,
-    number_quantities=OF_LIMITS,
-    begins=_OnOffCounts(1),
-    state_ranges={"sound": (0, 1)},
-)
+ON_OFF_FIXED_POINT = ON_OFF.kind
 
 
 class _DeadZoneNumbers(NamedTuple):
@@ -143,18 +138,13 @@ _DEAD_ZONE_NUMBERS = (
     Quantity("release", "", "error at which it closes again, in counts", None, 0.0, float(LARGEST_READING)),
     Quantity("opening", "", "command while it is open, in steps", None, 0.0, float(COMMAND_STEPS)),
 )
-DEAD_ZONE_FIXED_POINT = fixed_point_kind(
+DEAD_ZONE = fixed_law(
     FLOAT_DEAD_ZONE,
     _DeadZoneRows,
-    each(float, _DeadZoneCounts(0, 1)),
+    _DeadZoneCounts(0, 1),
+    dead_zone_sample,
     dead_zone_update,
     Numbers("on_off_dead_zone_fixed_point", (*OF_STEPS, *_DEAD_ZONE_NUMBERS), prepare_dead_zone, largest_dead_zone),
+    {"direction": (-1, 1), "sound": (0, 1)},
 )
-DEAD_ZONE = FixedLaw(
-    kind=DEAD_ZONE_FIXED_POINT,
-    sample=dead_zone_sample,
-    numbers=_DeadZoneNumbers,
-    number_quantities=_DEAD_ZONE_NUMBERS,
-    begins=_DeadZoneCounts(0, 1),
-    state_ranges={"direction": (-1, 1), "sound": (0, 1)},
-)
+DEAD_ZONE_FIXED_POINT = DEAD_ZONE.kind

@@ -32,7 +32,7 @@ from ppafo.processor.fixed_point import (
     shifted,
     still_sound,
 )
-from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
+from ppafo.processor.torque_laws.law import Numbers, fixed_law
 
 PART_BITS = 6
 HALF_STEP = 2 ** (PART_BITS - 1)
@@ -173,23 +173,16 @@ _PID_NUMBERS = (
     Quantity("anti_windup", "", "share of the excess that is pulled back, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
     Quantity("dead_band", "", "dead band of the valve, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
 )
-_PID_BEGINS = _PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
 _LARGEST_ERROR = 2 * LARGEST_READING
 """Largest error [counts]: reference and pressure difference each span one range."""
-PID_FIXED_POINT = fixed_point_kind(
+PID = fixed_law(
     FLOAT_PID,
     _PidRows,
-    each(float, _PID_BEGINS),
+    _PidCounts(integral=0, error=0, slope=0, started=0, sound=1),
+    pid_sample,
     pid_update,
     Numbers("pid_fixed_point", (*OF_STEPS, *_PID_NUMBERS), prepare_pid, largest_pid),
-)
-PID = FixedLaw(
-    kind=PID_FIXED_POINT,
-    sample=pid_sample,
-    numbers=_PidNumbers,
-    number_quantities=_PID_NUMBERS,
-    begins=_PID_BEGINS,
-    state_ranges={
+    {
         "integral": (-LARGEST_INTEGRAL, LARGEST_INTEGRAL),
         "error": (-_LARGEST_ERROR, _LARGEST_ERROR),
         "slope": (-LARGEST_SLOPE, LARGEST_SLOPE),
@@ -197,3 +190,4 @@ PID = FixedLaw(
         "sound": (0, 1),
     },
 )
+PID_FIXED_POINT = PID.kind

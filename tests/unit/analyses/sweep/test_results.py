@@ -1,7 +1,6 @@
 """Results of a study: statistics of what is too large for the memory, tables and columns, bands, the figure."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,7 @@ COLUMNS = {
 @pytest.mark.parametrize("name", COLUMNS)
 def test_statistics_are_those_of_numpy(name: str) -> None:
     values = COLUMNS[name]
-    said = describe(lambda: iter(np.array_split(values, 7)), SHARES)
+    said = describe(np.array_split(values, 7), SHARES)
     assert said["count"] == values.size
     assert said["mean"] == pytest.approx(values.mean(), rel=1e-12)
     assert said["minimum"] == values.min()
@@ -41,10 +40,14 @@ def test_statistics_are_those_of_numpy(name: str) -> None:
 
 
 def test_nothing_has_a_count_only() -> None:
-    def parts() -> Iterator[np.ndarray]:
-        yield np.array([])
+    assert describe([np.array([])], SHARES) == {"count": 0}
+    assert describe([], SHARES) == {"count": 0}
 
-    assert describe(parts, SHARES) == {"count": 0}
+
+def test_statistics_have_the_same_bits_for_any_division_into_parts() -> None:
+    values = RANDOM.normal(1.0, 0.1, 100_003)
+    whole, *divided = (describe(np.array_split(values, number), SHARES) for number in (1, 2, 7, 1_000))
+    assert divided == [whole] * 3
 
 
 def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: StudyResults) -> None:

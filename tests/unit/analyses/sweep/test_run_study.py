@@ -212,6 +212,30 @@ def test_a_stopped_study_goes_on_to_the_same_bytes(
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
+def test_the_results_are_the_same_with_any_number_of_runs_of_a_chunk(
+    small_results: StudyResults, small: Any, tmp_path: Path
+) -> None:
+    small["runs_of_chunk"] = 7
+    again = sweep(small, out=tmp_path / "out").found
+    assert len(list((tmp_path / "out" / "runs").iterdir())) == 6
+    for name in ("summary.json", "bands.parquet"):
+        assert (tmp_path / "out" / name).read_bytes() == (small_results.folder.path / name).read_bytes()
+    for name, values in small_results.table(["rms_error", "supply.pressure"]).items():
+        np.testing.assert_array_equal(again.table([name])[name], values)
+
+
+def test_an_interrupt_in_the_first_moments_keeps_the_first_runs(small: Any, tmp_path: Path) -> None:
+    del small["runs_of_chunk"]
+    small["configurations"], small["sample"]["runs"] = small["configurations"][:1], 500
+    with pytest.raises(StoppedError):
+        sweep(small, out=tmp_path / "out", progress=stopped_after(1))
+    kept = sorted((tmp_path / "out" / "finished").iterdir())
+    assert [json.loads(path.read_bytes())["runs"] for path in kept] == [64, 128][: len(kept)]
+    sweep(small, out=tmp_path / "out")
+    sweep(small, out=tmp_path / "in-peace")
+    assert contents(tmp_path / "out") == contents(tmp_path / "in-peace")
+
+
 def cut(content: bytes) -> bytes:
     """The first half."""
     return content[: len(content) // 2]
@@ -292,6 +316,19 @@ def test_a_changed_study_is_refused_with_what_changed(
         sweep(small, out=small_results.folder.path)
     assert "\n" not in str(caught.value)
     assert contents(small_results.folder.path) == before
+
+
+def test_results_of_a_study_and_of_a_run_name_the_function_that_reads_them(
+    small_results: StudyResults, tmp_path: Path
+) -> None:
+    for read in (ppafo.read_result, ppafo.read_recording):
+        with pytest.raises(DataError, match=r"results of a study, not of a run; read them by load_study_results$"):
+            read(small_results.folder.path)
+    folder = ppafo.simulate("step-response", overrides=["run.duration=10 ms"]).save(tmp_path / "run")
+    with pytest.raises(DataError, match=r"no study results .*; read the result of a run by read_result$"):
+        ppafo.load_study_results(folder)
+    with pytest.raises(DataError, match=r"no study results \(study\.json cannot be read\)$"):
+        ppafo.load_study_results(tmp_path / "nothing")
 
 
 def test_the_folder_of_another_study_is_refused(small_results: StudyResults, small: Any) -> None:

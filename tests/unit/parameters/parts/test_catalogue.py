@@ -131,6 +131,21 @@ def test_two_unknown_keys_of_a_table_list_the_allowed_keys_once() -> None:
     )
 
 
+def test_a_cylinder_in_a_catalogue_is_told_what_is_sized_and_where_to_describe_it() -> None:
+    figure = '{ value = 32.0, unit = "mm", origin = "datasheet", source = "its sheet" }'
+    part = f'[actuators.own]\nmaker = "Acme"\nmodel = "C32"\nbore = {figure}\n'
+    with pytest.raises(ParameterError) as caught:
+        parse_catalogue(f"{GOOD}\n{part}".encode(), "mine.toml")
+    assert "unknown key 'actuators.own.bore'" in str(caught.value)
+    assert str(caught.value).endswith(
+        "; 'ppafo design' sizes vanes only: write a cylinder as a parameter set ('ppafo new set NAME --from "
+        "cylinder-lever') and search supply.pressure by 'ppafo find' with controller.kind=damped_proportional"
+    )
+    with pytest.raises(ParameterError) as caught:
+        parse_catalogue(GOOD.replace('note = "scaled"', 'height = "scaled"').encode(), "mine.toml")
+    assert "vanes" not in str(caught.value)
+
+
 def test_every_key_that_parts_lack_is_in_one_refusal() -> None:
     two = GOOD.replace('note = "scaled"', "").replace('title = "Mine"', f'title = "Mine"\n{VALVE}')
     with pytest.raises(ParameterError) as caught:

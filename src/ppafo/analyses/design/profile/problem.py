@@ -17,7 +17,7 @@ from ppafo.documents.toml_text import beside
 from ppafo.errors import DataError, PpafoError, StudyError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.loading import reloaded
 from ppafo.parameters.parts import Part, load_catalogue
-from ppafo.parameters.parts.catalogue import DEFAULT
+from ppafo.parameters.parts.catalogue import DEFAULT, FOR_A_CYLINDER
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
@@ -27,7 +27,6 @@ from ppafo.units import parse_quantity, split_quantity
 _TORQUE = "N m"
 _ROUNDING = 1.0e-9
 """Fraction of the range of a profile below which a difference counts as rounding."""
-_FOR_A_LEVER = "; search supply.pressure by 'ppafo find' with controller.kind=damped_proportional"
 _MOMENT = 1.0e-5
 """Duration [s] of the torque step between two repetitions if the end differs from the start."""
 
@@ -358,7 +357,7 @@ def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file:
     """Load the scenario with the profile as its reference; it ends with a whole controller and output sample."""
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
-    plain.device.check_torque_constant("the size of a device", _FOR_A_LEVER)
+    plain.device.check_torque_constant("the size of a device", f"; {FOR_A_CYLINDER}")
     if plain.controller.is_open_loop:
         raise StudyError(
             f"{file}: scenario '{plain.name}' has no reference (controller.kind = "

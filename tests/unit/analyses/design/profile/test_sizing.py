@@ -18,6 +18,7 @@ from ppafo.analyses.design.profile.search import OSCILLATES, Trials, ceiling, ce
 from ppafo.analyses.design.profile.solve import _lasting_bottle, smallest_bottle
 from ppafo.analyses.design.question import design
 from ppafo.analyses.find.question import find
+from ppafo.cli.main import main
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.loading import load_scenario
@@ -272,7 +273,9 @@ def test_a_lever_cylinder_is_sized_by_the_search_that_its_refusal_names(tmp_path
     with pytest.raises(PpafoError, match="needs a torque proportional to the pressure difference") as refused:
         load_design(tmp_path / "lever.toml")
     assert "search supply.pressure by 'ppafo find' with controller.kind=damped_proportional" in str(refused.value)
-    changes = ["device.set=cylinder-lever", "controller.kind=damped_proportional"]
+    own = str(tmp_path / "my-cylinder.toml")
+    assert main(["new", "set", "my-cylinder", "--from", "cylinder-lever", "--out", own]) == 0
+    changes = [f"device.set={own}", "controller.kind=damped_proportional"]
     goal = "rms_error <= 0.5 N m"
     found = find(
         "torque-task-proportional", vary="supply.pressure=20..120 psi_g", such_that=goal, overrides=changes, grid=9
@@ -280,6 +283,19 @@ def test_a_lever_cylinder_is_sized_by_the_search_that_its_refusal_names(tmp_path
     # A bore of 25.7 mm, 5.1875 cm^2, on a lever of 25 mm gives at most 12.97 cm^3: 5 N m of the 6 N m need 385 kPa.
     assert found.value is not None
     assert found.value - ATMOSPHERE > 385.0e3
+
+
+def test_valves_of_two_kinds_are_compared_by_two_files_as_the_refusal_says(tmp_path: Path) -> None:
+    mixed = FILE.replace('["enfield-ls-v05s"]', '["enfield-ls-v05s", "festo-vovg-5v-pair"]')
+    for kind, other in (("proportional", "festo-vovg-5v-pair"), ("solenoid", "enfield-ls-v05s")):
+        (tmp_path / f"{kind}.toml").write_text(mixed.replace("torque-task-proportional", f"torque-task-{kind}"))
+        with pytest.raises(PpafoError, match=f"'{other}' is a .* name it in a second file") as refused:
+            load_design(tmp_path / f"{kind}.toml")
+        assert f"torque-task-{kind}" in str(refused.value)
+        remaining = (tmp_path / f"{kind}.toml").read_text().replace(f'"{other}"', "").replace("[, ", "[")
+        (tmp_path / f"{kind}.toml").write_text(remaining)
+        problem = load_design(tmp_path / f"{kind}.toml")
+        assert {valve.kind for valve in problem.valves} == {problem.scenario.device.valve.kind} == {kind}
 
 
 @pytest.mark.parametrize(
