@@ -28,7 +28,7 @@ from ppafo.walking.wearer import who_walks
 from ppafo.wording import argument_text
 
 _HEAD = ("valve", "actuator", ("peak torque", TORQUE), ("lowest toes", CLEARANCE))
-_OFFERED = "Alternatives, each tried in a walk (a pressure is an example, no limit):"
+_OFFERED = "Alternatives tried (no pressure is a limit):"
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _READING = (
     "Every pair of valve and actuator in the catalogue is simulated for a few strides at this pressure. Pairs with at "
