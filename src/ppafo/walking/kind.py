@@ -8,7 +8,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.simulation.law_signals import IN_WALK
 from ppafo.simulation.motion_kind import WALK, LawSignals
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking import contradictions, motion, planning, result
+from ppafo.walking import contradictions, evaluation, motion, planning
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,8 +32,8 @@ class WalkKind:
     switches = staticmethod(planning.switches)
     noise = staticmethod(planning.noise)
     law = staticmethod(planning.law_of)
-    lacks = staticmethod(result.lacks)
-    measured = staticmethod(result.measured)
+    lacks = staticmethod(evaluation.lacks)
+    measured = staticmethod(evaluation.measured)
 
     def sees(self, _scenario: Scenario) -> LawSignals:
         """Return the torque signals that the controller receives."""

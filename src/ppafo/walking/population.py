@@ -17,11 +17,11 @@ from ppafo.errors import ScenarioError
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.helping import STOPPED
 from ppafo.simulation.scenario import Scenario
+from ppafo.walking.evaluation import REMEDY
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_people
 from ppafo.walking.planning import plan_walks, task_sequence_of_walk, unrecorded
-from ppafo.walking.result import REMEDY
 from ppafo.walking.safety_events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.task_sequence_plan import turns_walked
 from ppafo.walking.walk import Progress, lasting, silent

@@ -23,14 +23,15 @@ from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle
-from ppafo.walking.bottle.course import WALKED, SupplyEnding
+from ppafo.walking.bottle.course import WALKED
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.declaration import THRESHOLDS
+from ppafo.walking.evaluation import result_of_walk
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, WalkMotion, duration_problems, walk_of, with_duration
 from ppafo.walking.planning import fed_device, plan_walk, task_sequence_of_walk
 from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.result import WalkResult, result_of_walk
+from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 
 Progress = Callable[[float, float], None]
@@ -204,7 +205,12 @@ def compare_walks(
     configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
     worn = walk(configuration, minutes=minutes, progress=progress)
     if worn.supply is not None and worn.supply.ending.kind != WALKED:
-        _check_strides_on_bottle(worn, worn.supply.ending)
+        ending = worn.supply.ending
+        if ending.time < SHORTEST_STRIDES * walk_of(worn.scenario).gait.stride_time:
+            raise SimulationError(
+                f"{worn.scenario.name}: with its bottle, the walk ends after {ending.time:.3g} s, within the first "
+                f"{SHORTEST_STRIDES} strides ({ending.message}); use a fuller, larger or warmer bottle"
+            )
         # The bottle has shortened the walk: the walk without the device is as long.
         minutes = float(worn.recording.time[-1]) / 60.0
     bare = walk(without_device(configuration), minutes=minutes, progress=progress)
@@ -215,38 +221,26 @@ def compare_walks(
     return WalkComparison(worn, bare, healthy_metrics(configuration))
 
 
-def _check_strides_on_bottle(worn: WalkResult, ending: SupplyEnding) -> None:
-    """Raise SimulationError for a walk that its bottle ends within the first strides."""
-    if ending.time < SHORTEST_STRIDES * walk_of(worn.scenario).gait.stride_time:
-        raise SimulationError(
-            f"{worn.scenario.name}: with its bottle, the walk ends after {ending.time:.3g} s, within the first "
-            f"{SHORTEST_STRIDES} strides ({ending.message}); use a fuller, larger or warmer bottle"
-        )
-
-
-def with_device_off(configuration: Scenario) -> Scenario:
-    """Return the walk with both chambers vented: no gas flows, and neither bottle nor supply lines are used."""
-    name = f"{configuration.name}-off"
-    control = Control(event_on_off.OFF.name, {}, configuration.controller.period)
-    motion = replace(walk_of(configuration), bottle=None, timing=THRESHOLDS)
-    # Links to numbers that are left out go too.
-    links = outside(configuration.links, "controller", "timing", "supply_line")
-    return replace(configuration, name=name, controller=control, motion=motion, supply_line=None, links=links)
-
-
 def without_device(configuration: Scenario) -> Scenario:
-    """Return the walk of this wearer without a device: no foot plate, actuator torque or friction.
+    """Return the walk of this wearer without a device: no foot plate, actuator torque or friction, and no gas flow.
 
-    The ankle has its own range of motion. The result does not depend on device or valve; faults of the device are
-    removed.
+    The ankle has its own range of motion. The result does not depend on device or valve; bottle, supply lines and
+    faults are removed.
     """
-    off = with_device_off(configuration)
-    device, motion = off.device, replace(_without_faults(walk_of(off)), shut_off={})
+    device, control = configuration.device, Control(event_on_off.OFF.name, {}, configuration.controller.period)
     # No torque and no displacement; the stops of the actuator become the range of the ankle.
     stops = Actuator(0.0, 0.0, *ANKLE_RANGE, _LEG_CHAMBER, _LEG_CHAMBER, 0.0, device.actuator.leak)
-    plate, friction = FootPlate(0.0, 0.0), Friction(0.0, 0.0, 0.0)
-    leg = replace(device, actuator=stops, friction=friction, foot_plate=plate, effects={}, links={})
-    return replace(off, name=f"{configuration.name}-without", device=leg, motion=motion)
+    parts = {"actuator": stops, "friction": Friction(0.0, 0.0, 0.0), "foot_plate": FootPlate(0.0, 0.0)}
+    return replace(
+        configuration,
+        name=f"{configuration.name}-without",
+        device=replace(device, **parts, effects={}, links={}),
+        controller=control,
+        motion=replace(_without_faults(walk_of(configuration)), bottle=None, timing=THRESHOLDS, shut_off={}),
+        supply_line=None,
+        # Links to numbers that are left out go too.
+        links=outside(configuration.links, "controller", "timing", "supply_line"),
+    )
 
 
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:

@@ -25,7 +25,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.simulate import REMEDY, result_of, simulate_many
-from ppafo.walking.result import _status as walk_status
+from ppafo.walking.evaluation import status_of_walk
 from tests.reference.reference_solver import compare_with_reference
 
 CHANNELS = {
@@ -332,8 +332,8 @@ def test_a_chamber_that_is_driven_far_above_its_supply_completes() -> None:
 
 def test_runs_of_an_ensemble_and_walks_with_too_many_parts_say_so_too() -> None:
     states = np.zeros((3, 1))
-    assert walk_status(1.5, True, states).message.endswith(f"t = 1.5 s; {TOO_MANY_PARTS}")
-    assert "parts" not in walk_status(1.5, False, states).message
+    assert status_of_walk(1.5, True, states).message.endswith(f"t = 1.5 s; {TOO_MANY_PARTS}")
+    assert "parts" not in status_of_walk(1.5, False, states).message
     outcome = MeteredRuns(2, OutputRequest({}, (), 1.0, np.empty(0)))
     outcome.failure_time[:] = 1.5
     outcome.too_many_parts[1] = True

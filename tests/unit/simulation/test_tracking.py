@@ -4,6 +4,8 @@ import ast
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from ppafo.remedy_trials import tried
 from ppafo.running import most_reversals, simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.tracking import tracking_in
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.simulation.tracking.rule import SettledPart, failure_of_task, settled_task
 from ppafo.study.runs import excess, with_companions
@@ -625,6 +628,36 @@ def test_a_verdict_has_the_limits_by_which_it_was_judged_and_the_swing() -> None
     assert re.search(r"RMS error [\d.]+ deg \(2 deg allowed\), largest error [\d.]+ deg \(2 deg allowed\)$", angle)
     still = ["reference.kind=constant", "reference.level=60 deg", "motion.angle=55 deg"]
     assert re.search(r"swing [\d.e-]+ deg \(1 deg allowed\)$", simulate("cylinder-servo", still).following)
+
+
+def test_a_swing_that_alone_is_beyond_its_limit_is_said_with_the_limit() -> None:
+    """An error that creeps from 1.9 to 0.1 deg: RMS and mean error are within their limits, the swing is not."""
+    still = ["reference.kind=constant", "reference.level=100 deg", "motion.angle=60 deg"]
+    result = simulate("cylinder-servo", still)
+    recording = result.recording
+    creep = np.interp(recording.time, recording.time[-1] * np.array([0.5, 1.0]), [1.9, 0.1])
+    angle = recording["reference_angle"] + np.where(recording.time > 0.0, np.radians(creep), recording["angle"][0])
+    angle[0] = recording["angle"][0]
+    crept: Any = SimpleNamespace(
+        scenario=result.scenario, metrics=result.metrics, recording=recording.with_channel("angle", angle, "rad")
+    )
+    verdict = tracking_in(crept)
+    assert verdict is not None
+    assert verdict.kind == "does not follow"
+    assert verdict.found.startswith("the angle does not follow its reference: swing 1.8 deg (1.2 deg allowed) from ")
+    assert verdict.worst == pytest.approx(math.radians(1.8), rel=1e-6)
+
+
+def test_loop_rates_are_computed_only_where_gains_are_computed_for_no_known_angle(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def unused(*_: object) -> float:
+        raise AssertionError
+
+    monkeypatch.setattr("ppafo.simulation.tracking.causes.quicker_at", unused)
+    fast = simulate(TASK, ["controller.proportional_gain=100 1/(N m)", "valve.delay=5 ms"])
+    assert fast.tracking is not None
+    assert fast.tracking.kind == "oscillates"
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import bottle_life, compare_walks, with_device_off
+from ppafo.walking.walk import bottle_life, compare_walks, without_device
 from tests.reference import bottle as independent
 
 WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
@@ -284,7 +284,7 @@ def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:
     changes = ["gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"]
     with pytest.raises(ScenarioError, match=r"gas_model\.kind.*omit gas_model\.kind, or the bottle"):
         load_walk(WALK, [*changes, "gas_model.wall_area_per_volume=100 1/m"], bottle=BOTTLE)
-    assert walk_of(with_device_off(configuration)).bottle is None
+    assert walk_of(without_device(configuration)).bottle is None
 
 
 def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_time(

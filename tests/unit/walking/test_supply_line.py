@@ -12,7 +12,7 @@ from ppafo.simulation.declaration import line_entries
 from ppafo.simulation.numbers import number_at, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk, walk, walk_population
-from ppafo.walking.walk import with_device_off
+from ppafo.walking.walk import without_device
 
 REGULATED = ("solenoid-regulators", "proportional-regulators")
 
@@ -76,7 +76,7 @@ def test_the_recording_has_line_pressures_only_where_there_are_lines() -> None:
 
 
 def test_a_walk_without_the_device_needs_no_lines() -> None:
-    assert with_device_off(load_walk("solenoid-regulators")).supply_lines is None
+    assert without_device(load_walk("solenoid-regulators")).supply_lines is None
 
 
 def test_a_tenfold_droop_costs_work_and_a_smaller_step_changes_little() -> None:

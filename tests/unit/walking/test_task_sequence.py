@@ -14,9 +14,10 @@ from ppafo.gait import load_gait
 from ppafo.model.contact import FLAT
 from ppafo.model.plant import chamber_mass, chamber_volumes
 from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking.evaluation import integral_of_a_stride
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk, planned_task_sequence
-from ppafo.walking.result import WalkResult, integral_of_a_stride
+from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import steady_strides, task_sequence_metrics
 from ppafo.walking.task_sequence import FILE, TaskSequence, load_task_sequence
 from ppafo.walking.walk import WalkComparison

@@ -9,9 +9,9 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import SimulationError
 from ppafo.simulation.scenario import Scenario
+from ppafo.walking.evaluation import REMEDY
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk, task_sequence_of_walk
-from ppafo.walking.result import REMEDY
 from ppafo.walking.stride_events import EVENTS, event_errors, known_events, true_events, within
 from ppafo.walking.task_sequence import TaskSegment, TaskSequence
 

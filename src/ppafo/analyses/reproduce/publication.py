@@ -19,9 +19,10 @@ from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, r
 from ppafo.progress import Progress, Report
 from ppafo.report.writing import format_reported_quantity, quantity
 from ppafo.units import from_si, parse_quantity
+from ppafo.walking.evaluation import integral_of_a_stride
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
-from ppafo.walking.result import WalkResult, integral_of_a_stride
+from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import healthy_metrics, walk
 from ppafo.wording import argument_text, known_names, nearest_name, said_missing
 

@@ -44,29 +44,34 @@ _AFTER_TOE_LOAD = 0.02
 """Time between toe load and the start of foot-flat that a remedy sets [strides]."""
 
 
+RemedyTrials = tuple[str, Sequence[tuple[str, ...]], str]
+"""Cause of missing help, the overrides of each remedy to try in turn, and advice if no remedy suffices."""
+
+
 def benefit_sentence(comparison: WalkComparison) -> str:
     """Return a sentence on whether the device helps, with the numbers of both walks; "" for a walk that diverged.
 
     The device helps by net work in push-off, toes above the ground, and an ankle closer to the healthy angle.
     """
     worn, bare = comparison.with_device, comparison.without_device
-    reasons = [] if worn.is_helped else [worn.help_text, *event_lines(worn.events)[:1], *_later_flat_foot(worn)]
-    if not comparison.is_completed or "net_push_off_work" not in worn.metrics:
-        return f"the device does not help: {'; '.join(reasons)}" if reasons else ""
     numbers, without = ({name: metric.value for name, metric in walked.metrics.items()} for walked in (worn, bare))
+    reasons = [] if worn.is_helped else [worn.help_text, *event_lines(worn.events)[:1], *_remedied(worn, drags=False)]
+    if not comparison.is_completed or "net_push_off_work" not in numbers:
+        return f"the device does not help: {'; '.join(reasons)}" if reasons else ""
     has_work = numbers["net_push_off_work"] > 0.0
     drags, drags_without = (metrics.get("lowest_toes", 0.0) < 0.0 for metrics in (numbers, without))
     both = numbers.keys() & without.keys()
     is_closer = "angle_difference" in both and without["angle_difference"] > numbers["angle_difference"]
     lifts = not drags and (drags_without or is_closer)
-    verdict = "the device helps" if has_work else "the device helps in swing alone"
     if reasons or not (has_work or lifts):
         verdict = "the device does not help"
     elif drags:
         verdict = "the device helps in push-off but not in swing"
+    else:
+        verdict = "the device helps" if has_work else "the device helps in swing alone"
     clauses = ", ".join([*_compared(numbers, without), *reasons])
-    needs_remedy = not reasons and walk_of(worn.scenario).bottle is None and (drags or not has_work)
-    return f"{verdict}, against the same walk without it: {clauses}{_remedied(worn, drags) if needs_remedy else ''}"
+    remedied = _remedied(worn, drags) if worn.is_helped and (drags or not has_work) else []
+    return "; ".join([f"{verdict}, against the same walk without it: {clauses}", *remedied])
 
 
 def _compared(numbers: Mapping[str, float], without: Mapping[str, float]) -> list[str]:
@@ -85,30 +90,55 @@ def _compared(numbers: Mapping[str, float], without: Mapping[str, float]) -> lis
     return clauses
 
 
-def _remedied(worn: WalkResult, drags: bool) -> str:
-    """Return a clause on the cause of missing help and the first remedy with push-off work and clear toes."""
-    cause, candidates, advice = _cause(worn, drags)
-    for overrides in candidates:
+def _remedied(worn: WalkResult, drags: bool) -> list[str]:
+    """Return a clause on the cause of missing help, with the first remedy that another walk confirms or advice.
+
+    The list is empty for a walk on a bottle, and for a cause without remedy and advice. A walk without help needs help
+    in at least half of the strides; a walk with help needs push-off work and, if its toes would drag, clear toes.
+    """
+    if walk_of(worn.scenario).bottle is not None:
+        return []
+    cause, remedies, advice = _trials(worn, drags)
+    for overrides in remedies:
         with contextlib.suppress(PpafoError):
             again = walk(reloaded(worn.scenario, overrides), minutes=_MINUTES)
-            toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
-            if again.status.is_completed and again.is_helped and work > 0.0 and (toes >= 0.0 or not drags):
+            if not (again.status.is_completed and again.is_helped):
+                continue
+            gain = again.help_text
+            if worn.is_helped:
+                toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
+                if work <= 0.0 or (drags and toes < 0.0):
+                    continue
                 gain = f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}"
-                return f"; {cause}: with {_changed(overrides)}, {gain}, simulated in another walk{_EXAMPLE}"
-    return f"; {cause}, and {advice}"
+            changes = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
+            return [f"{cause}: with {changes}, {gain}, simulated in another walk{_EXAMPLE}"]
+    return [f"{cause}, and {advice}"] if advice else []
 
 
-def _changed(overrides: Sequence[str]) -> str:
-    """Return overrides as words of a sentence."""
-    return " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
+def _trials(worn: WalkResult, drags: bool) -> RemedyTrials:
+    """Return the cause of missing help with its remedies; ``drags`` is True if the toes would drag."""
+    scenario = worn.scenario
+    if not worn.is_helped:
+        return _later_flat_foot(worn)
+    if scenario.controller.kind == "off":
+        return "its controller is off", _LAWS, "another controller alone does not help"
+    requested, available = _lifting_torques(worn) if drags else (0.0, 0.0)
+    if requested < _NEARLY * available and "hold_stiffness" in scenario.controller.settings:
+        return _stiffer_holds(scenario, requested, available)
+    other = "an actuator with more torque" if drags else "another timing of push-off"
+    return (
+        "the ankle is not lifted enough" if drags else "the torque opposes the motion",
+        [remedy(scenario, pressures).overrides for pressures in _raised_pressures(scenario)],
+        f"more supply pressure alone does not suffice; {other} was not tried",
+    )
 
 
-def _later_flat_foot(worn: WalkResult) -> list[str]:
-    """Return the start of foot-flat with which another walk is assisted, if the toes load too late; else nothing."""
+def _later_flat_foot(worn: WalkResult) -> RemedyTrials:
+    """Return a later start of foot-flat as remedy, if assistance ended because the toes load too late."""
     settings, starts = worn.scenario.controller.settings, worn.starts
     flags = [event.fault_flag for event in worn.events if event.fault_flag is not None]
-    if not flags or flags[0] is not FAULT_FLAGS[NOT_FLAT] or walk_of(worn.scenario).bottle is not None:
-        return []
+    if not flags or flags[0] is not FAULT_FLAGS[NOT_FLAT]:
+        return "", (), ""
     is_loaded = worn.recording["toe_force"] > settings["load_threshold"]
     loads = [np.argmax(is_loaded[start:end]) / (end - start) for start, end in pairwise(starts)]
     latest = max(loads, default=0.0) + settings["debounce"] / walk_of(worn.scenario).gait.stride_time
@@ -116,37 +146,29 @@ def _later_flat_foot(worn: WalkResult) -> list[str]:
     overrides = [f"controller.flat_from={begin:.2f}"]
     if begin >= settings["flat_to"]:
         overrides.append(f"controller.flat_to={begin + settings['flat_to'] - settings['flat_from']:.2f}")
-    if begin > settings["flat_from"]:
-        with contextlib.suppress(PpafoError):
-            again = walk(reloaded(worn.scenario, overrides), minutes=_MINUTES)
-            if again.status.is_completed and again.is_helped:
-                cause = f"the toes count as loaded up to {latest:.2g} strides after heel strike"
-                return [f"{cause}: with {_changed(overrides)}, {again.help_text}, simulated in another walk{_EXAMPLE}"]
-    return []
+    cause = f"the toes count as loaded up to {latest:.2g} strides after heel strike"
+    return cause, [tuple(overrides)] if begin > settings["flat_from"] else (), ""
 
 
-def _cause(worn: WalkResult, drags: bool) -> tuple[str, Sequence[tuple[str, ...]], str]:
-    """Return the cause of missing help, the overrides of each remedy to try, and advice if no remedy suffices."""
-    scenario = worn.scenario
-    if scenario.controller.kind == "off":
-        return "its controller is off", _LAWS, "another controller alone does not help"
-    raised = _raised_pressures(scenario)
-    requested, available = _lifting_torques(worn) if drags else (0.0, 0.0)
-    if requested < _NEARLY * available and "hold_stiffness" in scenario.controller.settings:
-        stiffer = _stiffer_holds(worn, requested, available)
-        # A stiffer hold alone comes before one with more pressure: the valve may fill the chamber too slowly.
-        changes = [*stiffer, *({**hold, **levels} for hold in stiffer[-2:] for levels in raised[:3])]
-        largest = remedy(scenario, stiffer[-1]).overrides[-1].replace("=", " = ", 1)
-        torques = f"{_TORQUE.text(requested)} at the lowest toes, where the actuator gives {_TORQUE.text(available)}"
-        cause = f"the ankle is not lifted enough, as the controller requests {torques}"
-        tried = "alone and with more supply pressure, were simulated and do not suffice"
-        advice = f"larger settings up to `{largest}`, {tried}"
-    else:
-        changes = raised
-        cause = "the ankle is not lifted enough" if drags else "the torque opposes the motion"
-        other = "an actuator with more torque" if drags else "another timing of push-off"
-        advice = f"more supply pressure alone does not suffice; {other} was not tried"
-    return cause, [remedy(scenario, numbers).overrides for numbers in changes], advice
+def _stiffer_holds(scenario: Scenario, requested: float, available: float) -> RemedyTrials:
+    """Return settings with which the controller requests more torque at the lowest toes as remedies, least first.
+
+    ``requested`` and ``available`` are the torques [N m] of controller and actuator there. A limit that cuts the
+    request is raised to the torque of the actuator.
+    """
+    settings, path = scenario.controller.settings, "controller.hold_stiffness"
+    limit = {"controller.largest_torque": available} if requested >= _NEARLY * settings["largest_torque"] else {}
+    stiffness = max(float(settings["hold_stiffness"]), declared_numbers(scenario)[path].default or 0.0)
+    holds = [*([limit] if limit else []), *({**limit, path: factor * stiffness} for factor in _STIFFER)]
+    # A stiffer hold alone comes before one with more pressure: the valve may fill the chamber too slowly.
+    filled = [{**hold, **pressures} for hold in holds[-2:] for pressures in _raised_pressures(scenario)[:3]]
+    largest = remedy(scenario, holds[-1]).overrides[-1].replace("=", " = ", 1)
+    return (
+        f"the ankle is not lifted enough, as the controller requests {_TORQUE.text(requested)} at the lowest toes, "
+        f"where the actuator gives {_TORQUE.text(available)}",
+        [remedy(scenario, numbers).overrides for numbers in (*holds, *filled)],
+        f"larger settings up to `{largest}`, alone and with more supply pressure, were simulated and do not suffice",
+    )
 
 
 def _raised_pressures(scenario: Scenario) -> list[dict[str, float]]:
@@ -171,14 +193,3 @@ def _lifting_torques(worn: WalkResult) -> tuple[float, float]:
     lowest = first + int(worn.averages["toe_height"].mean[first:last].argmin())
     request, angle = (float(worn.averages[name].mean[lowest]) for name in ("reference", "angle"))
     return -request, -torque_reach(worn.scenario.device, angle)[0]
-
-
-def _stiffer_holds(worn: WalkResult, requested: float, available: float) -> list[dict[str, float]]:
-    """Return settings of the controller by path that request more torque where the toes are lowest, least first.
-
-    A limit that cuts the request is raised to the torque [N m] that the actuator gives.
-    """
-    settings, path = worn.scenario.controller.settings, "controller.hold_stiffness"
-    limit = {"controller.largest_torque": available} if requested >= _NEARLY * settings["largest_torque"] else {}
-    stiffness = max(float(settings["hold_stiffness"]), declared_numbers(worn.scenario)[path].default or 0.0)
-    return [*([limit] if limit else []), *({**limit, path: factor * stiffness} for factor in _STIFFER)]

@@ -12,13 +12,14 @@ from ppafo.gait.recorded.table import MotionTable
 class Convention:
     """Meaning of the columns of a recorded file without a gait map.
 
-    ``columns`` is the map, ``plates`` are force plate columns, to be assigned to the foot by its motion, and
-    ``remarks`` are sentences for the user.
+    ``columns`` is the map, ``plates`` are force plate columns, to be assigned to the foot by its motion. ``remarks``
+    are sentences for the user, ``curve_remarks`` further sentences, each with the one curve of the map that it is on.
     """
 
     columns: GaitMap
     plates: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    curve_remarks: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import numpy as np
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.mean_stride import SignSource
+from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.contacts import force_of_plates
 from ppafo.gait.recorded.footfalls import FORCE
@@ -97,10 +98,11 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
         fitting = [each for each, table in pairs if name != "schema_version" and _is_there(each, table)]
         columns[name] = fitting[0] if fitting else choices[0]
     plates = tuple(dict.fromkeys(plate for convention in conventions for plate in convention.plates))
-    remarks = tuple(dict.fromkeys(remark for convention in conventions for remark in convention.remarks))
+    remarks = tuple(remark for convention in conventions for remark in convention.remarks)
+    curve_remarks = tuple(remark for convention in conventions for remark in convention.curve_remarks)
     # A force by the name of this foot is surer than contacts chosen by the lean of the shank.
     has_force = any(_is_there(columns["vertical_force"], table) for table in tables)
-    return Convention(GaitMap(**columns), () if has_force else plates, remarks)
+    return Convention(GaitMap(**columns), () if has_force else plates, remarks, curve_remarks)
 
 
 def _arranged(table: MotionTable, own: Set[str]) -> MotionTable:
@@ -112,9 +114,10 @@ def _arranged(table: MotionTable, own: Set[str]) -> MotionTable:
 
 
 def _named_in(own: GaitMap | None) -> dict[str, list[str]]:
-    """Return the columns that a user's map names, by curve, without their signs."""
-    curves = {} if own is None else {name: getattr(own, name) for name in own.model_fields_set - {"schema_version"}}
-    named = {name: column_names(mapped) for name, mapped in curves.items() if mapped is not None}
+    """Return the columns that a user's map names, by curve in the order of the map, without their signs."""
+    given = set[str]() if own is None else own.model_fields_set - {"schema_version"}
+    mapped = {name: getattr(own, name) for name in GaitMap.model_fields if name in given}
+    named = {name: column_names(curve) for name, curve in mapped.items() if curve is not None}
     return {name: [column.removeprefix("-") for column in columns] for name, columns in named.items()}
 
 
@@ -140,12 +143,9 @@ def _completed_map(own: GaitMap | None, tables: Sequence[MotionTable], side: Sid
         problems = [f"only the curves of the gait map are imported: {error}"]
     columns = usual.columns.model_copy(update={name: getattr(own, name) for name in own.model_fields_set})
     found = convention_of_map(columns, tables, side)
-    # Remarks on curves that the map replaces: by the name of the curve or of its column.
-    texts = [name.replace("_", " ") for name in named]
-    texts += [repr(column) for name, terms in _named_in(usual.columns).items() if name in named for column in terms]
-    remarks = [remark for remark in usual.remarks if not any(text in remark for text in texts)]
     plates = () if FORCE in named else found.plates or usual.plates
-    return Convention(found.columns, plates, tuple(dict.fromkeys([*found.remarks, *remarks, *problems])))
+    on_others = tuple((curve, remark) for curve, remark in usual.curve_remarks if curve not in named)
+    return Convention(found.columns, plates, (*found.remarks, *usual.remarks, *problems), on_others)
 
 
 def _is_there(mapped: object, table: MotionTable) -> bool:
@@ -189,8 +189,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         raise_noted(wrong)
     wrong += [DataError(table.problem) for table in tables if table.problem]
     is_usable = not wrong
-    own = settings.columns
-    named = _named_in(own)
+    own, named = settings.columns, _named_in(settings.columns)
     # A user's map names columns as the file has them; the convention of the format names them as arranged.
     tables = [_arranged(table, {column for columns in named.values() for column in columns}) for table in tables]
     settings, remarks = _with_subject(settings, tables, wrong)
@@ -226,8 +225,16 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
             remarks += more
     mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
     mended += _ends(walk, tables)
+    remarks += [*convention.remarks, *(remark for _, remark in convention.curve_remarks)]
     signs_from: SignSource = "columns" if settings.columns is None else "map"
-    return GaitSource(tables, columns, walk, settings, signs_from, (*remarks, *convention.remarks, *mended))
+    if FORCE in walk:
+        try:
+            check_force_scale(walk[FORCE].file, walk[FORCE].values, signs_from)
+        except DataError as error:
+            wrong.append(error)
+            # Scaled to 1, so that its events are still found.
+            walk[FORCE] = of_largest_one(walk[FORCE], is_upwards=True)
+    return GaitSource(tables, columns, walk, settings, signs_from, (*remarks, *mended))
 
 
 def of_largest_one(signal: Signal, is_upwards: bool = False) -> Signal:

@@ -1,21 +1,35 @@
-"""Selection of strides: rejection of strides with unusual duration, sensor drop-outs or an odd shape.
+"""Selection of strides: rejection of strides with lost samples, unusual duration, drop-outs or an odd shape.
 
 Rejected are recordings that no leg can produce: columns that stay constant while the wearer walks, drop-outs filled
 with the last value, and strides whose curve differs from all others.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in
+from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.columns import LOADS
+from ppafo.gait.recorded.contacts import contacts_of
 from ppafo.gait.recorded.curves import CurveStatistics
-from ppafo.gait.recorded.footfalls import Stride
+from ppafo.gait.recorded.footfalls import (
+    FORCE,
+    LEAST_STRIDES,
+    SHANK,
+    Footfalls,
+    Stride,
+    heel_strikes,
+    lost_in,
+    usable_strides,
+)
+from ppafo.gait.recorded.mapping import setting_text
 from ppafo.gait.recorded.signal import Signal
-from ppafo.gait.recorded.table import MotionTable
+from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
 from ppafo.signals.recording import Floats
+from ppafo.wording import count_of
 
 LARGEST_STRIDE_CHANGE = 0.25
 """Largest relative deviation from the median stride time; a larger one is a missed event or unsteady walking."""
@@ -59,16 +73,62 @@ class StrideSelection:
         return self
 
 
-def of_usual_time(strides: Sequence[Stride], least: int) -> StrideSelection:
-    """Return the strides whose duration differs from the median by at most the fraction LARGEST_STRIDE_CHANGE."""
-    if not strides:
-        return StrideSelection((), (), least)
+def select_strides(footfalls: Footfalls, given_least: int | None) -> StrideSelection:
+    """Return the strides with both angles whose duration differs from the median by at most LARGEST_STRIDE_CHANGE.
+
+    Strides with lost samples are rejected too. ``given_least`` is the least number of strides, None for the default.
+    """
+    walk = footfalls.walk
+    least = given_least or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
+    recorded = usable_strides(walk, footfalls.strides)
     # The median: one stop among ten strides would move a mean.
-    median = float(np.median([stride.time for stride in strides]))
-    kept = [stride for stride in strides if abs(stride.time - median) <= LARGEST_STRIDE_CHANGE * median]
-    why = "{:.3g} s long, the others are about " + f"{np.mean([stride.time for stride in kept]):.3g} s"
-    return StrideSelection(
-        tuple(kept), tuple((stride, why.format(stride.time)) for stride in strides if stride not in kept), least
+    median = float(np.median([stride.time for stride in recorded])) if recorded else 0.0
+    kept = [stride for stride in recorded if abs(stride.time - median) <= LARGEST_STRIDE_CHANGE * median]
+    usual = f"{np.mean([stride.time for stride in kept]):.3g} s" if kept else ""
+    odd = [stride for stride in recorded if stride not in kept]
+    unusual = [(stride, f"{stride.time:.3g} s long, the others are about {usual}") for stride in odd]
+    counts = [(stride, max(lost_in(walk[name], stride) for name in REQUIRED)) for stride in footfalls.strides]
+    lost = [(stride, f"markers or angles lost in {count_of(count, 'frame')}") for stride, count in counts if count]
+    return StrideSelection(tuple(kept), (*unusual, *lost), least)
+
+
+def check_enough(strides: StrideSelection, footfalls: Footfalls) -> None:
+    """Raise DataError for too few strides, with the cause: events, covered time or gaps."""
+    taken, least = len(strides.taken), strides.least
+    if taken >= least:
+        return
+    walk = {name: footfalls.walk[name] for name in (*REQUIRED, footfalls.events) if name in footfalls.walk}
+    spans = ", ".join(f"{name} {signal.time[0]:.4g} to {signal.time[-1]:.4g} s" for name, signal in walk.items())
+    count = count_of(taken, "whole stride")
+    where = FORCE if FORCE in walk else SHANK
+    events = f"{count_of(len(footfalls.strides), 'stride')} in the events"
+    if not footfalls.strides:
+        strikes = heel_strikes(where, walk)
+        if strikes:
+            events = f"{where} has one heel strike only, at {strikes[0]:.3g} s; a stride needs two"
+        elif where == FORCE and any(off is not None for _, off in contacts_of(walk[FORCE])):
+            events = (
+                f"no heel strike in {where}: the foot is on the ground at the start, and a heel strike follows a swing"
+            )
+        else:
+            events = f"no heel strikes were found in {where}: check its column"
+    fewer = f", or accept fewer with {setting_text('least_strides')}" if taken else ""
+    # From the last sample before the longest gap to the first one after it.
+    longest = max(
+        0.0 if signal.lost is None else float(np.max(np.diff(signal.time[~signal.lost]))) for signal in walk.values()
+    )
+    if longest > 0.0:
+        # Rounded up, so that the value in the remedy fills the gap.
+        needed = math.ceil(100.0 * longest - 1e-6) / 100.0
+        filled = f"fill the gaps ({setting_text('longest_gap', needed, f'{needed:g} s')})"
+        remedy = filled if needed <= LONGEST_FILLED else f"the longest gap of {longest:.3g} s cannot be filled"
+        raise DataError(
+            f"{walk['shank_angle'].file}: has {count} without missing samples, but at least {least} are needed; "
+            f"{remedy}{(', give' if fewer else ', or give')} a longer recording{fewer}"
+        )
+    raise DataError(
+        f"{walk['shank_angle'].file}: has {count} covered by both angles and events ({events}; {spans}), but at least "
+        f"{least} are needed; give a longer recording{fewer}"
     )
 
 

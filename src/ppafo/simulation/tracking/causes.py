@@ -5,12 +5,14 @@ from collections.abc import Callable
 import numpy as np
 
 from ppafo.control.catalog import switching_remedy
+from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, TORQUE, error_functions
 from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.numbers import declared_numbers, number_at
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.load_causes import (
     flung_at_start,
@@ -111,63 +113,76 @@ def _shut_valve(case: Case) -> TrackingCause | None:
 
 def oscillation(case: Case) -> TrackingCause | None:
     """Cause: valves, gains or small chambers make the loop oscillate."""
-    scenario, law = case.scenario, case.law
+    law = case.law
     if not (case.oscillates or case.only_switches):
         return None
     if law is None:
         return TrackingCause("the controller is user-defined", (), "reduce its gains")
-    visited = case.recording["angle"][case.settled.samples]
-    # A joint that moves far oscillates where its loop is fastest, near a stop.
-    extremes = () if case.only_switches else (np.min, np.max)
-    angles = [float(of(visited)) for of in (np.mean, *extremes)]
-    ratios = [quicker_at(scenario.device, angle, scenario.controlled) for angle in angles]
-    quicker, angle = max(zip(ratios, angles, strict=True))
-    # Gains are those of where the joint is to be, where that is known.
-    if scenario.motion.motion_kind.sees(scenario).places is not anywhere:
-        quicker = 1.0
     if case.only_switches:
-        # Full openings change the quantity during the dead time, however little is wanted.
-        step, dead_time = pair_step(scenario, law)
-        step *= quicker
-        ratio = step / case.settled.wanted
-        if ratio <= _FINE and not case.oscillates:
-            return None
-        controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-        declare = switching_remedy(scenario.controller.kind)
-        asks = f"`{law.name}` requests partial openings, which on/off valves do not have{declare}: "
-        opens = "" if law.only_switches else asks
-        text = (
-            f"{opens}the valves cause a step of {change_text(controlled, step)} in their dead time of "
-            f"{1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested change"
-        )
-        # Where a valve has gradual openings, a law that uses them for an angle is the better remedy.
-        gradual = (CASCADE,) if scenario.controlled == ANGLE else ()
-        return TrackingCause(text, (*gradual, *smaller_pair(scenario, ratio)), "take faster or smaller valves")
-    names = [quantity.name for quantity in speed_settings(scenario, law).values()]
+        return _step_of_valves(case, law)
+    names = [quantity.name for quantity in speed_settings(case.scenario, law).values()]
     if not names:
         return TrackingCause(
             "the controller is too fast for the delays of the loop", (), "reduce its gains or use a slower controller"
         )
-    sensors = scenario.sensors
-    reason = "the loop has delays that this gain does not include"
-    if np.ptp(visited) > _MOVING:
-        reason = "it is computed at constant volume and without load, but the joint moves"
-    if sensors.delay or scenario.supply_lines is not None:
-        reason = "the delay of sensors or supply lines causes it"
+    return gains_of_another_device(case) or _fast_loop(case, law, names[0])
+
+
+def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
+    """Cause: on/off valves change the controlled quantity during their dead time, however little is requested."""
+    scenario, angle = case.scenario, case.recording["angle"][case.settled.samples]
+    step_by_gains, dead_time = pair_step(scenario, law)
+    step = step_by_gains * _loop_rate(scenario, float(np.mean(angle)))
+    ratio = step / case.settled.wanted
+    if ratio <= _FINE and not case.oscillates:
+        return None
+    controlled = scenario.controlled if TORQUE in law.controls else TORQUE
+    declare = switching_remedy(scenario.controller.kind)
+    asks = f"`{law.name}` requests partial openings, which on/off valves do not have{declare}: "
+    text = (
+        f"{'' if law.only_switches else asks}the valves cause a step of {change_text(controlled, step)} in their dead "
+        f"time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested change"
+    )
+    # Where a valve has gradual openings, a law that uses them for an angle is the better remedy.
+    gradual = (CASCADE,) if scenario.controlled == ANGLE else ()
+    return TrackingCause(text, (*gradual, *smaller_pair(scenario, ratio)), "take faster or smaller valves")
+
+
+def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
+    """Cause: a default gain is too large for delays, noise, motion of the joint, or chambers that are small there."""
+    scenario, sensors, angle = case.scenario, case.scenario.sensors, case.recording["angle"][case.settled.samples]
+    # A joint that moves far oscillates where its loop is fastest, near a stop.
+    rates = [(_loop_rate(scenario, float(each)), float(each)) for each in (angle.mean(), angle.min(), angle.max())]
+    rate, fastest = max(rates)
+    if rate > _QUICKER:
+        text = (
+            f"at {level_text('rad', fastest)} the chambers are so small that the loop is {rate:.2g} times "
+            f"faster than at the angle for which `{gain}` is computed"
+        )
+        # Near a stop for a part of the time, a loop needs no gain for that angle throughout.
+        factors = (rate, 2.0 * rate) if rate == rates[0][0] else (2.0, 4.0, rate)
+        return TrackingCause(text, slower_loops(scenario, law, factors))
     if sensors.angle_noise or sensors.pressure_noise:
         noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
         reason = f"sensor noise ({noise}) reverses the command"
-    text = f"`{names[0]}` is about the gain computed for this device: {reason}"
-    slower = TrackingCause(text, slower_loops(scenario, law, (2.0, 4.0)))
-    if quicker > _QUICKER:
-        text = (
-            f"at {level_text('rad', angle)} the chambers are so small that the loop is {quicker:.2g} times "
-            f"faster than at the angle for which `{names[0]}` is computed"
-        )
-        # Near a stop for a part of the time, a loop needs no gain for that place throughout.
-        factors = (quicker, 2.0 * quicker) if quicker == ratios[0] else (2.0, 4.0, quicker)
-        slower = TrackingCause(text, slower_loops(scenario, law, factors))
-    return gains_of_another_device(case) or slower
+    elif sensors.delay or scenario.supply_lines is not None:
+        reason = "the delay of sensors or supply lines causes it"
+    elif np.ptp(angle) > _MOVING:
+        reason = "it is computed at constant volume and without load, but the joint moves"
+    else:
+        reason = "the loop has delays that this gain does not include"
+    text = f"`{gain}` is about the gain computed for this device: {reason}"
+    return TrackingCause(text, slower_loops(scenario, law, (2.0, 4.0)))
+
+
+def _loop_rate(scenario: Scenario, angle: float) -> float:
+    """Loop rate at an angle [rad], divided by the rate for which gains are computed [-].
+
+    It is 1 where the wanted angle is known, because gains are then computed for that angle.
+    """
+    if scenario.motion.motion_kind.sees(scenario).places is not anywhere:
+        return 1.0
+    return quicker_at(scenario.device, angle, scenario.controlled)
 
 
 def _static_friction(case: Case) -> TrackingCause | None:

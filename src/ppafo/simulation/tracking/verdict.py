@@ -16,6 +16,7 @@ from ppafo.simulation.tracking.causes import CAUSES_OF_TASK
 from ppafo.simulation.tracking.load_causes import cuts_wave, torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
+    LARGEST_MEAN_SWITCHED,
     LARGEST_SHARE,
     LARGEST_SHARE_OF_WAVE,
     REVERSALS,
@@ -59,7 +60,8 @@ class Tracking:
     the scenario's reason for a reference beyond reach, else "". ``at_rest`` is true if reference and joint stand still.
     ``since`` [s] is the start of the settled part, 0 for a walk. ``span`` is the range of the error of an angle that
     swings slowly, or of on/off valves whose RMS error alone is within its limit, else 0. ``worst`` is the largest error
-    beside a moving reference and ``allowed`` its limit, if the RMS error alone would be within its own limit, else 0.
+    beside a moving reference, or the range of the error beside a reference at rest, and ``allowed`` its limit, if RMS
+    and mean error are within theirs, else 0.
     """
 
     kind: Failure
@@ -124,13 +126,16 @@ class Tracking:
             return f"the {words} loop oscillates: {often}, {rms}"
         if self.kind == "overshoots":
             return f"the {words} overshoots: {plain_moved} instead of at most {wanted}"
+        if self.worst:
+            worst, limit = (change_text(self.controlled, each) for each in (self.worst, self.allowed))
+            number = "swing" if self.at_rest else "largest error"
+            return (
+                f"the {words} does not follow its reference: {number} {worst} ({limit} allowed){time_text(self.since)}"
+            )
         if self.rests and self.at_rest:
             missing = change_text(self.controlled, abs(self.missing))
             side = "below" if self.missing < 0.0 else "above"
             return f"the {words} stays {missing} {side} its reference (requested change {wanted})"
-        if self.worst:
-            worst, limit = (change_text(self.controlled, each) for each in (self.worst, self.allowed))
-            rms = f"largest error {worst} ({limit} allowed){time_text(self.since)}"
         return f"the {words} does not follow its reference: {rms}"
 
 
@@ -154,7 +159,9 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
     switches = only_switches(scenario, scenario.law)
     largest = float(largest_deviation(settled, switches))
     is_within = is_task and settled.error <= float(largest_error(settled, switches))
-    is_worst = is_within and not switches and not settled.rests and settled.worst > largest
+    deviation, is_pair_at_rest = (settled.span if settled.rests else settled.worst), switches and settled.rests
+    is_centred = not is_pair_at_rest or abs(settled.missing) <= LARGEST_MEAN_SWITCHED * settled.wanted
+    is_worst = is_within and is_centred and deviation > largest
     is_swing = (is_within and switches and settled.span > largest) or (settled.way > 0.0 and not settled.turns)
     return Tracking(
         kind=failure,
@@ -172,7 +179,7 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
         at_rest=settled.rests,
         since=settled.start,
-        worst=settled.worst if is_worst else 0.0,
+        worst=deviation if is_worst else 0.0,
         allowed=largest if is_worst else 0.0,
         span=settled.span if failure == "oscillates" and turning <= 1.0 and is_swing else 0.0,
     )

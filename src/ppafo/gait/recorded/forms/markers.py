@@ -69,13 +69,13 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
     backwards = "-" if forward.startswith("-") else ""
     angles = _label(labels, foot + _ANGLES)
     heel, toe = (_first(labels, foot, names) for names in (_HEELS, _TOES))
-    ankle_remarks: tuple[str, ...] = ()
+    ankle_remarks: tuple[tuple[str, str], ...] = ()
     # The model's own angle is preferred: its zero comes from a static trial.
     if angles is None and heel is not None and toe is not None:
         # Without markers of the shank the axes are unknown: those of a gait map's shank follow later.
         axes: dict[str, Any] = {"forward": forward, "vertical": vertical} if shin else {}
         angle = AngleMap(heel=heel, toe=toe, positive="plantarflexion", **axes)
-        ankle_remarks = (f"ankle angle from the markers {heel} and {toe}; zero from the flat foot",)
+        ankle_remarks = (("ankle_angle", f"ankle angle from the markers {heel} and {toe}; zero from the flat foot"),)
     else:
         column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
         angle = AngleMap(terms=(column,), positive="dorsiflexion", unit="deg")
@@ -87,7 +87,7 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
         **loads,
     )
     plates = tuple(name for name in table.columns if name.startswith(PLATE) and name.endswith(f".{vertical}"))
-    return Convention(columns, plates, (*remarks, *ankle_remarks, *units))
+    return Convention(columns, plates, remarks, (*ankle_remarks, *units))
 
 
 def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Side) -> Convention:
@@ -141,18 +141,18 @@ def _first(labels: Sequence[str], foot: str, names: Sequence[str]) -> str | None
 
 def _load_maps(
     table: MotionTable, labels: Sequence[str], foot: str, vertical: str, body_mass: float
-) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the maps of the measured loads, each with the unit inferred from its magnitude, and remarks.
+) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """Return the maps of the measured loads, each with the unit inferred from its magnitude, and remarks on curves.
 
     There is no force if ``vertical``, the axis upwards, is unknown (empty).
     """
     maps: dict[str, Any] = {}
-    remarks: list[str] = []
+    remarks: list[tuple[str, str]] = []
     moment = _label(labels, foot + _MOMENTS)
     if moment is not None and _is_measured(table, f"{moment}.x"):
         unit, load_remarks = load_unit(table, f"{moment}.x", "moment", body_mass)
         maps["ankle_moment"] = MomentMap(terms=(f"{moment}.x",), positive="plantarflexion", unit=unit)
-        remarks += load_remarks
+        remarks += [("ankle_moment", remark) for remark in load_remarks]
     reactions = (_label(labels, foot + name) for name in _REACTIONS)
     force = next(
         (f"{name}.{vertical}" for name in reactions if name and vertical and _is_measured(table, f"{name}.{vertical}")),
@@ -161,8 +161,8 @@ def _load_maps(
     if force is not None:
         unit, load_remarks = load_unit(table, force, "force", body_mass)
         maps["vertical_force"] = ForceMap(terms=(force,), unit=unit or "-")
-        remarks += load_remarks
-    return maps, tuple(remarks)
+        remarks += [("vertical_force", remark) for remark in load_remarks]
+    return maps, remarks
 
 
 def _is_measured(table: MotionTable, name: str) -> bool:

@@ -94,8 +94,9 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
         (numbered if len(sides) != 1 else own if side in sides else other).append(name)
     if own or (other and len(numbered) == 1):
         plates = tuple(own or numbered)
-        remarks = (f"vertical force: the sum of {' and '.join(plates)}",) if len(plates) > 1 else ()
-        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=plates)}), (), remarks)
+        summed = f"vertical force: the sum of {' and '.join(plates)}"
+        remarks = (("vertical_force", summed),) if len(plates) > 1 else ()
+        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=plates)}), curve_remarks=remarks)
     if len(numbered) == 1 and side == "right":
         return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=tuple(numbered))}))
     return Convention(usual.model_copy(update={"vertical_force": None}), tuple(numbered))

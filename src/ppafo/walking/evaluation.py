@@ -1,0 +1,146 @@
+"""Evaluation of a simulated walk: status, recording, strides, averages and metrics from the rows of the engine."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ppafo.engine.lanes import BatchResult, Floats
+from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, state_row_numbers
+from ppafo.engine.step.lane import LaneResult
+from ppafo.metrics import METRICS, evaluate
+from ppafo.metrics.metric import MetricKind, Metrics
+from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY
+from ppafo.simulation.motion_kind import Measured
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import Status
+from ppafo.units.shown import in_units
+from ppafo.walking.bottle.course import SupplyCourse
+from ppafo.walking.contradictions import check_no_bottle
+from ppafo.walking.motion import walk_of
+from ppafo.walking.person import as_drawn
+from ppafo.walking.planning import requests_torque, task_sequence_of_walk
+from ppafo.walking.recording import recording_of_walk
+from ppafo.walking.result import WalkResult
+from ppafo.walking.safety_events import SAFE_ROW, safety_events
+from ppafo.walking.strides import (
+    SegmentResult,
+    helped_strides,
+    mean_curves,
+    per_stride,
+    segment_results,
+    settled,
+    steady_strides,
+    stride_metrics,
+    stride_starts,
+    task_sequence_metrics,
+    walk_metrics,
+)
+
+REMEDY = "the time step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
+
+
+def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: SupplyCourse | None) -> WalkResult:
+    """Return the result of a walk from the outcome of its run, up to a divergence; ``supply`` is its bottle."""
+    rows = state_row_numbers(run)
+    failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
+    status = status_of_walk(failed, bool(too_many_parts), outcome.states)
+    time = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
+    # A recording has at least one sample, also of a walk that fails at once.
+    end = time.size if status.time is None else max(int(np.searchsorted(time, status.time)), 1)
+    record = {name: outcome.record[:end, row, 0] for name, row in rows.items()}
+    return _evaluated(scenario, run, time[:end], record, status, supply)
+
+
+def status_of_walk(failed: float, too_many_parts: bool, states: Floats) -> Status:
+    """Return the status of a walk from its time of failure [s], if any, and its last states."""
+    if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
+        return Status("completed", None, "completed")
+    # A last state that is not finite, without a time of failure, discards the whole walk.
+    time = failed if failed < NEVER_FAILED else 0.0
+    remedy = TOO_MANY_PARTS if too_many_parts else REMEDY
+    return Status("diverged", time, f"diverged at t = {time:.6g} s; {remedy}")
+
+
+@in_units(lambda scenario, *_: scenario.device.shown)
+def _evaluated(
+    scenario: Scenario,
+    run: Run,
+    time: Floats,
+    record: Mapping[str, Floats],
+    status: Status,
+    supply: SupplyCourse | None,
+) -> WalkResult:
+    """Return the result of a walk from its rows (samples,) by path at times [s], up to the time of a failure."""
+    motion = walk_of(scenario)
+    # The walk is compared with the healthy gait of the person who walked; the result keeps the scenario as planned.
+    gait, wearer = as_drawn(motion.gait, motion.wearer, motion.person)
+    of_person = replace(scenario, motion=replace(motion, gait=gait, wearer=wearer))
+    sequence = task_sequence_of_walk(of_person)
+    recording = recording_of_walk(of_person, run, time, record, supply)
+    starts = stride_starts(record["walk.strides"])
+    strides = per_stride(record, starts)
+    # A controller without a safe state assists every stride.
+    helped = helped_strides(record.get(SAFE_ROW, np.zeros(time.size)), starts)
+    # The first strides do not count for averages, in which the controller adapts; in a sequence only steady ones do.
+    every = np.ones(max(starts.size - 1, 0), dtype=np.bool_)
+    counted = settled(every) if sequence is None else steady_strides(sequence, time[starts])
+    averages, vented_averages = (mean_curves(recording, starts, chosen & counted) for chosen in (helped, ~helped))
+    metrics = walk_metrics(of_person, recording, strides, averages, starts, helped, counted)
+    vented = ~helped & counted
+    segments: tuple[SegmentResult, ...] = ()
+    if sequence is not None:
+        segments = segment_results(of_person, sequence, recording, strides["net_push_off_work"], starts)
+        metrics |= task_sequence_metrics(sequence, segments, recording, int((helped & counted).sum()))
+    return WalkResult(
+        scenario=scenario,
+        recording=recording,
+        strides=strides,
+        averages=averages,
+        metrics=Metrics(metrics),
+        status=status,
+        starts=starts,
+        helped=helped,
+        counted=counted,
+        vented_metrics=stride_metrics(of_person, strides, vented_averages, vented) if vented.any() else {},
+        events=safety_events(of_person, time, record),
+        segments=segments,
+        supply=supply,
+    )
+
+
+def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
+    """Return the integral of a channel over the ankle angle in one stride [channel unit times rad], mean over strides.
+
+    The mean uses the assisted strides that count for averages.
+    """
+    turned = np.diff(result.recording["angle"])
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
+    return float(np.diff(integral[result.starts])[result.helped & result.counted].mean())
+
+
+def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]) -> Measured:
+    """Return recording, metrics and status message of a walk from its rows (samples,) by path, at these times [s]."""
+    check_no_bottle(scenario)
+    result = _evaluated(scenario, run, time, record, Status("completed", None, "completed"), None)
+    # The catalogue lists metrics of plugins by module and object, a recording by the name of the metric.
+    kinds = {kind.name: kind for kind in METRICS.values()}
+    of_recording = evaluate(result.recording).items()
+    available = {name: metric for name, metric in of_recording if not lacks(scenario, kinds[name])}
+    return result.recording, {**available, **result.metrics}, result.status.message
+
+
+def lacks(scenario: Scenario, kind: MetricKind) -> str:
+    """Return the reason that a metric is not available for a walk; empty if it is available."""
+    if kind.of_reference:
+        return "a walk has no single torque reference; push_off_error is the error in push-off"
+    if kind.traced:
+        return "the metric needs the whole run over time, which a walk does not keep"
+    if LED_SHANK in kind.needs:
+        return "the metric needs a leg without ground contact, whose shank follows a gait"
+    if STEADY in kind.needs and walk_of(scenario).task_sequence is not None:
+        return "the metric is a mean over equal strides, but strides of a task sequence differ: omit the task sequence"
+    law = scenario.law
+    if REQUESTED in kind.needs and (law is None or not requests_torque(law)):
+        return f"controller '{scenario.controller.kind}' requests no torque"
+    return ""
