@@ -58,7 +58,7 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     assert verdict.is_useless
-    said = "with overrides=['supply.pressure=94.5 psi_g'] it follows, as a further run shows (an example, no limit)"
+    said = "for example, with overrides=['supply.pressure=94.5 psi_g'] it follows, as a further run shows"
     assert said in verdict.sentence
 
 

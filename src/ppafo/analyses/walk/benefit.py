@@ -36,8 +36,6 @@ _STIFFER = (2.0, 4.0)
 """Factors on the stiffness with which a controller lifts the foot, tried if the requested torque is too small."""
 _NEARLY = 0.95
 """Ratio of a torque to its limit from which the limit counts as reached [-]."""
-_EXAMPLE = " (an example, no limit)"
-"""Words behind a remedy: the numbers that were tried are not the least ones that suffice."""
 _MINUTES = 0.15
 """Duration of a walk with a remedy [min]: a few strides after the transient."""
 _AFTER_TOE_LOAD = 0.02
@@ -111,7 +109,7 @@ def _remedied(worn: WalkResult, drags: bool) -> list[str]:
                     continue
                 gain = f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}"
             changes = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
-            return [f"{cause}: with {changes}, {gain}, simulated in another walk{_EXAMPLE}"]
+            return [f"{cause}: for example with {changes}, {gain}, simulated in another walk"]
     return [f"{cause}, and {advice}"] if advice else []
 
 
