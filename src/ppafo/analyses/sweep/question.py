@@ -1,4 +1,4 @@
-"""Command ``sweep``: arguments of a study with results in a folder, or of a statistic over draws."""
+"""Command ``sweep``: run a study into a folder, or estimate a statistic of it, as its arguments ask."""
 
 from __future__ import annotations
 
@@ -63,16 +63,15 @@ def sweep_into_folder(
     >>> print(sweep_into_folder("torque-task-uncertainty", draws=4, out=Path("four")).said[0])
     torque-task-uncertainty: 8 runs: 8 completed
     """
-    from dataclasses import replace
-
     from ppafo.errors import StudyError
     from ppafo.report.drawing import load_drawing
     from ppafo.studies.draws import study_of
     from ppafo.wording import argument_text
 
-    # Before anything else imports Matplotlib, so that it comes without what it does for others.
+    # A module imported below may import Matplotlib, slowly: load_drawing imports it first, without its slow parts.
     load_drawing()
-    optional: dict[str, Any] = {
+    for_statistic_only: dict[str, Any] = {
+        "metric": metric,
         "width": width,
         "also": tuple(also) or None,
         "configuration": configuration,
@@ -80,37 +79,56 @@ def sweep_into_folder(
         "confidence": confidence,
         "maximum_failed": maximum_failed,
     }
-    # What is not given has the default of ``estimate``.
-    options = {name: value for name, value in optional.items() if value is not None}
+    given = {name: value for name, value in for_statistic_only.items() if value is not None}
     if statistic is None:
-        unused = [*(["metric"] if metric is not None else []), *options]
-        if unused:
+        if given:
             example = f"{argument_text('statistic', 'mean')} {argument_text('metric', 'rms_error')}"
-            raise StudyError(f"{unused[0]}: needs a statistic, for example {example}")
-        from ppafo.analyses.sweep.answer import write_sweep_report
-        from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, sweep
-
-        chosen = study_of(study, overrides, draws, seed)
-        target = out or Path("out") / chosen.name
-        try:
-            swept = sweep(chosen, threads=threads, out=target, agreed=agreed, progress=progress)
-            write_sweep_report(swept.found)
-        except KeyboardInterrupt:
-            is_begun = any(Path(target).glob("finished/chunk-*.json"))
-            raise KeyboardInterrupt(INTERRUPTED if is_begun else INTERRUPTED_AT_ONCE) from None
-        return swept
+            raise StudyError(f"{next(iter(given))}: needs a statistic, for example {example}")
+        return _study_into_folder(study_of(study, overrides, draws, seed), out, threads, agreed, progress)
     if metric is None:
         raise StudyError(f"statistic '{statistic}': needs a metric, for example {argument_text('metric', 'rms_error')}")
+    if draws is not None:
+        given["draws"] = draws
+    given |= {"statistic": statistic, "seed": seed, "threads": threads, "progress": progress}
+    return _statistic_into_folder(study_of(study, overrides), out, given)
+
+
+def _study_into_folder(
+    study: Study, out: str | Path | None, threads: int | None, agreed: bool, progress: Report | None
+) -> Finding[StudyResults]:
+    """Run a study into the folder ``out``, default out/NAME, and write its figure, page and summary there.
+
+    An interrupt is raised again with a message that tells whether the same command resumes the study.
+    """
+    from ppafo.analyses.sweep.answer import write_sweep_report
+    from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, sweep
+
+    # A text stays a text: in a Path, a URL is no longer recognised as one.
+    folder = out or Path("out") / study.name
+    try:
+        swept = sweep(study, threads=threads, out=folder, agreed=agreed, progress=progress)
+        write_sweep_report(swept.found)
+    except KeyboardInterrupt:
+        has_finished_chunk = any(Path(folder).glob("finished/chunk-*.json"))
+        raise KeyboardInterrupt(INTERRUPTED if has_finished_chunk else INTERRUPTED_AT_ONCE) from None
+    return swept
+
+
+def _statistic_into_folder(
+    study: Study, out: str | Path | None, arguments: Mapping[str, Any]
+) -> Finding[StatisticEstimate]:
+    """Estimate a statistic of a study and write its report into the folder ``out``, default out/NAME-METRIC.
+
+    ``arguments`` are the arguments of ``estimate`` that the user gave; ``estimate`` has the defaults of the others.
+    """
+    from dataclasses import replace
+
     from ppafo.analyses.sweep.statistic import estimate
     from ppafo.storage.owned_folder import check_owned_folder, marked_folder
 
-    chosen = study_of(study, overrides)
-    folder = Path(out or Path("out") / f"{chosen.name}-{metric}")
-    # Before anything is drawn: a folder of something else must cost no time.
+    folder = Path(out or Path("out") / f"{study.name}-{arguments['metric']}")
+    # The folder is checked before the draws, which may take minutes.
     check_owned_folder(folder, marked_folder("sweep"))
-    if draws is not None:
-        options["draws"] = draws
-    options |= {"seed": seed, "threads": threads, "progress": progress}
-    estimated = estimate(chosen, metric=metric, statistic=statistic, **options)
+    estimated = estimate(study, **arguments)
     estimated.save(folder)
     return replace(estimated, found=replace(estimated.found, folder=str(folder)))
