@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from operator import methodcaller
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 _MILLISECONDS = 1.0e3
 _AFTER_STEP = Kind("Time after the step", "ms")
+_TORQUE, _ERROR = Kind("Torque", "N m", "torque"), Kind("Error", "N m", "torque")
+_GAS = Kind("CO$_2$", "kg", "gas mass")
 _SHOWN_BEFORE_STEP = 0.03
 """Fraction of the time axis before the step, so that the rise within the first milliseconds stays visible."""
 _SHOWN_AFTER_STOP = 0.8
@@ -42,18 +44,36 @@ _ENLARGED = 40.0
 """Time after the step that is shown enlarged [ms]."""
 _BIN = 3.0
 """Interval [ms] for the band from the smallest to the largest reading of a measurement."""
-_CURVES = (
-    ("Vane angle", "Angle", "deg", ACTUAL.colour, (0.66, 0.36, 0.31, 0.34)),
-    ("Pressure difference, $P_1 - P_2$", "Difference", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),
-    ("Chamber 1 (plantarflexion), $P_1$", "Pressure", "psig", CHAMBER_1.colour, (0.22, 0.12, 0.3, 0.34)),
-    ("Chamber 2 (dorsiflexion), $P_2$", "Pressure", "psig", CHAMBER_2.colour, (0.69, 0.3, 0.29, 0.4)),
-)
-"""Panels of figure 7: name, quantity, unit, colour, and frame of the enlarged part (x, y, width, height)."""
 _EVENT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 3)), "alpha": 0.7, "zorder": 0.5}
 _LEVEL: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 0.9}
 _WORDS: dict[str, Any] = {"fontsize": 8.5, "va": "center"}
 _THIN: dict[str, Any] = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}
 _SMALL_WORDS: dict[str, Any] = {"fontsize": 7.5, "va": "center"}
+
+
+class _Curve(NamedTuple):
+    """Curve of figure 7 with its panel.
+
+    - ``title``: title of the panel, with the letter of the paper
+    - ``axis``: kind of the values
+    - ``colour``: colour of the model
+    - ``inset``: frame of the inset with the first milliseconds: x, y, width and height, as fractions of the panel
+    """
+
+    title: str
+    axis: Kind
+    colour: str
+    inset: tuple[float, float, float, float]
+
+
+_DIFFERENCE, _PRESSURE = Kind("Difference", "psi"), Kind("Pressure", "psig")
+_STEP_CURVES = (
+    _Curve("$\\bf{A}$   Vane angle", Kind("Angle", "deg"), ACTUAL.colour, inset=(0.66, 0.36, 0.31, 0.34)),
+    _Curve("$\\bf{B}$   Pressure difference, $P_1 - P_2$", _DIFFERENCE, ACTUAL.colour, inset=(0.69, 0.14, 0.29, 0.34)),
+    _Curve("$\\bf{C}$   Chamber 1 (plantarflexion), $P_1$", _PRESSURE, CHAMBER_1.colour, inset=(0.22, 0.12, 0.3, 0.34)),
+    _Curve("$\\bf{D}$   Chamber 2 (dorsiflexion), $P_2$", _PRESSURE, CHAMBER_2.colour, inset=(0.69, 0.3, 0.29, 0.4)),
+)
+"""Curves of figure 7, in the order of its panels."""
 
 
 def step_response_figure(
@@ -62,54 +82,43 @@ def step_response_figure(
     """Return figure 7: angle, pressure difference and both pressures over time, with ``events`` marked if known.
 
     ``synthetic`` is a recording of the simulated bench, drawn as a thin line with a band from the smallest to the
-    largest readings; below each panel, the difference from the model is stated.
+    largest readings; a further panel below each curve shows the measurement less the model.
     """
-    time, last = _MILLISECONDS * recording.time, _MILLISECONDS * float(recording.time[-1])
+    end = _MILLISECONDS * float(recording.time[-1])
     if events is not None:
-        last = min(last, _MILLISECONDS * events.stop_time * (1.0 + _SHOWN_AFTER_STOP))
-    time_limits = -_SHOWN_BEFORE_STEP * last, last
-    event_lines, event_names = _event_marks(events, last)
-    signals: list[Panel] = []
+        end = min(end, _MILLISECONDS * events.stop_time * (1.0 + _SHOWN_AFTER_STOP))
+    limits = -_SHOWN_BEFORE_STEP * end, end
+    event_times = () if events is None else (events.breakaway_time, events.stop_time)
+    event_lines = [Mark("at", x=_MILLISECONDS * time, colour=GREY, style=_EVENT) for time in event_times]
+    models = _curves(recording, levels)
+    marks = [
+        [Mark("line", _MILLISECONDS * recording.time, model, label="model", colour=curve.colour, style={"zorder": 3})]
+        for curve, model in zip(_STEP_CURVES, models, strict=True)
+    ]
     errors: list[Panel] = []
-    for letter, (name, quantity, unit, colour, inset_frame), model in zip(
-        "ABCD", _CURVES, _curves(recording, levels), strict=True
-    ):
-        marks = [Mark("line", time, model, label="model", colour=colour, style={"zorder": 3})]
-        if synthetic is not None:
-            measured = _curves(synthetic, levels)[len(errors)]
-            marks += _measured_marks(_MILLISECONDS * synthetic.time, measured)
-            error = measured - np.interp(synthetic.time, recording.time, model)
-            error_marks = [
-                Mark("line", _MILLISECONDS * synthetic.time, error, colour=EXPERIMENT.colour, style={"linewidth": 0.9}),
-                Mark("level", y=0.0, colour=colour, style={"linewidth": 1.0}),
-                *event_lines,
-            ]
-            kind, limit = Kind("Error", unit.replace("psig", "psi")), methodcaller("set_xlim", *time_limits)
-            errors.append(
-                Panel(_AFTER_STEP, kind, error_marks, "Measurement less model", then=limit, tall=0.85, shares_x=True)
-            )
-        # The first panel has the names of the events, and the legend of all panels.
-        marks += event_lines if signals else [*event_lines, *event_names]
-        legend, title = "" if signals else "figure", f"$\\bf{{{letter}}}$   {name}"
-        enlarge = partial(_enlarge, inset_frame, time_limits)
-        signals.append(
-            Panel(_AFTER_STEP, Kind(quantity, unit), marks, title, None, legend, enlarge, 2.3, shares_x=True)
-        )
+    if synthetic is not None:
+        time = _MILLISECONDS * synthetic.time
+        for curve, model, readings, own in zip(_STEP_CURVES, models, _curves(synthetic, levels), marks, strict=True):
+            own.extend(_measured_marks(time, readings))
+            error = readings - np.interp(synthetic.time, recording.time, model)
+            errors.append(_error_panel(curve, time, error, event_lines, limits))
+    panel = partial(Panel, _AFTER_STEP, legend="", tall=2.3, shares_x=True)
+    signals = [
+        panel(curve.axis, [*own, *event_lines], curve.title, then=partial(_enlarge, curve.inset, limits))
+        for curve, own in zip(_STEP_CURVES, marks, strict=True)
+    ]
+    # The first panel has the names of the events, and the legend of all panels.
+    names = [] if events is None else _event_names(events, end)
+    signals[0] = replace(signals[0], marks=[*signals[0].marks, *names], legend="figure")
     panels = [*signals[:2], *errors[:2], *signals[2:], *errors[2:]]
     return draw_panels(panels, 2, (3.15, 1.0), kind=(synthetic or recording).kind)
 
 
-def _event_marks(events: StepEvents | None, last: float) -> tuple[list[Mark], list[Mark]]:
-    """Return upright lines at the events, and their names, for panels that end at ``last`` [ms]."""
-    if events is None:
-        return [], []
-    # Names at angles [deg] at which nothing else is drawn at that time.
-    named = ((events.breakaway_time, 120.0, "breaks away"), (events.stop_time, 25.0, "at rest"))
-    times = [_MILLISECONDS * time for time, _, _ in named]
-    return [Mark("at", x=time, colour=GREY, style=_EVENT) for time in times], [
-        Mark("text", time + 0.01 * last, angle, label=name, colour=GREY, style=_SMALL_WORDS)
-        for time, (_, angle, name) in zip(times, named, strict=True)
-    ]
+def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
+    """Return the values (samples,) of the panels of figure 7, in the order and units of ``_STEP_CURVES``."""
+    first, second = recording["pressure_1"], recording["pressure_2"]
+    gauge = ((pressure - levels.atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
+    return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)
 
 
 def _measured_marks(time: Floats, readings: Floats) -> list[Mark]:
@@ -123,11 +132,29 @@ def _measured_marks(time: Floats, readings: Floats) -> list[Mark]:
     ]
 
 
-def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
-    """Return the curves of the panels of figure 7, in the order and units of ``_CURVES``."""
-    first, second = recording["pressure_1"], recording["pressure_2"]
-    gauge = ((pressure - levels.atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
-    return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)
+def _error_panel(
+    curve: _Curve, time: Floats, error: Floats, event_lines: Sequence[Mark], limits: tuple[float, float]
+) -> Panel:
+    """Return the panel of the measurement less the model over time [ms], below the panel of the ``curve``."""
+    marks = [
+        Mark("line", time, error, colour=EXPERIMENT.colour, style={"linewidth": 0.9}),
+        Mark("level", y=0.0, colour=curve.colour, style={"linewidth": 1.0}),
+        *event_lines,
+    ]
+    # The difference of two gauge pressures is no gauge pressure.
+    kind = Kind("Error", "psi" if curve.axis == _PRESSURE else curve.axis.unit)
+    set_limits = methodcaller("set_xlim", *limits)
+    return Panel(_AFTER_STEP, kind, marks, "Measurement less model", then=set_limits, tall=0.85, shares_x=True)
+
+
+def _event_names(events: StepEvents, end: float) -> list[Mark]:
+    """Return the names of the events for the angle panel, whose time axis ends at ``end`` [ms]."""
+    # At these angles [deg] nothing else is drawn at the time of the event.
+    named = ((events.breakaway_time, 120.0, "breaks away"), (events.stop_time, 25.0, "at rest"))
+    return [
+        Mark("text", _MILLISECONDS * time + 0.01 * end, angle, label=name, colour=GREY, style=_SMALL_WORDS)
+        for time, angle, name in named
+    ]
 
 
 def _enlarge(frame: tuple[float, float, float, float], ends: tuple[float, float], axes: "Axes") -> None:
@@ -150,7 +177,21 @@ def _enlarge(frame: tuple[float, float, float, float], ends: tuple[float, float]
     inset.set_title(f"first {_ENLARGED:.0f} ms", fontsize=font_size(7.5), color=GREY, loc="center", pad=2.0)
 
 
-_TORQUE, _GAS = Kind("Torque", "N m", "torque"), Kind("CO$_2$", "kg", "gas mass")
+class _TaskRun(NamedTuple):
+    """Torque task with one kind of valve.
+
+    - ``valve``: name of the valve
+    - ``style``: colour and line of the valve
+    - ``recording``: simulated run
+    - ``experiment``: recording of the same task on the simulated bench, None without one
+    - ``gas_in_paper``: gas that the paper states [g]
+    """
+
+    valve: str
+    style: DrawingStyle
+    recording: Recording
+    experiment: Recording | None
+    gas_in_paper: float
 
 
 def torque_task_figure(
@@ -166,61 +207,71 @@ def torque_task_figure(
     the solenoid valves and for the proportional valve [g]. ``synthetic`` are recordings of the same task on the
     simulated bench with both valves.
     """
-    runs = ((solenoid, SOLENOID, "solenoid"), (proportional, PROPORTIONAL, "proportional"))
-    torques = [
-        _torque_marks(run, style, ceiling, bench)
-        for (run, style, _), bench in zip(runs, synthetic or (None, None), strict=True)
-    ]
-    errors = [
-        Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8}),
-        *(Mark("line", run.time, run["reference"] - run["torque"], colour=style.colour) for run, style, _ in runs),
-    ]
-    gas: list[Mark] = []
-    for (run, style, name), stated in zip(runs, gas_in_paper, strict=True):
-        supplied = run["supplied_mass"]
-        label = f"{name}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g, in the paper {stated:g} g"
-        gas.append(Mark("line", run.time, supplied, label=label, colour=style.colour))
-        gas.append(Mark("level", y=stated / GRAMS_PER_KILOGRAM, colour=style.colour, style=_LEVEL))
+    experiments = synthetic or (None, None)
+    runs = (
+        _TaskRun("solenoid", SOLENOID, solenoid, experiments[0], gas_in_paper[0]),
+        _TaskRun("proportional", PROPORTIONAL, proportional, experiments[1], gas_in_paper[1]),
+    )
+    torques = [_torque_marks(run, ceiling) for run in runs]
     opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)
-    drawn = [mark.y for marks in torques for mark in marks]
+    errors = [Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8})]
+    for run in runs:
+        error = run.recording["reference"] - run.recording["torque"]
+        errors.append(Mark("line", run.recording.time, error, colour=run.style.colour))
+    gas = [mark for run in runs for mark in _gas_marks(run)]
+    most_gas = GRAMS_PER_KILOGRAM * max(float(run.recording["supplied_mass"][-1]) for run in runs)
+    limits = partial(methodcaller, "set", xlim=(float(solenoid.time[0]), float(solenoid.time[-1])))
+    torque_limits = limits(ylim=_torque_limits(torques))
+    chambers = limits(ylim=(0.0, 2.0), yticks=(0.5, 1.5), yticklabels=("2", "1"))
+    opening_limits = limits(ylim=(-0.08 if proportional["command"].min() >= 0.0 else -1.1, 1.08))
+    gas_limits = limits(ylim=(0.0, 1.1 * max(most_gas, *gas_in_paper)))
+    panel = partial(Panel, TIME, shares_x=True)
+    command_panel = partial(panel, Kind(), legend="", tall=0.7)
+    panels = [
+        panel(_TORQUE, torques[0], "Torque with solenoid valves, on or off", tall=2.3, then=torque_limits),
+        command_panel(_filling_marks(solenoid), "Chamber that the solenoid valves fill", then=chambers),
+        panel(_TORQUE, torques[1], "Torque with the proportional valve", tall=2.3, then=torque_limits),
+        command_panel([opening], "Opening of the proportional valve", then=opening_limits),
+        panel(_ERROR, errors, "Error: reference less torque, both valves", legend="", tall=1.3, then=limits()),
+        panel(_GAS, gas, "CO$_2$ from the supply (dotted: the paper)", tall=1.3, then=gas_limits),
+        _gas_panel(runs, most_gas),
+    ]
+    return draw_panels(panels, 1, (6.3, 1.0), kind=solenoid.kind)
+
+
+def _torque_limits(panels: Sequence[Sequence[Mark]]) -> tuple[float, float]:
+    """Return the limits of the torque axis [N m] that all torque panels share, 5 % beyond their marks."""
+    drawn = [mark.y for marks in panels for mark in marks]
     low, high = min(float(np.min(values)) for values in drawn), max(float(np.max(values)) for values in drawn)
     margin = 0.05 * (high - low)
-    most_gas = GRAMS_PER_KILOGRAM * max(float(run["supplied_mass"][-1]) for run, _, _ in runs)
-    torque_limits = {"ylim": (low - margin, high + margin)}
-    chambers = {"ylim": (0.0, 2.0), "yticks": (0.5, 1.5), "yticklabels": ("2", "1")}
-    opening_limits = {"ylim": (-0.08 if proportional["command"].min() >= 0.0 else -1.1, 1.08)}
-    gas_limits = {"ylim": (0.0, 1.1 * max(most_gas, *gas_in_paper))}
-    over_time: tuple[tuple[Kind, list[Mark], str, str, float, dict[str, Any]], ...] = (
-        (_TORQUE, torques[0], "Torque with solenoid valves, on or off", "above", 2.3, torque_limits),
-        (Kind(), _filling_marks(solenoid), "Chamber that the solenoid valves fill", "", 0.7, chambers),
-        (_TORQUE, torques[1], "Torque with the proportional valve", "above", 2.3, torque_limits),
-        (Kind(), [opening], "Opening of the proportional valve", "", 0.7, opening_limits),
-        (replace(_TORQUE, words="Error"), errors, "Error: reference less torque, both valves", "", 1.3, {}),
-        (_GAS, gas, "CO$_2$ from the supply (dotted: the paper)", "above", 1.3, gas_limits),
-    )
-    time_limits = float(solenoid.time[0]), float(solenoid.time[-1])
-    panels = [
-        Panel(TIME, kind, marks, title, None, legend, methodcaller("set", xlim=time_limits, **limits), tall, True)
-        for kind, marks, title, legend, tall, limits in over_time
-    ]
-    return draw_panels([*panels, _gas_panel(runs, most_gas)], 1, (6.3, 1.0), kind=solenoid.kind)
+    return low - margin, high + margin
 
 
-def _torque_marks(recording: Recording, style: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:
-    """Return marks of reference, torque and largest torque, over the broad line of a synthetic experiment."""
-    time, dashed = recording.time, {"linestyle": REFERENCE.line, "linewidth": 1.3}
+def _torque_marks(run: _TaskRun, ceiling: float) -> list[Mark]:
+    """Return marks of reference, torque and largest torque [N m], and the broad line of the synthetic experiment."""
+    recording, dashed = run.recording, {"linestyle": REFERENCE.line, "linewidth": 1.3}
     ceiling_label = f"maximum at this pressure: {ceiling:.1f} N m"
     marks = [
-        Mark("line", time, recording["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
+        Mark("line", recording.time, recording["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
         Mark("level", y=ceiling, label=ceiling_label, colour=GREY, style=_LEVEL),
-        Mark("line", time, recording["torque"], label="simulated", colour=style.colour),
     ]
-    if synthetic is not None:
-        named: dict[str, Any] = {"label": "synthetic experiment", "colour": EXPERIMENT.colour}
-        # Broader than what is simulated and darker than the grid: seen where both agree, too.
+    if run.experiment is not None:
+        time, torque = run.experiment.time, run.experiment["torque"]
+        # Broader than the simulated torque and darker than the grid, so that it is visible where both agree.
         broad = {"linestyle": "-", "linewidth": 4.5, "alpha": 0.75}
-        marks.insert(2, Mark("line", synthetic.time, synthetic["torque"], style=broad, **named))
-    return marks
+        named: dict[str, Any] = {"label": "synthetic experiment", "colour": EXPERIMENT.colour}
+        marks.append(Mark("line", time, torque, style=broad, **named))
+    return [*marks, Mark("line", recording.time, recording["torque"], label="simulated", colour=run.style.colour)]
+
+
+def _gas_marks(run: _TaskRun) -> list[Mark]:
+    """Return the line of the supplied gas over time [kg], and the level that the paper states."""
+    supplied, colour = run.recording["supplied_mass"], run.style.colour
+    label = f"{run.valve}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g, in the paper {run.gas_in_paper:g} g"
+    return [
+        Mark("line", run.recording.time, supplied, label=label, colour=colour),
+        Mark("level", y=run.gas_in_paper / GRAMS_PER_KILOGRAM, colour=colour, style=_LEVEL),
+    ]
 
 
 def _filling_marks(recording: Recording) -> list[Mark]:
@@ -237,27 +288,29 @@ def _filling_marks(recording: Recording) -> list[Mark]:
     return marks
 
 
-def _gas_panel(runs: Sequence[tuple[Recording, DrawingStyle, str]], most: float) -> Panel:
-    """Return the panel of the supplied gas at the end: bars in the chambers, vented, and below them leaked.
+def _gas_panel(runs: Sequence[_TaskRun], most: float) -> Panel:
+    """Return the panel of the supplied gas at the end [kg]: bars in the chambers and vented, and below them leaked.
 
-    The first of two runs is above, with labels for the legend; ``most`` is the larger gas [g].
+    The first of two runs is above and has the labels for the legend; ``most`` is the larger supplied gas [g].
     """
     marks: list[Mark] = []
     rows = (1.0, ("in the chambers", "vented", "leaked past the vane")), (0.0, ("", "", ""))
-    for (run, style, _), (height, labels) in zip(runs, rows, strict=True):
-        supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
-        inside = supplied - vented
-        amounts = ", ".join(f"{GRAMS_PER_KILOGRAM * mass:.2f}" for mass in (inside, vented, leaked))
-        marks.append(Mark("text", supplied, height, label=f"  {amounts} g", colour=BLACK, style=_WORDS))
-        bars = (
-            (0.0, inside, height, 0.25, style.colour, 1.0),
-            (inside, supplied, height, 0.25, style.colour, 0.35),
-            (supplied - leaked, supplied, height - 0.36, 0.05, GREY, 1.0),
+    for run, (height, (inside_label, vented_label, leaked_label)) in zip(runs, rows, strict=True):
+        supplied, vented, leaked = (
+            float(run.recording[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass")
         )
-        for label, (start, end, middle, half, colour, alpha) in zip(labels, bars, strict=True):
-            edges = (middle - half,) * 2, (middle + half,) * 2
-            marks.append(Mark("band", (start, end), edges, label=label, colour=colour, style={"alpha": alpha}))
-    # Room to the right of the longer bar for the amounts.
-    limits = {"xlim": (0.0, 1.8 * most), "yticks": (1.0, 0.0), "yticklabels": [name for _, _, name in runs]}
+        inside, colour = supplied - vented, run.style.colour
+        amounts = ", ".join(f"{GRAMS_PER_KILOGRAM * mass:.2f}" for mass in (inside, vented, leaked))
+        broad = (height - 0.25,) * 2, (height + 0.25,) * 2
+        thin = (height - 0.36 - 0.05,) * 2, (height - 0.36 + 0.05,) * 2
+        past_vane = supplied - leaked, supplied
+        marks += [
+            Mark("text", supplied, height, label=f"  {amounts} g", colour=BLACK, style=_WORDS),
+            Mark("band", (0.0, inside), broad, label=inside_label, colour=colour, style={"alpha": 1.0}),
+            Mark("band", (inside, supplied), broad, label=vented_label, colour=colour, style={"alpha": 0.35}),
+            Mark("band", past_vane, thin, label=leaked_label, colour=GREY, style={"alpha": 1.0}),
+        ]
+    # To the right of the longer bar there is space for the amounts.
+    limits = {"xlim": (0.0, 1.8 * most), "yticks": (1.0, 0.0), "yticklabels": [run.valve for run in runs]}
     set_limits = methodcaller("set", **limits)
     return Panel(_GAS, Kind(), marks, "Location of this gas at the end", then=set_limits, tall=0.75)
