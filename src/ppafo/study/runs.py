@@ -21,7 +21,7 @@ from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.metered import TrackingExcess, command_turning, needed_metrics, tracking_excess
-from ppafo.simulation.tracking.rule import smallest_change
+from ppafo.simulation.tracking.settled import smallest_change
 from ppafo.studies.distributions import Floats
 from ppafo.studies.limits import check_metrics
 from ppafo.study.blocks import runs_at_once

@@ -22,7 +22,8 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking import tracking_in
 from ppafo.simulation.tracking.pair_step import coarse_pair
-from ppafo.simulation.tracking.rule import SettledPart, failure_of_task, settled_task
+from ppafo.simulation.tracking.rule import failure_of_task
+from ppafo.simulation.tracking.settled import SettledPart, settled_task
 from ppafo.study.runs import excess, with_companions
 
 TASK = "torque-task-proportional"
@@ -172,7 +173,7 @@ def test_a_loop_that_keeps_only_the_mean_of_a_sine_does_not_follow_it() -> None:
     coarse = simulate("torque-task-solenoid", wave)
     assert coarse.tracking is not None
     settled = settled_task(coarse.scenario, coarse.recording)
-    assert 0.5 * 2.0 / math.sqrt(2.0) < settled.error < 0.25 * settled.wanted
+    assert 0.5 * 2.0 / math.sqrt(2.0) < settled.rms_error < 0.25 * settled.wanted_change
     assert "the valves cause a step of 2.19 N m in their dead time of 75 ms" in coarse.tracking.cause
     # A constant delay behind a slow ramp is not judged by how little the ramp changes.
     ramp = ["reference.kind=sine", "reference.level=3 N m", "reference.amplitude=1.5 N m", "reference.frequency=0.1 Hz"]
@@ -458,14 +459,15 @@ def test_an_angle_whose_joint_lacks_torque_is_told_the_pressure_with_which_it_fo
     given = ast.literal_eval(re.findall(r"overrides=(\[.*?\])", verdict.tried)[0])
     assert {text.partition("=")[0] for text in given} > {"supply.pressure", "supply.dorsiflexion_pressure"}
     again = settled_task(scenario, simulate("cylinder-servo", [*task, *given]).recording)
-    assert again.error < 0.25 * verdict.error
-    assert f"an RMS error of {math.degrees(again.error):.3g} deg is left" in verdict.tried
+    assert again.rms_error < 0.25 * verdict.error
+    assert f"an RMS error of {math.degrees(again.rms_error):.3g} deg is left" in verdict.tried
 
 
 def test_a_smooth_wave_of_a_torque_has_a_limit_on_its_largest_error() -> None:
-    wave = sampled(np.where(np.arange(200) % 50 < 3, 17.0, 0.0), "torque")._replace(rests=False, wave=28.0)
+    spikes = sampled(np.where(np.arange(200) % 50 < 3, 17.0, 0.0), "torque")
+    wave = spikes._replace(rests=False, reference_deviation=28.0)
     assert failure_of_task(wave, 0.0, False) is None
-    assert failure_of_task(wave._replace(is_smooth=True), 0.0, False) == "does not follow"
+    assert failure_of_task(wave._replace(is_reference_smooth=True), 0.0, False) == "does not follow"
 
 
 def sampled(error: np.ndarray, controlled: str) -> SettledPart:
@@ -475,17 +477,17 @@ def sampled(error: np.ndarray, controlled: str) -> SettledPart:
     return SettledPart(
         samples=slice(None),
         duration=2.0,
-        wanted=40.0 * unit,
-        error=float(np.sqrt(np.mean(error**2))) * unit,
-        missing=mean * unit,
-        swing=float(np.std(error)) * unit,
-        turns=0,
-        moved=40.0 * unit,
+        wanted_change=40.0 * unit,
+        rms_error=float(np.sqrt(np.mean(error**2))) * unit,
+        mean_error=mean * unit,
+        error_deviation=float(np.std(error)) * unit,
+        error_reversals=0,
+        value_range=40.0 * unit,
         peak=0.0,
         rests=True,
-        worst=float(np.max(np.abs(error))) * unit,
-        span=float(np.ptp(error)) * unit,
-        way=40.0 * unit if controlled == "angle" else 0.0,
+        largest_error=float(np.max(np.abs(error))) * unit,
+        error_range=float(np.ptp(error)) * unit,
+        reference_range=40.0 * unit if controlled == "angle" else 0.0,
     )
 
 
@@ -511,11 +513,11 @@ def test_noise_that_turns_the_command_on_the_way_is_no_oscillation_once_the_loop
     scenario = load_scenario("cylinder-servo", [*noisy, "controller.torque_gain=0.9 1/(N m)"])
     result = simulate(scenario)
     settled = settled_task(scenario, result.recording)
-    assert settled.reversals < 10.0
+    assert settled.command_reversal_rate < 10.0
     columns = {"motion.external_torque": np.zeros(1)}
     metered = run_ensemble(scenario, columns, with_companions([], scenario)).metrics
-    assert metered["settled_reversals"][0] == pytest.approx(settled.reversals, rel=1e-6)
-    assert metered["settled_span"][0] == pytest.approx(settled.span, rel=1e-6)
+    assert metered["settled_reversals"][0] == pytest.approx(settled.command_reversal_rate, rel=1e-6)
+    assert metered["settled_span"][0] == pytest.approx(settled.error_range, rel=1e-6)
     assert (excess(metered, scenario, columns).follows[0] == 1.0) == (result.tracking is None)
 
 
@@ -786,9 +788,9 @@ def test_noise_that_turns_the_command_until_the_joint_rests_is_not_counted_as_os
     half, last = (first + count) // 2, (first + 3 * count) // 4
     command[half:last] = np.where(np.arange(last - half) % 4 < 2, 1.0, -1.0)
     command[last:] = 0.0
-    assert settled_task(scenario, recording.with_channel("command", command, "-")).reversals == 0.0
+    assert settled_task(scenario, recording.with_channel("command", command, "-")).command_reversal_rate == 0.0
     command[last:] = np.where(np.arange(count - last) % 4 < 2, 1.0, -1.0)
-    assert settled_task(scenario, recording.with_channel("command", command, "-")).reversals > 100.0
+    assert settled_task(scenario, recording.with_channel("command", command, "-")).command_reversal_rate > 100.0
 
 
 def test_the_largest_error_is_said_where_it_decided() -> None:

@@ -10,7 +10,8 @@ from ppafo.metrics.switching import SHUT
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import Remedy
-from ppafo.simulation.tracking.rule import Failure, SettledPart, only_switches
+from ppafo.simulation.tracking.rule import Failure, only_switches
+from ppafo.simulation.tracking.settled import SettledPart
 
 _FULLY_OPEN = 0.98
 """Command above which a valve counts as fully open [-]."""

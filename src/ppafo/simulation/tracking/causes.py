@@ -99,17 +99,17 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     typical = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
     if typical <= SHUT and case.failure != "overshoots":
         return TrackingCause("the command stays 0: the gains are 0, or the dead zone is wider than the error")
-    if typical > _EDGE * band or settled.turns or case.failure == "overshoots":
+    if typical > _EDGE * band or settled.error_reversals or case.failure == "overshoots":
         return None
     known_band = float(scenario.controller.settings.get("dead_band", 0.0))
     if known_band >= band and _is_settling(case):
         return None
     remedies = [remedy(scenario, {"controller.dead_band": band})] if known_band < band else []
     # A law that knows the band asks for more openings than it gets, and errs by what its gain lacks.
-    gain_factor = band / typical if known_band < band else settled.error / (LARGEST_SHARE * settled.wanted)
+    gain_factor = band / typical if known_band < band else settled.rms_error / (LARGEST_SHARE * settled.wanted_change)
     remedies += larger_gains(scenario, case.law, (1.5 * gain_factor, 3.0 * gain_factor))
     remedies += default_integral_remedy(scenario, case.law)
-    if torque_asked(scenario, case.law, settled.error) is not None:
+    if torque_asked(scenario, case.law, settled.rms_error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
     relation = "stays within" if known_band < band else "hardly opens the valve beyond"
     text = f"the command of {typical:.2g} {relation} `valve.dead_band = {band:.2g}`"
@@ -138,11 +138,11 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
     scenario, angle = case.scenario, case.recording["angle"][case.settled.samples]
     step_by_gains, dead_time = pair_step(scenario, law)
     step = step_by_gains * _loop_rate(scenario, float(np.mean(angle)))
-    ratio = step / case.settled.wanted
+    ratio = step / case.settled.wanted_change
     if ratio <= _FINE and not case.oscillates:
         return None
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-    if law.only_switches and step < _SMALL_STEP * case.settled.span and controlled == scenario.controlled:
+    if law.only_switches and step < _SMALL_STEP * case.settled.error_range and controlled == scenario.controlled:
         return _wide_zone(case, law, step)
     declare = switching_remedy(scenario.controller.kind)
     asks = f"`{law.name}` requests partial openings, which on/off valves do not have{declare}: "
@@ -214,12 +214,12 @@ def _static_friction(case: Case) -> TrackingCause | None:
     """Cause: static friction, with the valve's dead band, holds the joint at rest off its reference."""
     scenario, settled = case.scenario, case.settled
     settings, holding = scenario.controller.settings, float(scenario.device.friction.static_torque)
-    requested = torque_asked(scenario, case.law, settled.error)
+    requested = torque_asked(scenario, case.law, settled.rms_error)
     gain = float(settings.get("torque_gain", 0.0))
     if requested is None or gain == 0.0:
         return None
     # Friction holds a joint still: it neither overshoots nor swings.
-    if case.failure == "overshoots" or (settled.rests and settled.swing > abs(settled.missing)):
+    if case.failure == "overshoots" or (settled.rests and settled.error_deviation > abs(settled.mean_error)):
         return None
     # A torque that creeps up while the joint rests is asked for beside the stiffness.
     known_friction = float(settings.get("static_torque", 0.0))
@@ -280,14 +280,14 @@ def _lag(case: Case) -> TrackingCause | None:
         return None
     delay = float(np.mean(slope * error)) / squares
     text = "the reference changes faster than the loop can follow"
-    if delay > 0.0 and delay**2 * squares >= _EXPLAINED * case.settled.error**2:
+    if delay > 0.0 and delay**2 * squares >= _EXPLAINED * case.settled.rms_error**2:
         text = f"it lags its reference by {1.0e3 * delay:.3g} ms"
     remedies = [*stiffened(scenario, (2.0, 4.0)), *larger_gains(scenario, case.law, (2.0, 4.0))]
     frequency = float(scenario.reference.settings.get("frequency", 0.0))
     for share in _SLOWER if frequency else ():
         slower = {"reference.frequency": share * frequency}
         # The judged half of a run shows a period of the slower reference.
-        if share * case.settled.periods < 1.0:
+        if share * case.settled.reference_periods < 1.0:
             slower["run.duration"] = 2.0 / (share * frequency)
         remedies.append(remedy(scenario, slower))
     return TrackingCause(text, tuple(remedies), "use larger gains, less delay or a slower reference")
@@ -320,7 +320,7 @@ def _law_without_torque_loop(case: Case) -> TrackingCause | None:
     law = case.law
     if case.scenario.controlled != ANGLE or law is None or law.only_switches:
         return None
-    if torque_asked(case.scenario, law, case.settled.error) is not None:
+    if torque_asked(case.scenario, law, case.settled.rms_error) is not None:
         return None
     text = f"`{law.name}` controls the angle without an inner torque loop and is slow against load and friction"
     return TrackingCause(text, (CASCADE,))

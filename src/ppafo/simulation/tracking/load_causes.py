@@ -27,7 +27,8 @@ from ppafo.simulation.tracking.remedies import (
     stiffer_laws,
     torque_asked,
 )
-from ppafo.simulation.tracking.rule import FEWEST_PERIODS, LARGEST_SHARE
+from ppafo.simulation.tracking.rule import LARGEST_SHARE
+from ppafo.simulation.tracking.settled import FEWEST_PERIODS
 
 _MARGINS = (1.05, 1.5)
 """Static torque at an increased supply pressure divided by the wanted torque; the second for a fast wave [-]."""
@@ -100,7 +101,7 @@ def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
     """Highest and lowest wanted torque with the reach there; a reference with a period counts with its own peaks."""
     scenario, samples = case.scenario, case.settled.samples
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
-    has_period = math.isfinite(case.settled.periods)
+    has_period = math.isfinite(case.settled.reference_periods)
     lowest, highest = profile_bounds(scenario.reference) if has_period else (reference.min(), reference.max())
     top, bottom = float(angle[int(np.argmax(reference))]), float(angle[int(np.argmin(reference))])
     return (
@@ -114,7 +115,7 @@ def cuts_wave(case: Case) -> bool:
     settled = case.settled
     if case.scenario.controlled != TORQUE or settled.rests or settled.ends_on_ramp:
         return False
-    return max(peak.lacking for peak in torque_peaks(case)) > LARGEST_SHARE * settled.wanted
+    return max(peak.lacking for peak in torque_peaks(case)) > LARGEST_SHARE * settled.wanted_change
 
 
 def torque_beyond_reach(case: Case) -> TrackingCause | None:
@@ -145,8 +146,8 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     elif PROFILES[scenario.reference.kind].is_monotone:
         changes.append({"reference.level": _WITHIN * worst.reach})
     # The judged half of a trial shows a period of the reference.
-    is_long = settled.rests or settled.periods >= FEWEST_PERIODS
-    longer = {} if is_long else {"run.duration": scenario.run.duration / settled.periods}
+    is_long = settled.rests or settled.reference_periods >= FEWEST_PERIODS
+    longer = {} if is_long else {"run.duration": scenario.run.duration / settled.reference_periods}
     return TrackingCause(text, tuple(remedy(scenario, {**each, **longer}) for each in changes), is_beyond_reach=True)
 
 
@@ -162,7 +163,7 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
     # A joint that rests beside its reference needs what breaks its static friction, too.
     holding = float(device.friction.static_torque) if case.settled.rests else 0.0
     is_within = lowest <= load <= highest
-    is_high = load > highest if not is_within else case.settled.missing < 0.0
+    is_high = load > highest if not is_within else case.settled.mean_error < 0.0
     needed_torque = load if not is_within else load + holding if is_high else load - holding
     if lowest <= needed_torque <= highest:
         return None
@@ -186,7 +187,7 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
         changes.append({"motion.external_torque": 0.7 * reach - (load - outside)})
     remedies = [remedy(scenario, numbers) for numbers in changes]
     # A law without an integral requests no torque where there is no error, and knows nothing of the load.
-    if torque_asked(scenario, case.law, case.settled.error) is not None:
+    if torque_asked(scenario, case.law, case.settled.rms_error) is not None:
         for numbers in changes:
             held = abs(numbers.get("motion.external_torque", outside)) + float(device.friction.static_torque)
             remedies += stiffer_laws(scenario, held, case.settled, numbers)
@@ -243,7 +244,7 @@ def flung_at_start(case: Case) -> TrackingCause | None:
     lacking = load - torque_at(start, float(initial.pressure_1), float(initial.pressure_2))
     # A lack of torque turns the joint to smaller angles.
     deviation = float(np.max((reference - angle) * np.sign(lacking)))
-    if abs(lacking) <= float(device.friction.static_torque) or deviation <= _FLUNG * case.settled.wanted:
+    if abs(lacking) <= float(device.friction.static_torque) or deviation <= _FLUNG * case.settled.wanted_change:
         return None
     atmosphere = float(device.supply.atmospheric_pressure)
     needed = supply_for(device, start, load)

@@ -5,27 +5,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ppafo.control.catalog import PROFILES
 from ppafo.metrics.metric import Floats
-from ppafo.metrics.settled import SETTLED_METRICS, SHORTEST_HOLD
-from ppafo.metrics.tracking import SUSTAINED
+from ppafo.metrics.settled import SETTLED_METRICS
 from ppafo.model.columns import first
-from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import (
     LARGEST_SHARE,
-    MOVED_JOINT,
     REVERSALS,
-    SettledPart,
     excess_of_task,
     excess_of_walk,
     is_noisy,
     only_switches,
-    settled_periods,
-    shortfall,
     torque_limit,
 )
+from ppafo.simulation.tracking.settled import SettledPart, settled_tasks
+from ppafo.simulation.tracking.shortfall import shortfall
 
 _OF_WALK = ("torque_error", "requested_torque", "peak_torque")
 """Metrics by which a walk is judged, in addition to the reversals of its command."""
@@ -87,63 +81,31 @@ def tracking_excess(
     with np.errstate(divide="ignore", invalid="ignore"):
         if not scenario.follows_reference:
             error, requested, peak = (numbers[name] for name in _OF_WALK)
-            wanted = np.nan_to_num(requested, nan=np.inf)
-            settled = _settled(wanted=wanted, error=np.nan_to_num(error), peak=peak)
+            of_walk: dict[str, Any] = {
+                "wanted_change": np.nan_to_num(requested, nan=np.inf),
+                "rms_error": np.nan_to_num(error),
+                "peak": peak,
+            }
+            settled = SettledPart(samples=slice(None), **of_walk)
             limit = torque_limit(scenario.controller.settings)
             # A law that requests no torque is judged by the peak alone.
             excess = excess_of_walk(settled, turning, limit)
             known = (np.isfinite(error) & (requested > 0.0)) | (np.isnan(error) & np.isfinite(peak) & (limit > 0.0))
             return TrackingExcess(np.where(known, excess, np.nan), np.where(counted | known, turning, np.nan))
-        settled = _settled_task(scenario, {name.removeprefix("settled_"): row for name, row in numbers.items()}, least)
+        settled = settled_tasks(scenario, numbers, least)
         found = excess_of_task(settled, only_switches(scenario, scenario.law))
         # On the ramp every loop is behind, and what lies beyond reach may not have been asked for yet.
         beyond = np.where(settled.ends_on_ramp, 0.0, shortfall(scenario))
-        allowed = LARGEST_SHARE * settled.wanted
+        allowed = LARGEST_SHARE * settled.wanted_change
         # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error.
         # The mean error of a wave does not show its peaks.
         cut = np.where(settled.rests, 0.0, beyond / allowed)
-        missing = np.where(beyond > 0.0, np.fmax(np.abs(settled.missing) / allowed, cut), 0.0)
+        missing = np.where(beyond > 0.0, np.fmax(np.abs(settled.mean_error) / allowed, cut), 0.0)
     known = np.isfinite(numbers["settled_error"])
     largest = np.max([turning, *found, missing], axis=0)
     known_verdict = known & ~(settled.is_undecided & (largest <= 1.0))
     # A value that does not move is no oscillation, however far it is from the reference, and a cut wave is none either.
-    oscillation = np.fmax(turning, np.where((found.still > 1.0) | (cut > 1.0), 0.0, found.swings))
+    oscillation = np.fmax(turning, np.where((found.standstill > 1.0) | (cut > 1.0), 0.0, found.oscillation))
     return TrackingExcess(
         largest=np.where(known_verdict, largest, np.nan), oscillation=np.where(counted | known, oscillation, np.nan)
     )
-
-
-def _settled_task(scenario: Scenario, numbers: Mapping[str, Floats], least: float) -> SettledPart:
-    """Settled part of tasks without recording, from metrics (runs,) by name."""
-    lowest, highest = profile_bounds(scenario.reference)
-    begun: Any = 0.0 if scenario.controlled == TORQUE else numbers["begun"]
-    asked = numbers["extent"]
-    wanted = np.maximum(asked, least)
-    is_upwards = np.abs(highest - begun) >= np.abs(lowest - begun)
-    peak = np.where(is_upwards, numbers["top"] - begun, begun - numbers["bottom"])
-    share = numbers["share_of_hold"]
-    is_held = scenario.controlled == ANGLE or (numbers["angle_range"] <= MOVED_JOINT)
-    turns = numbers["turns"]
-    return _settled(
-        wanted=wanted,
-        error=numbers["error"],
-        missing=numbers["missing"],
-        swing=np.sqrt(np.maximum(numbers["error"] ** 2 - numbers["missing"] ** 2, 0.0)),
-        turns=np.where(turns >= SUSTAINED, turns, 0.0),
-        moved=numbers["highest"] - numbers["lowest"],
-        peak=np.where(asked >= wanted, peak, 0.0),
-        rests=(share >= SHORTEST_HOLD) & is_held,
-        worst=numbers["worst"],
-        span=numbers["span"],
-        wave=numbers["wave"],
-        periods=settled_periods(scenario),
-        is_smooth=PROFILES[scenario.reference.kind].is_smooth,
-        way=np.maximum(asked, highest - lowest) if scenario.controlled == ANGLE else 0.0,
-        ends_on_ramp=(share <= 0.0) & PROFILES[scenario.reference.kind].is_monotone,
-    )
-
-
-def _settled(**numbers: Any) -> SettledPart:
-    """Numbers of the settled part, as arrays (runs,)."""
-    none: dict[str, Any] = dict.fromkeys(("duration", "missing", "swing", "turns", "moved", "peak"), 0.0)
-    return SettledPart(**{"samples": slice(None), "rests": False, **none, **numbers})

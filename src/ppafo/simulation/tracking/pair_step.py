@@ -17,9 +17,9 @@ from ppafo.simulation.tracking.rule import (
     REVERSALS,
     is_pair,
     only_switches,
-    smallest_change,
     torque_limit,
 )
+from ppafo.simulation.tracking.settled import smallest_change
 from ppafo.units import without_exponent
 from ppafo.units.shown import in_units
 from ppafo.wording import subject_text

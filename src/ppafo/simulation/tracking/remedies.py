@@ -15,7 +15,8 @@ from ppafo.simulation.default_gains import SLOPE_GAINS
 from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.rule import LARGEST_SHARE, SettledPart
+from ppafo.simulation.tracking.rule import LARGEST_SHARE
+from ppafo.simulation.tracking.settled import SettledPart
 from ppafo.units import without_exponent
 from ppafo.wording import override_text
 
@@ -182,7 +183,7 @@ def stiffer_laws(
     settings = scenario.controller.settings
     present, limit = float(settings["angle_stiffness"]), float(settings["error_limit"])
     damping, band = float(settings.get("angle_damping", 0.0)), dead_band(scenario)
-    allowed = LARGEST_SHARE * settled.wanted
+    allowed = LARGEST_SHARE * settled.wanted_change
     sufficient = (_TORQUE_OVER_FRICTION * holding / limit, 3.0 * holding / limit, holding / (0.8 * allowed))
     changes: list[dict[str, float]] = []
     for stiffness in sorted(value for value in sufficient if value > present > 0.0):

@@ -21,18 +21,17 @@ from ppafo.simulation.tracking.rule import (
     LARGEST_SHARE_OF_WAVE,
     REVERSALS,
     Failure,
+    deviation_limit,
     failure_of_task,
     failure_of_walk,
     is_noisy,
-    largest_deviation,
-    largest_error,
     most_reversals,
     only_switches,
-    settled_task,
-    settled_walk,
-    shortfall,
+    rms_error_limit,
     torque_limit,
 )
+from ppafo.simulation.tracking.settled import settled_task, settled_walk
+from ppafo.simulation.tracking.shortfall import shortfall
 from ppafo.simulation.tracking.walk_causes import CAUSES_OF_WALK
 from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
@@ -151,26 +150,28 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
     found = (find(case) for find in (CAUSES_OF_TASK if is_task else CAUSES_OF_WALK))
     cause, *others = (each for each in found if each is not None)
     # Reversals of the value where these fail, else of the command.
-    if settled.turns and turning <= 1.0:
-        per_second = settled.turns / settled.duration
+    if settled.error_reversals and turning <= 1.0:
+        per_second = settled.error_reversals / settled.duration
     overshoots, is_of_walk = failure == "overshoots", stride_time > 0.0
     # A loop that is quiet at the end reversed before the part whose error is stated.
-    is_over = turning > 1.0 and settled.reversals < _QUIET * per_second
+    is_over = turning > 1.0 and settled.command_reversal_rate < _QUIET * per_second
     interval = "second of the whole run" if is_over else "second"
     switches = only_switches(scenario, scenario.law)
-    largest = float(largest_deviation(settled, switches))
-    is_within = is_task and settled.error <= float(largest_error(settled, switches))
-    deviation, is_pair_at_rest = (settled.span if settled.rests else settled.worst), switches and settled.rests
-    is_centred = not is_pair_at_rest or abs(settled.missing) <= LARGEST_MEAN_SWITCHED * settled.wanted
+    largest = float(deviation_limit(settled, switches))
+    is_within = is_task and settled.rms_error <= float(rms_error_limit(settled, switches))
+    deviation = settled.error_range if settled.rests else settled.largest_error
+    allowed_mean = LARGEST_MEAN_SWITCHED * settled.wanted_change if switches and settled.rests else math.inf
+    is_centred = abs(settled.mean_error) <= allowed_mean
     is_worst = is_within and is_centred and deviation > largest
-    is_swing = (is_within and switches and settled.span > largest) or (settled.way > 0.0 and not settled.turns)
+    is_slow_swing = settled.reference_range > 0.0 and not settled.error_reversals
+    is_swing = is_slow_swing or (is_within and switches and settled.error_range > largest)
     return Tracking(
         kind=failure,
         controlled=scenario.controlled,
-        error=settled.error,
-        wanted=torque_limit(scenario.controller.settings) if overshoots and not is_task else settled.wanted,
-        missing=settled.missing,
-        moved=settled.peak if overshoots else settled.moved,
+        error=settled.rms_error,
+        wanted=torque_limit(scenario.controller.settings) if overshoots and not is_task else settled.wanted_change,
+        missing=settled.mean_error,
+        moved=settled.peak if overshoots else settled.value_range,
         reversals=per_second * (stride_time if is_of_walk else 1.0),
         per="stride" if is_of_walk else interval,
         cause=cause.text,
@@ -182,7 +183,7 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         since=settled.start,
         worst=deviation if is_worst else 0.0,
         allowed=largest if is_worst else 0.0,
-        span=settled.span if failure == "oscillates" and turning <= 1.0 and is_swing else 0.0,
+        span=settled.error_range if failure == "oscillates" and turning <= 1.0 and is_swing else 0.0,
     )
 
 
@@ -204,11 +205,11 @@ def following_text(result: "RecordedResult") -> str:
     if case.failure is not None:
         return ""
     if settled.is_undecided:
-        left = f"with an RMS error of {change_text(controlled.name, settled.error)}{time_text(settled.start)}"
+        left = f"with an RMS error of {change_text(controlled.name, settled.rms_error)}{time_text(settled.start)}"
         if settled.ends_on_ramp:
             return _undecided_text(scenario, f"the run ends on the ramp of its reference, {left}")
-        short = f"the second half of the run has only {settled.periods:.2g} periods of the reference"
-        longer = override_text([f"run.duration={2.0 * scenario.run.duration / settled.periods:.3g} s"])
+        short = f"the second half of the run has only {settled.reference_periods:.2g} periods of the reference"
+        longer = override_text([f"run.duration={2.0 * scenario.run.duration / settled.reference_periods:.3g} s"])
         return f"no verdict on the {controlled.words}: {short}, {left}; not tried: {longer} should give one"
 
     def judged_text(name: str, number: float, limit: float | None, why: str = "") -> str:
@@ -217,15 +218,15 @@ def following_text(result: "RecordedResult") -> str:
 
     # The interval stands before the errors: metrics of the same names cover the whole run.
     begin = f"the {controlled.words} follows its reference;{time_text(settled.start)}: "
-    rms = ("RMS error", settled.error)
+    rms = ("RMS error", settled.rms_error)
     if not scenario.follows_reference:
-        return begin + judged_text(*rms, LARGEST_SHARE_OF_WAVE * settled.wanted)
+        return begin + judged_text(*rms, LARGEST_SHARE_OF_WAVE * settled.wanted_change)
     # The limit of on/off valves is several times wider, so the swing is reported beside the error.
     why = ", because the valves are either open or shut" if case.only_switches else ""
-    largest = float(largest_deviation(settled, case.only_switches))
+    largest = float(deviation_limit(settled, case.only_switches))
     limit = None if math.isinf(largest) else largest
-    deviation = ("swing", settled.span) if settled.rests else ("largest error", settled.worst)
-    texts = judged_text(*rms, float(largest_error(settled, case.only_switches)), why), judged_text(*deviation, limit)
+    deviation = ("swing", settled.error_range) if settled.rests else ("largest error", settled.largest_error)
+    texts = judged_text(*rms, float(rms_error_limit(settled, case.only_switches)), why), judged_text(*deviation, limit)
     # A reference just beyond reach is missed by no more than is allowed.
     beyond = torque_beyond_reach(case)
     return f"{begin}{', '.join(texts)}{'' if beyond is None else f'; {beyond.text}'}"
@@ -285,7 +286,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
         result.metrics[name].value if name in result.metrics else 0.0 for name in (REVERSALS, "strides")
     )
     stride_time = recording.duration / strides if strides > 0.0 else 0.0
-    counted = settled.reversals * max(recording.duration, 1.0) if is_noisy(scenario) else reversals
+    counted = settled.command_reversal_rate * max(recording.duration, 1.0) if is_noisy(scenario) else reversals
     turning = counted / most_reversals(scenario, law, recording.duration, stride_time)
     if is_task:
         failure = failure_of_task(settled, turning, only_switches(scenario, law))
@@ -299,7 +300,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     beyond = float(np.max(shortfall(scenario))) if is_task and not settled.ends_on_ramp else 0.0
     # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error. The
     # mean error of a wave does not show its peaks.
-    missing = abs(settled.missing) if settled.rests else max(abs(settled.missing), beyond)
-    if failure is None and beyond > 0.0 and missing > LARGEST_SHARE * settled.wanted:
+    missing = abs(settled.mean_error) if settled.rests else max(abs(settled.mean_error), beyond)
+    if failure is None and beyond > 0.0 and missing > LARGEST_SHARE * settled.wanted_change:
         case = case._replace(failure="does not follow")
     return case, turning, reversals / recording.duration, stride_time

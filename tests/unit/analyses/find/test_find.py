@@ -18,7 +18,7 @@ from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
 from ppafo.report.finding import Finding
-from ppafo.simulation.tracking.rule import settled_task
+from ppafo.simulation.tracking.settled import settled_task
 from tests.model_runs import model_runs
 
 Floats = NDArray[np.float64]
@@ -221,7 +221,7 @@ def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_erro
         "torque-task-solenoid", vary="supply.pressure=62..90 psi_g", such_that="final_error <= 0.5 N m", grid=15
     ).found
     alone = ppafo.simulate("torque-task-solenoid", ["supply.pressure=84 psi_g"])
-    final_error, there = alone.metrics["final_error"].value, settled_task(alone.scenario, alone.recording).error
+    final_error, there = alone.metrics["final_error"].value, settled_task(alone.scenario, alone.recording).rms_error
     assert final_error < 0.5
     assert there > 1.0
     assert found.value is None

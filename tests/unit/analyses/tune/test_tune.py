@@ -18,7 +18,7 @@ from ppafo.analyses.tune.result import Tuned
 from ppafo.errors import StudyError
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate_many
-from ppafo.simulation.tracking.rule import settled_task
+from ppafo.simulation.tracking.settled import settled_task
 from ppafo.studies.varying import value_at
 
 DOCUMENT: dict[str, Any] = {
@@ -313,7 +313,7 @@ def test_the_metric_that_is_printed_is_the_metric_and_what_is_judged_stands_apar
     quick = {"starts": 1, "generations": 1, "candidates_per_gain": 4}
     before = tune(changed(overrides=late, objective=[{"metric": "final_error"}], effort=quick)).found.before
     settled = settled_task(before.result.scenario, before.result.recording)
-    assert settled.turns > 4
+    assert settled.error_reversals > 4
     assert before.values["final_error"] == pytest.approx(before.metrics["final_error"].value, rel=1e-9)
-    assert before.judged["final_error"] == pytest.approx(settled.error, rel=1e-6)
+    assert before.judged["final_error"] == pytest.approx(settled.rms_error, rel=1e-6)
     assert before.judged["final_error"] > before.values["final_error"]
