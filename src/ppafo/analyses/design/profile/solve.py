@@ -96,7 +96,7 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
             text = PRESSURE.text(float(tried["pressure"][lowest + failing[0]]))
             remarks.append(f"at {text} the error limit is exceeded again")
     if is_cold:
-        remarks.append("a lighter bottle has enough gas, but gets too cold before the end")
+        remarks.append(f"a{' lighter' * (bottle is not None)} bottle has enough gas, but gets too cold before the end")
     if lowest is not None and bottles[chosen] is None:
         largest = max(problem.bottles, key=lambda part: part.values["content"])
         duration = f"{largest.name} lasts for {100.0 * largest.values['content'] / gas_in_all:.0f} % of the use"
