@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
+from ppafo.engine import loading
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from tests import costs
@@ -102,6 +103,14 @@ def test_what_was_long_is_left_out_of_the_short_suite_but_for_what_is_marked_sho
     assert costs_of(costly)["tests/test_burns.py"]["long"] == ["test_b", "test_d"], "what is gone does not"
 
 
+def test_parts_of_a_suite_share_no_file_and_leave_none_out(costly: Path) -> None:
+    parts = [run_tests("-v", "--part", part, cwd=costly).stdout for part in ("0/2", "7/2")]
+    assert [re.findall(r"^tests/\w+\.py::(\w+) PASSED", text, re.MULTILINE) for text in parts] == [
+        ["test_a", "test_b"],
+        ["test_c"],
+    ]
+
+
 def costs_of(folder: Path) -> dict[str, Any]:
     """What was recorded in a folder."""
     return tomllib.loads((folder / "tests" / "costs.toml").read_text(encoding="utf-8"))
@@ -115,6 +124,8 @@ def test_the_recorded_files_and_tests_are_there() -> None:
 
 @pytest.mark.usefixtures("fresh_cache")
 def test_a_model_that_is_compiled_counts_apart() -> None:
+    # A test before this one in the same process may have loaded the model.
+    loading._load_by.cache_clear()
     before = costs.BUILT.seconds
     simulate(load_scenario("step-response", ["sensors.delay=3 ms"]))
     assert costs.BUILT.seconds > before + 0.05

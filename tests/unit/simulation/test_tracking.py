@@ -58,7 +58,8 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     assert verdict.is_useless
-    assert "with overrides=['supply.pressure=94.5 psi_g'] it follows, as a further run shows" in verdict.sentence
+    said = "for example, with overrides=['supply.pressure=94.5 psi_g'] it follows, as a further run shows"
+    assert said in verdict.sentence
 
 
 def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> None:
@@ -192,6 +193,21 @@ def test_a_valve_that_opens_away_from_the_reference_is_not_called_too_small() ->
     assert "drives away from the reference for 100 % of this time; reverse the sign" in told.sentence
 
 
+KNEE = [
+    "controller.kind=pid",
+    "reference.of=torque",
+    "reference.kind=sine",
+    "reference.level=0 N m",
+    "reference.amplitude=4 N m",
+    "reference.frequency=0.5 Hz",
+    "run.duration=6 s",
+    "motion.angle=100 deg",
+    "foot_plate.inertia=0.46 kg m^2",
+    "foot_plate.gravity_torque=11.7 N m",
+]
+"""A wave of the torque on a joint that hangs, whose lever is short at its stops."""
+
+
 @pytest.mark.parametrize(
     ("scenario", "column", "values"),
     [
@@ -201,10 +217,13 @@ def test_a_valve_that_opens_away_from_the_reference_is_not_called_too_small() ->
         ("pressure-loop", "controller.proportional_gain", [1.0e-8, 1.0e-5]),
         ("cylinder-servo", "motion.external_torque", [0.2, 5.0, 14.0]),
         ("sine", "controller.proportional_gain", [0.001, 0.01, 0.1, 4.5]),
+        # At its stop, where the lever is short, the joint gets 2.86 N m.
+        ("knee", "reference.amplitude", [1.0, 3.0, 3.5, 4.0, 5.0, 9.0]),
     ],
 )
 def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: str, values: list[float]) -> None:
-    base = load_scenario(TASK, SMALL_SINE) if scenario == "sine" else load_scenario(scenario)
+    changed = {"sine": (TASK, SMALL_SINE), "knee": ("cylinder-servo", KNEE)}
+    base = load_scenario(*changed.get(scenario, (scenario, [])))
     columns = {column: np.array(values)}
     metered = run_ensemble(base, columns, with_companions([], base)).metrics
     alone = [simulate(with_numbers(base, {column: value})).tracking is None for value in values]
@@ -517,6 +536,56 @@ def test_a_free_joint_that_its_torque_presses_on_a_stop_is_told_so() -> None:
     assert told.remedies == ()
 
 
+def test_a_joint_that_reaches_a_stop_is_told_side_time_and_share_although_its_torque_follows() -> None:
+    free = simulate(TASK, ["motion.kind=free", "reference.level=3 N m"])
+    assert free.tracking is None
+    rests = np.degrees(free["angle"]) > 129.9
+    reached, share = free["time"][int(np.argmax(rests))], 100.0 * np.count_nonzero(rests) / rests.size
+    assert free.warnings[0] == (
+        f"the joint reaches its upper stop (130 deg) at {reached:.3g} s and lies on it for {share:.0f} % of the run: "
+        "there the stop bears the torque; not tried: lock the joint (overrides=['motion.kind=locked']) or add a load"
+    )
+    # A run that starts on the lower stop is told the upper one alone, and nothing of a torque that nobody asks for.
+    (opened,) = simulate("step-response").warnings
+    assert re.fullmatch(
+        r"the joint reaches its upper stop \(130 deg\) at 0\.1[78]\d* s and lies on it for \d+ % of the run", opened
+    )
+    pressed = simulate("cylinder-servo", ["motion.external_torque=20 N m"]).warnings
+    assert any(said.startswith("the joint reaches its lower stop (20 deg) at 0.03") for said in pressed)
+    for scenario in ("cylinder-servo", "pressure-loop", "torque-task-moving-ankle"):
+        assert simulate(scenario).warnings == ()
+
+
+@pytest.mark.parametrize("law", ["pid", "damped_proportional", "on_off", "sliding_mode"])
+def test_a_changed_sensor_that_the_controller_does_not_read_is_told_so(law: str) -> None:
+    task, noise = [f"controller.kind={law}", "reference.level=3 N m", "run.duration=0.5 s"], "sensors.angle_noise=2 deg"
+    quiet, noisy = simulate(TASK, task), simulate(TASK, [*task, noise])
+    assert np.array_equal(quiet["command"], noisy["command"])
+    said = (
+        "without effect here: sensors.angle_noise; the controller reads a torque computed from the measured pressures"
+    )
+    assert said in noisy.warnings
+    pressed = simulate(TASK, [*task, "sensors.pressure_noise=0.5 psi_d", "sensors.seed=2"])
+    assert not np.array_equal(quiet["command"], pressed["command"])
+    assert not any("without effect" in said for said in (*quiet.warnings, *pressed.warnings))
+
+
+def test_sensors_of_an_angle_of_a_lever_and_of_an_open_loop_are_told_by_what_is_read() -> None:
+    servo = ["controller.kind=pid", "run.duration=0.3 s"]
+    told = simulate("cylinder-servo", [*servo, "sensors.pressure_noise=0.1 bar_d"])
+    assert np.array_equal(told["command"], simulate("cylinder-servo", servo)["command"])
+    assert "without effect here: sensors.pressure_noise; the controller reads the measured angle" in told.warnings
+    # The torque of a lever depends on its angle: the measured angle counts.
+    lever = ["device.set=cylinder-lever", "reference.level=3 N m", "sensors.angle_noise=2 deg", "run.duration=0.3 s"]
+    assert not any("without effect" in said for said in simulate(TASK, lever).warnings)
+    opened = simulate("step-response", ["sensors.delay=5 ms", "sensors.seed=4"]).warnings
+    assert "without effect here: sensors.delay, sensors.seed; the controller reads no sensor" in opened
+    with pytest.raises(
+        PpafoError, match=r"did you mean 'sensors\.pressure_noise'\?; the torque is computed from the mea"
+    ):
+        load_scenario(TASK, ["sensors.torque_noise=0.1 N m"])
+
+
 @pytest.mark.parametrize("law", ["pid", "sliding_mode", "on_off"])
 def test_a_law_on_a_pair_of_valves_is_told_the_step_of_its_valves_and_no_gain(law: str) -> None:
     changes = [f"controller.kind={law}", "controller.rate=1 kHz", "reference.level=3 N m", "valve.area=60 mm^2"]
@@ -731,3 +800,18 @@ def test_the_largest_error_is_said_where_it_decided() -> None:
     said = f"largest error {error.max():.3g} deg (4 deg allowed) from 1.5 s on"
     assert run.tracking.sentence.startswith(f"the angle does not follow its reference: {said}; ")
     assert run.tracking.allowed == pytest.approx(math.radians(4.0), rel=1e-3)
+
+
+def test_a_swing_that_a_law_causes_itself_is_not_blamed_on_its_valves() -> None:
+    file = Path(ppafo.__file__).parent / "examples" / "add-a-controller" / "my_laws" / "hysteresis.py"
+    law = ["controller.kind=my_laws.hysteresis:KIND", "reference.level=3 N m"]
+    scenario = load_scenario(TASK, [*law, "controller.band=1 N m"], plugins=[file])
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    # Twice the band, and what the valves add on either side in their dead time.
+    assert 2.0 < verdict.span < 2.5
+    assert verdict.cause.startswith(
+        "`hysteresis` itself lets it swing, by `band = 1 N m`: the valves cause a step of only"
+    )
+    (narrower,) = verdict.mended
+    assert simulate(TASK, [*law, narrower], plugins=[file]).tracking is None

@@ -27,12 +27,7 @@ from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import who_walks
 from ppafo.wording import argument_text
 
-_HEAD = (
-    "valve",
-    "actuator",
-    ("peak torque", TORQUE),
-    ("lowest toes", CLEARANCE),
-)
+_HEAD = ("valve", "actuator", ("peak torque", TORQUE), ("lowest toes", CLEARANCE))
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _READING = (
     "Every pair of valve and actuator in the catalogue is simulated for a few strides at this pressure. Pairs with at "
@@ -73,7 +68,10 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     sections = (
         (
             finding.Section(
-                remarks=("No device in the catalogue meets these requirements. Alternatives:", *sizing.instead)
+                remarks=(
+                    "No device in the catalogue meets these requirements. Alternatives (examples):",
+                    *sizing.instead,
+                )
             ),
             table,
         )

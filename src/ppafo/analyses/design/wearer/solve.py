@@ -86,7 +86,7 @@ def size_for_wearer(
     instead = tuple(
         alternative.text(requirements) for alternative in alternatives_to(requirements, tried, shelf, report)
     )
-    if not tried:
+    if not instead and not tried:
         instead = ("no pair of valve and actuator is rated for this pressure and assists; change the pressure",)
     elif not instead:
         torque = requirements.torque
