@@ -148,10 +148,9 @@ class Sizing:
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
         """Quoted or assumed figures of parts on which the sizing rests, as pairs of part and figure name."""
-        parts = [sized.valve for sized in self.valves] + [
-            sized.bottle for sized in self.valves if sized.bottle is not None
-        ]
-        unique = {(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values()
+        bottles = [sized.bottle for sized in self.valves if sized.bottle is not None]
+        parts = *(sized.valve for sized in self.valves), *bottles, *self.problem.carried
+        unique = {(part.group, part.name): part for part in parts}.values()
         return tuple((part, name) for part in unique for name in part.doubtful)
 
     def json_document(self) -> dict[str, Any]:
@@ -361,9 +360,7 @@ def suggestion_sentence(sizing: Sizing) -> str:
         working = [sized for sized in sizing.valves if sized.works]
         kept = "valves keep the error limit, but no bottle lasts for the requested use"
         reasons = [kept if working else "no valve keeps the error limit at any of the pressures"]
-        reasons += [
-            f"{sized.valve.name}{cut}" for sized in working or sizing.valves if (cut := _cut_peak(sizing, sized))
-        ]
+        reasons += [f"{each.valve.name}{cut}" for each in working or sizing.valves if (cut := _cut_peak(sizing, each))]
         return f"no suggestion: {'; '.join(reasons)}"
     bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
     short = [
@@ -383,14 +380,13 @@ def suggestion_sentence(sizing: Sizing) -> str:
 def _cut_peak(sizing: Sizing, sized: SizedValve) -> str:
     """Return the fraction of the peak torque that a valve's pressure cuts off, with a remedy; "" for a whole peak."""
     problem, largest = sizing.problem, sizing.problem.profile.largest
-    cut = 1.0 - ceiling(problem, sized.pressure) / largest
-    if cut <= _WHOLE_PEAK or np.isnan(sized.error):
+    most = ceiling(problem, sized.pressure)
+    if (cut := 1.0 - most / largest) <= _WHOLE_PEAK or np.isnan(sized.error):
         return ""
     whole, rated = problem.atmosphere + largest / problem.torque_constant, rated_pressure(sized.valve, *problem.carried)
     higher = " and a higher pressure.highest" * bool(whole >= problem.highest_pressure)
-    needs = f"statically needs pressure.lowest = '{PRESSURE.text(whole)}'{higher}"
+    needs = f"pressure.lowest = '{PRESSURE.text(whole)}'{higher}"
     if whole > rated:
-        parts = f"its parts are rated for {PRESSURE.text(rated)}: name other parts"
-        needs = f"statically needs {PRESSURE.text(whole)}, but {parts}"
-    at_most = f"at most {TORQUE.text((1.0 - cut) * largest)} of {TORQUE.text(largest)}; the whole peak {needs}"
+        needs = f"{PRESSURE.text(whole)}, but its parts are rated for {PRESSURE.text(rated)}: name other parts"
+    at_most = f"at most {TORQUE.text(most)} of {TORQUE.text(largest)}; the whole peak statically needs {needs}"
     return f", with {100.0 * cut:.0f} % of the peak cut off ({at_most})"
