@@ -34,6 +34,10 @@ _HEAD = (
     ("lowest toes", CLEARANCE),
 )
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
+_NONE = (
+    "No device in the catalogue meets these requirements. Alternatives, on the largest bottle (a design takes the "
+    "lightest that lasts):"
+)
 _READING = (
     "Every pair of valve and actuator in the catalogue is simulated for a few strides at this pressure. Pairs with at "
     "least 95 % of the torque in the mean stride and the toes above the ground are simulated on bottles, lightest "
@@ -71,12 +75,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
             f"the lowest height of the toes in the healthy gait itself is {CLEARANCE.text(sizing.healthy_toes)}"
         )
     sections = (
-        (
-            finding.Section(
-                remarks=("No device in the catalogue meets these requirements. Alternatives:", *sizing.instead)
-            ),
-            table,
-        )
+        (finding.Section(remarks=(_NONE, *sizing.instead)), table)
         if device is None
         else (*_sections(requirements, device), table, part_titles(sizing.parts))
     )
