@@ -91,4 +91,4 @@ def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]") -
     if not names:
         return verdict.tried
     advice = f"{verdict.advice}; " if verdict.advice else ""
-    return f"{advice}other values of {names} alone did not suffice"
+    return f"{advice}none of the tried values of {names} alone sufficed"

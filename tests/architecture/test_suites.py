@@ -102,6 +102,14 @@ def test_what_was_long_is_left_out_of_the_short_suite_but_for_what_is_marked_sho
     assert costs_of(costly)["tests/test_burns.py"]["long"] == ["test_b", "test_d"], "what is gone does not"
 
 
+def test_parts_of_a_suite_share_no_file_and_leave_none_out(costly: Path) -> None:
+    parts = [run_tests("-v", "--part", part, cwd=costly).stdout for part in ("0/2", "7/2")]
+    assert [re.findall(r"^tests/\w+\.py::(\w+) PASSED", text, re.MULTILINE) for text in parts] == [
+        ["test_a", "test_b"],
+        ["test_c"],
+    ]
+
+
 def costs_of(folder: Path) -> dict[str, Any]:
     """What was recorded in a folder."""
     return tomllib.loads((folder / "tests" / "costs.toml").read_text(encoding="utf-8"))

@@ -67,6 +67,7 @@ def printed(folder: Path, files: dict[str, bytes]) -> tuple[dict[str, Floats], d
     return channels, {name: float(value or "nan") for name, value in metrics.items()}
 
 
+@pytest.mark.short
 @pytest.mark.thorough
 @needs_gcc
 @pytest.mark.parametrize("case", parameters(EXPORTED))
@@ -109,6 +110,7 @@ def of_both_versions() -> list[Any]:
     ]
 
 
+@pytest.mark.short
 @pytest.mark.thorough
 @needs_gcc
 @pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")

@@ -19,6 +19,7 @@ def of_modules() -> list[Any]:
     return [parameter(case, suite="" if case.is_shipped else "thorough") for case in EXPORTED]
 
 
+@pytest.mark.short
 @pytest.mark.thorough
 @pytest.mark.parametrize("case", of_modules())
 def test_a_module_of_the_page_has_the_bits_of_python(case: Case) -> None:

@@ -47,6 +47,7 @@ def replayed(file: str, time: Floats, channels: dict[str, Floats]) -> dict[str, 
     return dict(zip(names, np.array(rows).T, strict=True))
 
 
+@pytest.mark.short
 @pytest.mark.thorough
 @pytest.mark.usefixtures("quick_units")
 @pytest.mark.parametrize("case", parameters())

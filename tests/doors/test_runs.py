@@ -48,6 +48,7 @@ def of_ensembles() -> list[Any]:
     return [parameter(case, suite="long" if case.suite == "short" and case.walks else "") for case in CASES]
 
 
+@pytest.mark.short
 @pytest.mark.thorough
 @pytest.mark.parametrize("case", of_ensembles())
 def test_a_run_of_an_ensemble_has_the_bits_of_the_run_alone(case: Case) -> None:
@@ -68,6 +69,7 @@ def test_a_run_of_an_ensemble_has_the_bits_of_the_run_alone(case: Case) -> None:
     assert acts or answer.channels["supplied_mass"][-1] == 0.0, "the supply acts where gas is taken from it"
 
 
+@pytest.mark.short
 @pytest.mark.thorough
 @pytest.mark.parametrize("case", parameters())
 def test_a_result_that_was_stored_is_read_with_its_bits(case: Case, tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """Arguments: one signature defines both the command line and the checks of Python calls."""
 
 from ppafo.arguments.door import checked as checked
-from ppafo.arguments.reading import counting_number as counting_number
 from ppafo.arguments.reading import fraction as fraction
 from ppafo.arguments.reading import minutes as minutes
 from ppafo.arguments.reading import number as number

@@ -75,17 +75,8 @@ class NumberWithUnit(float):
         return NumberWithUnit, (float(self), self.unit)
 
 
-def whole_number(text: str) -> int:
-    """Return a whole number, 0 or more; ArgumentError for any other text."""
-    return _whole_from(text, 0)
-
-
-def counting_number(text: str) -> int:
-    """Return a whole number, 1 or more; ArgumentError for any other text."""
-    return _whole_from(text, 1)
-
-
-def _whole_from(text: str, lowest: int) -> int:
+def whole_number(text: str, lowest: int = 0) -> int:
+    """Return a whole number, ``lowest`` or more; ArgumentError for any other text."""
     # Separators of digit groups are allowed; isdecimal alone would accept the digits of any script.
     digits = text.replace("_", "").replace(",", "")
     is_usable = digits.isascii() and digits.isdecimal() and len(digits) <= MAXIMUM_DIGITS

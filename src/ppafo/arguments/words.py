@@ -7,6 +7,7 @@ parameter is its line in the docstring.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,7 +25,6 @@ from ppafo.arguments.reading import (
     FROM_ZERO,
     MAXIMUM_DIGITS,
     NumberRange,
-    counting_number,
     fraction,
     minutes,
     point,
@@ -85,9 +85,8 @@ def fraction_word(help_text: str = "") -> Word:
 
 def whole_word(lowest: int, help_text: str = "") -> Word:
     """Return the argument type of a whole number not below ``lowest``."""
-    read = whole_number if lowest == 0 else counting_number
     what = f"a whole number, {lowest} or more, of at most {MAXIMUM_DIGITS} digits"
-    return Word("N", read, taken_whole(lowest), what, help=help_text)
+    return Word("N", partial(whole_number, lowest=lowest), taken_whole(lowest), what, help=help_text)
 
 
 Whole = Annotated[int, whole_word(0)]

@@ -2,10 +2,11 @@
 
 import sys
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ppafo.arguments import Count, Folder, Overrides, Patience, Port, Scenario, Word, counting_number
+from ppafo.arguments import Count, Folder, Overrides, Patience, Port, Scenario, Word, whole_number
 from ppafo.cli import output
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_INTERRUPTED, CommandOutput
 from ppafo.units.shown import in_units
@@ -22,7 +23,7 @@ def hil(
     scenario: Scenario,
     *,
     port: Port,
-    rate: Annotated[int, Word("HZ", counting_number)] = 1000,
+    rate: Annotated[int, Word("HZ", partial(whole_number, lowest=1))] = 1000,
     baud: Count = 921600,
     lock_step: bool = False,
     patience: Patience = 10.0,

@@ -189,17 +189,8 @@ class FreeDecayProblem(StrictTable):
         # Near standstill a seal grips as hard as at rest at most.
         rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
         start, end = times_of(self, context.label)
-        inertia, inertia_deviation = self.inertia_of(context)
-        return free_decay(
-            sources,
-            start,
-            end,
-            inertia,
-            inertia_deviation,
-            rise,
-            confidence=self.confidence,
-            tolerances=context.tolerances,
-        )
+        inertia = self.inertia_of(context)
+        return free_decay(sources, start, end, *inertia, rise, self.confidence, context.tolerances)
 
 
 class OpenValveFlowProblem(StrictTable):

@@ -77,11 +77,6 @@ def display_values(values: Floats, quantity: str, atmosphere: float | None = Non
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 
 
-def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
-    """Format a value given in SI as number and display unit."""
-    return f"{without_exponent(display_value(value, quantity), form)} {display_unit(quantity)}".rstrip()
-
-
 def metric_quantity(si_unit: str) -> str:
     """Return the quantity of a metric or channel by its SI unit; empty for a dimensionless number."""
     return _OF_GAS.get(si_unit) or quantity_of_unit(si_unit)

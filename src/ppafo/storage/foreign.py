@@ -151,12 +151,11 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
         if mapped.at is not None or mapped.gas is not None:
             raise UnitError("'at' and 'gas' are allowed only for a volume flow, such as 'L/min'")
         return unit
-    flow, words, _ = flow_of(unit)
-    condition, gases = condition_and_gases(words)
+    condition, gases = condition_and_gases(flow_of(unit)[1])
     if not (mapped.at or condition):
         raise UnitError(without_condition(unit, gas))
     by_unit = with_condition(unit, mapped.at or "", mapped.gas or gas)
-    by_map = with_condition(flow, mapped.at or condition, mapped.gas or "".join(gases[:1]) or gas)
+    by_map = with_condition(flow_of(unit)[0], mapped.at or condition, mapped.gas or "".join(gases[:1]) or gas)
     if not math.isclose(read_unit(by_unit)[0].scale, read_unit(by_map)[0].scale, rel_tol=_SAME_DENSITY):
         raise UnitError(f"means '{by_map}' by 'at' and 'gas', but '{by_unit}' by 'unit'; give each only once")
     return by_unit

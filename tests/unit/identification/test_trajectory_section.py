@@ -319,7 +319,12 @@ def test_the_published_schema_has_the_section() -> None:
         (f"{FIT}{REPLAYED}inputs = ['supply_pressure']\n", "has no scenario, so inputs must have 'command'"),
         (
             f"{FIT}{REPLAYED}".replace("task.csv", "decay.csv"),
-            "experiment 'replayed': has no scenario, so its recording needs a channel 'command'",
+            "experiment 'replayed': has no scenario, so its recording needs a channel 'command'; available: angle; "
+            "give a scenario",
+        ),
+        (
+            FIT.replace("step.csv", "decay.csv"),
+            "has no channel 'pressure_1'; available: angle; give channels = [\"angle\"]",
         ),
         (f"{FIT}{SLOW}interval = '0 s'\n", "candidate 'slow': interval = '0 s' must be from 1e-06 to"),
         (f"{FIT}{SLOW}interval = '9 s'\n", "candidate 'slow': interval = '9 s' must be from 1e-06 to"),

@@ -20,7 +20,7 @@ from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.tracking.metered import shortfall
+from ppafo.simulation.tracking.rule import shortfall
 from tests.actuators.soft import soft
 
 EXAMPLE = Path(__file__).parents[2] / "actuators"

@@ -192,6 +192,21 @@ def test_a_valve_that_opens_away_from_the_reference_is_not_called_too_small() ->
     assert "drives away from the reference for 100 % of this time; reverse the sign" in told.sentence
 
 
+KNEE = [
+    "controller.kind=pid",
+    "reference.of=torque",
+    "reference.kind=sine",
+    "reference.level=0 N m",
+    "reference.amplitude=4 N m",
+    "reference.frequency=0.5 Hz",
+    "run.duration=6 s",
+    "motion.angle=100 deg",
+    "foot_plate.inertia=0.46 kg m^2",
+    "foot_plate.gravity_torque=11.7 N m",
+]
+"""A wave of the torque on a joint that hangs, whose lever is short at its stops."""
+
+
 @pytest.mark.parametrize(
     ("scenario", "column", "values"),
     [
@@ -201,10 +216,13 @@ def test_a_valve_that_opens_away_from_the_reference_is_not_called_too_small() ->
         ("pressure-loop", "controller.proportional_gain", [1.0e-8, 1.0e-5]),
         ("cylinder-servo", "motion.external_torque", [0.2, 5.0, 14.0]),
         ("sine", "controller.proportional_gain", [0.001, 0.01, 0.1, 4.5]),
+        # At its stop, where the lever is short, the joint gets 2.86 N m.
+        ("knee", "reference.amplitude", [1.0, 3.0, 3.5, 4.0, 5.0, 9.0]),
     ],
 )
 def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: str, values: list[float]) -> None:
-    base = load_scenario(TASK, SMALL_SINE) if scenario == "sine" else load_scenario(scenario)
+    changed = {"sine": (TASK, SMALL_SINE), "knee": ("cylinder-servo", KNEE)}
+    base = load_scenario(*changed.get(scenario, (scenario, [])))
     columns = {column: np.array(values)}
     metered = run_ensemble(base, columns, with_companions([], base)).metrics
     alone = [simulate(with_numbers(base, {column: value})).tracking is None for value in values]
@@ -731,3 +749,18 @@ def test_the_largest_error_is_said_where_it_decided() -> None:
     said = f"largest error {error.max():.3g} deg (4 deg allowed) from 1.5 s on"
     assert run.tracking.sentence.startswith(f"the angle does not follow its reference: {said}; ")
     assert run.tracking.allowed == pytest.approx(math.radians(4.0), rel=1e-3)
+
+
+def test_a_swing_that_a_law_causes_itself_is_not_blamed_on_its_valves() -> None:
+    file = Path(ppafo.__file__).parent / "examples" / "add-a-controller" / "my_laws" / "hysteresis.py"
+    law = ["controller.kind=my_laws.hysteresis:KIND", "reference.level=3 N m"]
+    scenario = load_scenario(TASK, [*law, "controller.band=1 N m"], plugins=[file])
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    # Twice the band, and what the valves add on either side in their dead time.
+    assert 2.0 < verdict.span < 2.5
+    assert verdict.cause.startswith(
+        "`hysteresis` itself lets it swing, by `band = 1 N m`: the valves cause a step of only"
+    )
+    (narrower,) = verdict.mended
+    assert simulate(TASK, [*law, narrower], plugins=[file]).tracking is None

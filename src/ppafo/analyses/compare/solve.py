@@ -15,7 +15,7 @@ from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
-from ppafo.simulation.tracking.pair_step import unlimited_switching, warn_of_coarse_pairs
+from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, uncertainty_of
 from ppafo.studies.limits import CONFIDENCE, check_fraction
@@ -107,9 +107,6 @@ def compared(
         for task, overrides in named_tasks
         for configuration in configurations_with(configurations, overrides)
     }
-    for (_, name), scenario in scenarios.items():
-        with said_of_configuration(name):
-            warn_of_coarse_pairs([scenario])
     # Metrics that all scenarios can have: without a reference there is no error.
     metrics = [
         name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())

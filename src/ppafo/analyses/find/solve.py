@@ -209,7 +209,14 @@ def outermost(
     search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED))
     search = search.with_values(base, np.linspace(low, high, grid), seeds, True)
     if not np.isfinite(search.tried["judged"]).any():
-        raise _no_value(search, f"from {path.quote(low)} to {path.quote(high)}")
+        ends = f"from {path.quote(low)} to {path.quote(high)}"
+        if search.tried["oscillating"].any():
+            raise StudyError(
+                f"scenario '{base.name}': the loop oscillates in every run {ends}; omit the gains of the controller, "
+                "so that they are computed for each device"
+            )
+        reason = f"; the first: {runs.reason}" if runs.reason else ""
+        raise StudyError(f"scenario '{base.name}': no run {ends} gives the metric '{condition.metric}'{reason}")
     # All parts of a bracket side by side: a bisection would wait for every one of its runs.
     index, neighbour = search.found
     while index is not None and neighbour is not None:
@@ -221,19 +228,6 @@ def outermost(
     # With noise a single run does not represent the mean over the noise streams.
     is_single_run = condition.text == FOLLOWS and not seeds.size
     return replace(search, verdicts=_verdicts(search, base)) if is_single_run else search
-
-
-def _no_value(search: FindResult, ends: str) -> StudyError:
-    """Return the error for a search of which no run has the metric; ``ends`` names the range of values."""
-    if search.tried["oscillating"].any():
-        return StudyError(
-            f"scenario '{search.scenario}': the loop oscillates in every run {ends}; omit the gains of the controller, "
-            "so that they are computed for each device"
-        )
-    reason = f"; the first: {search.runs.reason}" if search.runs.reason else ""
-    return StudyError(
-        f"scenario '{search.scenario}': no run {ends} gives the metric '{search.condition.metric}'{reason}"
-    )
 
 
 def _verdicts(search: FindResult, base: Scenario) -> tuple[tuple[float, str], ...]:

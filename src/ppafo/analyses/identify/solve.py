@@ -19,9 +19,9 @@ from ppafo.identification.procedures import (
     window_of,
 )
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, source_of
-from ppafo.identification.tolerances import tolerances_of
+from ppafo.identification.tolerances import Tolerances, tolerances_of
 from ppafo.identification.trajectory.layout import ExperimentSection
-from ppafo.identification.trajectory.section import SectionContext, solve_section
+from ppafo.identification.trajectory.section import SectionContext, TrajectoryOutcome, solve_section
 from ppafo.identification.unit_check import FAR_FROM_SET, with_wrong_units
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
@@ -76,16 +76,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         tasks.sort(key=lambda task: PROCEDURES.index(task.procedure.kind))
         used = _used_recordings(tasks, before, valve, file)
         tolerances = tolerances_of(problem.bench, file)
-        current, results = before, list[BenchResult]()
-        for task in tasks:
-            context = ProcedureContext(current, valve, task.label, tolerances)
-            result = run_procedure(task.sources, task.procedure, context)
-            known = {item.path: number_in_si(current, item.path) for item in result.estimates}
-            recordings = [source.recording for source in task.sources]
-            result = replace(result, estimates=with_wrong_units(result.estimates, known, recordings))
-            results.append(result)
-            # The next procedure leans on what this one found; the new set is made of the old one at the end.
-            current = with_estimates(current, result.estimates).parameter_set
+        results, current = _bench_results(tasks, before, valve, tolerances)
         estimates = [estimate for result in results for estimate in result.estimates]
         trajectory = None
         if problem.trajectory is not None:
@@ -99,24 +90,53 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
                 used=used,
                 tolerances=tolerances,
             )
-            trajectory = solve_section(problem.trajectory, section, progress)
-            fit = trajectory.fit
-            # A start near to the value says that the person expects it, whatever the set has.
-            starts = {number.free.name: number.free.start for number in fit.numbers}
-            near = {
-                path
-                for path, value in fit.values.items()
-                if value > 0.0 and 1.0 / FAR_FROM_SET < starts[path] / value < FAR_FROM_SET
-            }
-            known = {path: value if path in near else number_in_si(current, path) for path, value in fit.values.items()}
-            recordings = [experiment.recording for experiment in fit.problem.experiments]
-            estimates_of_fit = with_wrong_units(fit.estimates, known, recordings)
-            trajectory = replace(trajectory, fit=replace(fit, estimates=estimates_of_fit))
+            trajectory = _with_checked_units(solve_section(problem.trajectory, section, progress), current)
             estimates += trajectory.fit.estimates
         new_set = with_estimates(before, estimates, valve)
-        identification = Identification(problem.name, tuple(results), trajectory, before, new_set)
+        identification = Identification(problem.name, results, trajectory, before, new_set)
         described = replace(new_set, parameter_set=_described_set(identification, problem))
         return replace(identification, new_set=described)
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """Identification procedure with its recordings, and the name used in error messages."""
+
+    procedure: ProcedureProblem
+    sources: tuple[RecordingSource, ...]
+    label: str
+
+
+def _bench_results(
+    tasks: Sequence[_Task], before: ParameterSet, valve: str, tolerances: Tolerances
+) -> tuple[tuple[BenchResult, ...], ParameterSet]:
+    """Return the results of bench procedures in order, and the set in which each found the earlier estimates."""
+    results, current = list[BenchResult](), before
+    for task in tasks:
+        context = ProcedureContext(current, valve, task.label, tolerances)
+        found = run_procedure(task.sources, task.procedure, context)
+        known = {item.path: number_in_si(current, item.path) for item in found.estimates}
+        recordings = [source.recording for source in task.sources]
+        results.append(replace(found, estimates=with_wrong_units(found.estimates, known, recordings)))
+        current = with_estimates(current, results[-1].estimates).parameter_set
+    return tuple(results), current
+
+
+def _with_checked_units(trajectory: TrajectoryOutcome, current: ParameterSet) -> TrajectoryOutcome:
+    """Return the trajectory fit with the verdict of a wrong unit where a unit mistake explains its estimates.
+
+    Estimates are compared with the values of the set, or with their start values if these are near: a start near the
+    estimate shows that the person expects the value.
+    """
+    fit = trajectory.fit
+    starts = {number.free.name: number.free.start for number in fit.numbers}
+    is_near = {
+        path: value > 0.0 and 1.0 / FAR_FROM_SET < starts[path] / value < FAR_FROM_SET
+        for path, value in fit.values.items()
+    }
+    known = {path: value if is_near[path] else number_in_si(current, path) for path, value in fit.values.items()}
+    recordings = [experiment.recording for experiment in fit.problem.experiments]
+    return replace(trajectory, fit=replace(fit, estimates=with_wrong_units(fit.estimates, known, recordings)))
 
 
 _ROW_TIMES = dict.fromkeys(("static-torque", "open-valve-flow", "valve-map"), 1.0)
@@ -169,15 +189,6 @@ def _experiment_source(
             "recording; name one trial"
         )
     return source
-
-
-@dataclass(frozen=True, slots=True)
-class _Task:
-    """Identification procedure with its recordings, and the name used in error messages."""
-
-    procedure: ProcedureProblem
-    sources: tuple[RecordingSource, ...]
-    label: str
 
 
 def _used_recordings(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:

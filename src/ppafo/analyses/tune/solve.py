@@ -25,7 +25,7 @@ from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
-from ppafo.simulation.tracking.metered import shortfall
+from ppafo.simulation.tracking.rule import shortfall
 from ppafo.studies.distributions import Floats
 from ppafo.studies.intervals import noise_interval
 from ppafo.studies.limits import MetricLimit

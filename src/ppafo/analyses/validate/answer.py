@@ -38,19 +38,13 @@ _WRITTEN_AS_ZERO = 5.0e-4
 """Absolute value below which a number in the table of errors is written as 0."""
 
 
-def panels_across(agreement: RecordingAgreement) -> int:
-    """Return the number of channels side by side in a figure: 2, or 1 if there is only one channel."""
-    return 1 if len(agreement.channels) == 1 else 2
-
-
-def agreement_panels(agreement: RecordingAgreement) -> list[Panel]:
-    """Return the panels of a recording in rows: samples with the model, and their residuals below."""
+def agreement_panels(agreement: RecordingAgreement, across: int) -> list[Panel]:
+    """Return the panels of a recording in rows of ``across`` channels: samples with the model, and residuals below."""
     samples, residuals = [], []
     for channel in agreement.channels:
         upper, lower = _channel_panels(agreement, channel)
         samples.append(upper)
         residuals.append(lower)
-    across = panels_across(agreement)
     # An odd number of channels leaves one place in the last row empty.
     if len(samples) % across:
         samples.append(Panel(TIME, TIME, ()))
@@ -139,13 +133,13 @@ def _part(name: str, agreement: RecordingAgreement) -> Section:
         f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
         f"{', '.join(agreement.inputs)}; delay of the measurement: {delay}"
     )
-    across = panels_across(agreement)
+    across = 1 if len(agreement.channels) == 1 else 2
     return Section(
         f"{agreement.file} ({kind})",
         columns_of(_HEAD, map(channel_cells, agreement.channels)),
         [replayed],
         remarks=[f"note: {remark}" for remark in agreement.remarks],
-        panels=partial(agreement_panels, agreement),
+        panels=partial(agreement_panels, agreement, across),
         name=f"{name}-agreement",
         caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: the residual, measured - "
         "model, the limit of its RMS value dashed where it is in range.",

@@ -19,7 +19,6 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
 from ppafo.parameters.bottles.fluid import list_fluids
 from ppafo.remedy_trials import tried
-from ppafo.report.display_units import quantity_text
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
@@ -49,7 +48,7 @@ _OVER_TIME = (
     "Gas, toe height and gait phase over the whole walk. The strip at the bottom shows when the controller helps, only "
     "lifts the foot, pauses or has stopped. A solid line marks less help, a dashed line a fault."
 )
-_TORQUE = Kind("", "N m", "torque", ".3g")
+_TORQUE, _PRESSURE = Kind("", "N m", "torque", ".3g"), Kind(quantity="pressure", form=".3g")
 _FAR_ABOVE = 2.0
 """Ratio of absolute chamber pressure to supply pressure for a remark; healthy wearers stay below."""
 
@@ -268,7 +267,7 @@ def _pressure_remarks(worn: WalkResult) -> Iterator[str]:
         channel = f"pressure_{number}"
         largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
         if largest > _FAR_ABOVE * supply_pressure:
-            reached, supplied = (quantity_text(value, "pressure") for value in (largest, supply_pressure))
+            reached, supplied = map(_PRESSURE.text, (largest, supply_pressure))
             yield (
                 f"the pressure in chamber {number} reaches {reached}, at a supply pressure of {supplied}: "
                 f"actuator, valves and tubing must withstand {reached}"

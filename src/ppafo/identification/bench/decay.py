@@ -26,6 +26,12 @@ _VELOCITY_MAY_DIFFER = 0.1
 """Largest relative difference of velocity and rate of the angle [-]; a wrong unit or sign differs by more."""
 _MINIMUM_OVER_NOISE = 20.0
 """Least range of the angle divided by its noise [-] for motion to be detected."""
+_NEAR = 0.05
+"""Distance from the end of a swing, relative to the swing [-], within which the vane is near this end."""
+_NOISE_NEAR = 6.0
+"""Least such distance divided by the noise of the angle [-]."""
+_AT_ONCE = 2.0
+"""Duration near the end of a swing, relative to the last half of the swing [-], below which the vane did not rest."""
 
 
 class FreeDecay(NamedTuple):
@@ -61,6 +67,7 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     has_start = start is not None
     speeds, _ = smoothed_rates(part.time, part[ANGLE])
     fastest = 0 if has_start else int(np.argmax(np.abs(speeds)))
+    _check_comes_to_rest(source, part.time[fastest:], part[ANGLE][fastest:], noise)
     sign = 1.0 if speeds[fastest] > 0.0 else -1.0
     # A push ends a little after the highest speed of the smoothed signal; that much is left out.
     first = fastest if has_start else fastest + smoothing_width(part.time.size) // 2
@@ -95,6 +102,27 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
                 f"check unit and sign of both channels"
             )
     return FreeDecay(time=time - time[0], angle=angle, sign=sign, velocity=velocity)
+
+
+def _check_comes_to_rest(source: RecordingSource, time: Floats, angle: Floats, noise: float) -> None:
+    """Raise IdentificationError if the largest swing ends in a return swing without rest, as on a spring.
+
+    Friction alone stops the vane. ``noise`` is the standard deviation of the angle [rad].
+    """
+    end = max(int(np.argmin(angle)), int(np.argmax(angle)))
+    distance = np.abs(angle - angle[end])
+    near = max(_NEAR * float(distance.max()), _NOISE_NEAR * noise)
+    back = end + np.flatnonzero(distance[end:] > near)
+    if back.size:
+        halfway, reached = (time[np.flatnonzero(distance[:end] > far)[-1]] for far in (0.5 * distance.max(), near))
+        if time[back[0]] - reached < _AT_ONCE * (reached - halfway):
+            raise IdentificationError(
+                f"{source.name}: {PROCEDURE}: the vane turns back at {time[end]:.3g} s without coming to rest, so "
+                f"another torque acts, such as a spring or gravity; fit it in [trajectory], with channels = "
+                f'["{ANGLE}"] and a scenario whose overrides have motion.kind=free, the load (effects.joint_load) and '
+                "for open chambers actuator.dead_volume_1=10 L and actuator.dead_volume_2=10 L; if a stop or a hand "
+                "turned the vane, give an end before"
+            )
 
 
 def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:

@@ -66,10 +66,8 @@ class Slowing(NamedTuple):
 
     def at(self, speed: Floats) -> Floats:
         """Return the deceleration [rad/s^2] at given speeds [rad/s]; equation (1)."""
-        if self.rise_velocity > 0.0:
-            grip = self.rise / (1.0 + np.square(speed / self.rise_velocity))
-        else:
-            grip = np.zeros_like(speed)
+        has_rise = self.rise_velocity > 0.0
+        grip = self.rise / (1.0 + np.square(speed / self.rise_velocity)) if has_rise else np.zeros_like(speed)
         return self.damping_rate * speed + self.deceleration * (1.0 + grip)
 
 
@@ -205,14 +203,16 @@ def free_decay(
         float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
         for number, decay in enumerate(decays, start=1)
     )
+    used = TIME.text(sum(float(decay.time[-1]) for decay in decays), ".3g")
+    recorded = TIME.text(sum(float(np.ptp(source.recording.time)) for source in sources), ".3g")
     unknown = "" if inertia else "; the inertia is unknown, so only ratios to the inertia are identified"
     return result_of(
         PROCEDURE,
         sources,
         fit,
         (damping, friction),
-        f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {slowing.damping_rate:.4g} 1/s, T_c/I = "
-        f"{slowing.deceleration:.4g} rad/s^2{unknown}",
+        f"{count_of(len(decays), 'decay')} ({used} of {recorded}), {at_rest} to standstill; beta/I = "
+        f"{slowing.damping_rate:.4g} 1/s, T_c/I = {slowing.deceleration:.4g} rad/s^2{unknown}",
         _panels(decays, model, slowing),
         "another torque acts, such as gravity, an end stop or friction that depends differently on speed",
         remarks,

@@ -1,5 +1,6 @@
 """Experiments of a trajectory fit: recordings paired with the scenarios that model them."""
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -85,10 +86,14 @@ def check_experiment(experiment: FittedExperiment) -> None:
         if name not in ALL_INPUTS:
             hint = nearest_name(name, ALL_INPUTS)
             raise IdentificationError(f"{where}: '{name}' is not a measured input{hint}; use {', '.join(ALL_INPUTS)}")
-    for name, use in (*((name, "") for name in experiment.channels), *((name, " to follow") for name in inputs)):
-        if name not in recording:
-            have = ", ".join(recording.names)
-            raise IdentificationError(f"{where}: {recording.label} has no channel '{name}'{use}; available: {have}")
+    for key, names, use in (("channels", experiment.channels, ""), ("inputs", inputs, " to follow")):
+        recorded = [name for name in (FITTED_CHANNELS if key == "channels" else inputs) if name in recording]
+        for name in names:
+            if name not in recording:
+                raise IdentificationError(
+                    f"{where}: {recording.label} has no channel '{name}'{use}; available: "
+                    f"{', '.join(recording.names)}; give {key} = {json.dumps(recorded)}"
+                )
     scenario, has_torque = experiment.scenario, EXTERNAL_TORQUE in inputs
     motion, follows = vane_motion(scenario), {ANGLE} & set(inputs) & set(experiment.channels)
     is_python = scenario.controller.is_outside and COMMAND not in inputs
@@ -167,13 +172,6 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
 
 def use_of(experiment: FittedExperiment) -> UsedRecording:
     """Return the part of the recording with which an experiment is compared."""
-    last = float(experiment.recording.time[-1])
-    trace = experiment.source or experiment.recording.label
-    return UsedRecording(
-        f"experiment '{experiment.label}'",
-        trace,
-        experiment.recording,
-        frozenset(experiment.channels),
-        experiment.start,
-        last,
-    )
+    used, recording = frozenset(experiment.channels), experiment.recording
+    label, trace = f"experiment '{experiment.label}'", experiment.source or recording.label
+    return UsedRecording(label, trace, recording, used, experiment.start, float(recording.time[-1]))

@@ -14,7 +14,14 @@ from ppafo.identification.keys import positive_in, quantity_in
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
 from ppafo.identification.tolerances import Tolerances, quantity_of
 from ppafo.identification.trajectory.expected import CandidateExperiment, ExpectedBenefit, expected_information
-from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, INPUTS, FittedExperiment, refuse_first, use_of
+from ppafo.identification.trajectory.experiment import (
+    FITTED_CHANNELS,
+    INPUTS,
+    FittedExperiment,
+    InitialState,
+    refuse_first,
+    use_of,
+)
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.identification.trajectory.layout import ExperimentSection, ParameterSection, TrajectorySection
 from ppafo.identification.trajectory.numbers import TIME_OFFSET, FreeParameter, declaration_of, full_path
@@ -128,17 +135,9 @@ def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExpe
     scenario = scenario if step is None else replace(scenario, run=replace(scenario.run, step=step))
     # The scenario of a replay has the state of the samples already.
     is_read = entry.scenario is not None and entry.initial_state in ("recording", "fitted")
-    return FittedExperiment(
-        label=entry.label,
-        scenario=scenario,
-        recording=source.recording,
-        start=start,
-        channels=channels,
-        noise=noise_of_channels(entry.noise, where),
-        inputs=inputs,
-        initial_state="recording" if is_read else "scenario",
-        source=source.trace,
-    )
+    state: InitialState = "recording" if is_read else "scenario"
+    noise, recording = noise_of_channels(entry.noise, where), source.recording
+    return FittedExperiment(entry.label, scenario, recording, start, channels, noise, inputs, state, source.trace)
 
 
 def _scenario(name: str, overrides: tuple[str, ...], context: SectionContext) -> Scenario:
@@ -196,7 +195,8 @@ def _replay(
         (is_locked and is_fixed, "locked and volume exclude each other: a fixed volume has no vane; omit one of them"),
         (
             COMMAND not in recording,
-            f"has no scenario, so its recording needs a channel '{COMMAND}'; available: {', '.join(recording.names)}",
+            f"has no scenario, so its recording needs a channel '{COMMAND}'; available: {', '.join(recording.names)}; "
+            "give a scenario",
         ),
         (COMMAND not in inputs, f"has no scenario, so inputs must have '{COMMAND}'"),
     )
@@ -208,7 +208,9 @@ def _replay(
     known = {} if angle is None else {ANGLE: angle}
     if volume is not None:
         device, known = with_fixed_volume(device, volume)
-    remedies = dict.fromkeys(FITTED_CHANNELS, "give a scenario, which prescribes the initial state")
+    remedies = dict.fromkeys(
+        FITTED_CHANNELS, 'give a scenario, which prescribes the initial state, and channels = ["angle"]'
+    )
     start = start_of(used, device, known, where, remedies)
     motion = locked_vane(start.angle) if known else None
     return replay_scenario(recording, device, start, used.duration, where, motion), start_time, inputs

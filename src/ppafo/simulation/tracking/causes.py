@@ -8,7 +8,8 @@ from ppafo.control.catalog import switching_remedy
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
-from ppafo.model.controlled import ANGLE, TORQUE, error_functions
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, error_functions
+from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.numbers import declared_numbers, number_at
@@ -48,6 +49,10 @@ _ALWAYS = 0.9
 """Fraction of the samples that counts as nearly all [-]."""
 _FINE = 0.1
 """Step of an on/off valve during its dead time divided by the wanted change, up to which it makes no loop fail [-]."""
+_SMALL_STEP = 0.25
+"""Step of an on/off valve during its dead time divided by the swing, below which the swing is not the valve's [-]."""
+_NARROWER = (2.0, 5.0, 20.0)
+"""Factors by which the dead zone of an on/off law is reduced in a trial [-]."""
 _EDGE = 1.05
 """Command divided by the dead band, up to which the command counts as within the band [-]."""
 _EXPLAINED = 0.6
@@ -137,6 +142,8 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
     if ratio <= _FINE and not case.oscillates:
         return None
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
+    if law.only_switches and step < _SMALL_STEP * case.settled.span and controlled == scenario.controlled:
+        return _wide_zone(case, law, step)
     declare = switching_remedy(scenario.controller.kind)
     asks = f"`{law.name}` requests partial openings, which on/off valves do not have{declare}: "
     text = (
@@ -146,6 +153,24 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
     # Where a valve has gradual openings, a law that uses them for an angle is the better remedy.
     gradual = (CASCADE,) if scenario.controlled == ANGLE else ()
     return TrackingCause(text, (*gradual, *smaller_pair(scenario, ratio)), "take faster or smaller valves")
+
+
+def _wide_zone(case: Case, law: ControllerKind, step: float) -> TrackingCause:
+    """Cause: the dead zone or hysteresis of an on/off law lets the value swing more than the ``step`` of its valves."""
+    scenario, unit = case.scenario, CONTROLLED[case.scenario.controlled].difference
+    widths = {
+        item.name: float(scenario.controller.settings[item.name])
+        for item in law_settings(law, scenario.controlled)
+        if item.unit == unit and scenario.controller.settings[item.name] > 0.0
+    }
+    own = ", ".join(f"`{name} = {change_text(scenario.controlled, width)}`" for name, width in widths.items())
+    text = (
+        f"`{law.name}` itself lets it swing, by {own or 'its rule'}: the valves cause a step of only "
+        f"{change_text(scenario.controlled, step)} in their dead time"
+    )
+    narrower = [{f"controller.{name}": width / factor for name, width in widths.items()} for factor in _NARROWER]
+    smaller = [remedy(scenario, numbers) for numbers in narrower if numbers]
+    return TrackingCause(text, tuple(smaller), "change the settings or the rule of the controller")
 
 
 def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:

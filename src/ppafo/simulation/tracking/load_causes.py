@@ -110,7 +110,7 @@ def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
 
 
 def cuts_wave(case: Case) -> bool:
-    """True if a moving reference of a torque goes so far beyond the actuator's reach that it cannot follow."""
+    """True if a moving reference of a torque goes far beyond what the actuator reaches at the angle of its peak."""
     settled = case.settled
     if case.scenario.controlled != TORQUE or settled.rests or settled.ends_on_ramp:
         return False

@@ -6,14 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ppafo.control.catalog import PROFILES
-from ppafo.engine.scheme.actuators import torque_of
 from ppafo.metrics.metric import Floats
 from ppafo.metrics.settled import SETTLED_METRICS, SHORTEST_HOLD
 from ppafo.metrics.tracking import SUSTAINED
-from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import first
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import (
@@ -26,11 +23,10 @@ from ppafo.simulation.tracking.rule import (
     is_noisy,
     only_switches,
     settled_periods,
+    shortfall,
     torque_limit,
 )
 
-_ANGLES = 9
-"""Number of angles between the stops at which the torque of a moving joint is evaluated."""
 _OF_WALK = ("torque_error", "requested_torque", "peak_torque")
 """Metrics by which a walk is judged, in addition to the reversals of its command."""
 
@@ -116,29 +112,6 @@ def tracking_excess(
         largest=np.where(known_verdict, largest, np.nan),
         oscillation=np.where(counted | known, oscillation, np.nan),
     )
-
-
-def shortfall(scenario: Scenario) -> Floats:
-    """Largest reference minus the available torque [N m] in each run (runs,); 0 if the torque suffices.
-
-    The available torque is with one chamber at its supply and the other vented, independent of the controller. For a
-    moving joint the angle with the largest torque counts.
-    """
-    if scenario.controlled != TORQUE:
-        return np.zeros(1)
-    device = scenario.device
-    actuator, supply, locked = device.actuator, device.supply, scenario.motion.locked_angle
-    fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
-    first, travel = (actuator.angle_min, actuator.angle_max - actuator.angle_min) if locked is None else (locked, 0.0)
-    model, plant, vented = ACTUATORS[actuator.kind].model, plant_parameters(device), supply.atmospheric_pressure
-    angles = [first + fraction * travel for fraction in fractions]
-    highest = [torque_of(model, plant, angle, supply.pressure, vented) for angle in angles]
-    lowest = [torque_of(model, plant, angle, vented, supply.dorsiflexion_pressure) for angle in angles]
-    if supply.is_vacuum:
-        highest, lowest = lowest, highest
-    least, most = profile_bounds(scenario.reference)
-    above, below = most - np.max(highest, axis=0), np.min(lowest, axis=0) - least
-    return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))
 
 
 def _settled_task(scenario: Scenario, numbers: Mapping[str, Floats], least: float) -> SettledPart:

@@ -117,7 +117,8 @@ def coarse_pair(scenario: Scenario, varied: Collection[str] = ()) -> str:
     if ratio <= _LARGEST_STEP:
         return ""
     step_text, wanted_text = change_text(controlled.name, step), change_text(controlled.name, wanted)
-    smaller = smaller_pair(scenario, ratio)[0].text
+    # The valves of a joint that moves also fill the chambers as these grow.
+    smaller = "smaller valves" if scenario.motion.locked_angle is None else smaller_pair(scenario, ratio)[0].text
     return (
         f"{subject_text(scenario.name)}: the pair of valves changes the {controlled.words} by {step_text} in its dead "
         f"time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested {wanted_text}: {smaller}, faster valves "

@@ -31,8 +31,8 @@ SLOWER_ABOVE = frozenset((torque_loop.BOUNDARY,))
 """Settings whose increase makes the loop slower."""
 _SAME_GAIN = 0.02
 """Relative difference up to which two gains count as the same [-]."""
-_STEP_OF_PAIR = 0.2
-"""Step of a pair during its dead time divided by the wanted change, aimed at with a smaller orifice [-]."""
+_STEPS_OF_PAIR = (0.2, 0.3, 0.4, 0.5, 0.6, 0.1)
+"""Steps of a pair during its dead time divided by the wanted change, aimed at with smaller orifices [-]."""
 _TORQUE_OVER_FRICTION = 1.5
 """Torque that a controller should be able to request, divided by the static friction of the joint [-]."""
 _SHORT = 0.1
@@ -158,7 +158,7 @@ def sized_valves(scenario: Scenario, factors: Iterable[float]) -> tuple[Remedy, 
 
 def smaller_pair(scenario: Scenario, step: float) -> tuple[Remedy, ...]:
     """Remedies with smaller orifices, for a pair whose step is ``step`` times the wanted change."""
-    return sized_valves(scenario, (share / step for share in (_STEP_OF_PAIR, 0.5 * _STEP_OF_PAIR) if share < step))
+    return sized_valves(scenario, (share / step for share in _STEPS_OF_PAIR if share < step))
 
 
 def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -> float | None:

@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ControllerKind
+from ppafo.engine.scheme.actuators import torque_of
 from ppafo.metrics.command import command_reversals, requested_samples
 from ppafo.metrics.metric import Floats, controlled_in, extent, followed, hold_start
 from ppafo.metrics.settled import is_long_enough
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.metrics.tracking import SUSTAINED
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
+from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import torque_reach
 from ppafo.signals import Recording
 from ppafo.simulation.profiles import limits_of, profile_bounds, profile_values
@@ -68,6 +71,9 @@ SMALLEST_CHANGE = 0.05
 """Smallest wanted change divided by the range of the controlled quantity [-]; smaller ones are judged as this one."""
 SMALLEST_SIZE = 5.0e-4
 """Smallest wanted change if the range is 0, in typical sizes of the quantity (``ControlledQuantity.size``)."""
+
+_ANGLES = 9
+"""Number of angles between the stops at which the torque of a moving joint is evaluated."""
 
 REVERSALS = "command_reversals"
 """Metric that counts reversals of the command."""
@@ -270,6 +276,29 @@ def smallest_change(scenario: Scenario) -> float:
     # A torque or a difference of pressures goes from 0 to one end of its range.
     one_way = 0.5 if kind.name in (TORQUE, "pressure_difference") else 1.0
     return max(SMALLEST_CHANGE * one_way * abs(highest - lowest), SMALLEST_SIZE * kind.size)
+
+
+def shortfall(scenario: Scenario) -> Floats:
+    """Largest reference minus the available torque [N m] in each run (runs,); 0 if the torque suffices.
+
+    The available torque is with one chamber at its supply and the other vented, independent of the controller. For a
+    moving joint the angle with the largest torque counts.
+    """
+    if scenario.controlled != TORQUE:
+        return np.zeros(1)
+    device = scenario.device
+    actuator, supply, locked = device.actuator, device.supply, scenario.motion.locked_angle
+    fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
+    first, travel = (actuator.angle_min, actuator.angle_max - actuator.angle_min) if locked is None else (locked, 0.0)
+    model, plant, vented = ACTUATORS[actuator.kind].model, plant_parameters(device), supply.atmospheric_pressure
+    angles = [first + fraction * travel for fraction in fractions]
+    highest = [torque_of(model, plant, angle, supply.pressure, vented) for angle in angles]
+    lowest = [torque_of(model, plant, angle, vented, supply.dorsiflexion_pressure) for angle in angles]
+    if supply.is_vacuum:
+        highest, lowest = lowest, highest
+    least, most = profile_bounds(scenario.reference)
+    above, below = most - np.max(highest, axis=0), np.min(lowest, axis=0) - least
+    return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))
 
 
 def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: float) -> Floats | float:

@@ -30,6 +30,7 @@ from ppafo.simulation.tracking.rule import (
     only_switches,
     settled_task,
     settled_walk,
+    shortfall,
     torque_limit,
 )
 from ppafo.simulation.tracking.walk_causes import CAUSES_OF_WALK
@@ -292,9 +293,13 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
         failure = failure_of_walk(settled, turning, limit)
     case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
     # An error at the cut peaks of a wave reverses more often than the wave, and is no oscillation.
-    if is_task and turning <= 1.0 and failure in (None, "oscillates") and cuts_wave(case):
+    if failure == "oscillates" and turning <= 1.0 and is_task and cuts_wave(case):
+        return case._replace(failure="does not follow"), turning, reversals / recording.duration, stride_time
+    # What lies beyond reach may not have been asked for yet on the ramp.
+    beyond = float(np.max(shortfall(scenario))) if is_task and not settled.ends_on_ramp else 0.0
+    # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error. The
+    # mean error of a wave does not show its peaks.
+    missing = abs(settled.missing) if settled.rests else max(abs(settled.missing), beyond)
+    if failure is None and beyond > 0.0 and missing > LARGEST_SHARE * settled.wanted:
         case = case._replace(failure="does not follow")
-    # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error.
-    elif failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
-        case = case._replace(failure="does not follow" if torque_beyond_reach(case) is not None else None)
     return case, turning, reversals / recording.duration, stride_time

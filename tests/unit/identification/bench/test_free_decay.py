@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import Tolerances, free_decay
 from ppafo.identification.bench.free_decay import Slowing, course
 from ppafo.identification.source import RecordingSource
+from ppafo.signals.recording import Floats
 from tests.unit.identification import planted
 
 
@@ -93,6 +95,38 @@ def test_gravity_holds_for_this_model_only() -> None:
     noise = np.random.default_rng(1).normal(0.0, 1e-3, time.size)
     swing = planted.source("swing", time, angle=(0.6 * np.exp(-0.2 * time) * np.sin(1.2 * time) + noise, "rad"))
     assert "another torque acts" in free_decay((swing,), start=0.0, rise=0.0).conflict
+
+
+def swing_on_a_spring(stiffness: float, duration: float) -> RecordingSource:
+    """A vane of 8.4 g m^2 released at 30 deg on a spring, with 20 g m^2/s and 0.03 N m, read to 0.05 deg."""
+    time = np.arange(0.0, duration, 1e-3)
+
+    def rates(_: float, state: Floats) -> list[float]:
+        friction = 20e-3 * state[1] + 0.03 * math.tanh(state[1] / 0.01)
+        return [state[1], -(stiffness * state[0] + friction) / 8.4e-3]
+
+    swing = solve_ivp(rates, (0.0, duration), [math.pi / 6.0, 0.0], t_eval=time, rtol=1e-7, max_step=2e-3).y[0]
+    noise = np.random.default_rng(7).normal(0.0, math.radians(0.05), time.size)
+    return planted.source("spring", time, angle=(0.5 * math.pi + swing + noise, "rad"))
+
+
+@pytest.mark.parametrize(("stiffness", "duration"), [(2.0, 3.0), (0.5, 3.0), (2.0, 12.0)])
+def test_a_swing_on_a_spring_is_no_decay_and_the_fit_of_its_motion_is_named(stiffness: float, duration: float) -> None:
+    with pytest.raises(IdentificationError, match=r"turns back at 0\.\d+ s without coming to rest.*\[trajectory\]"):
+        free_decay((swing_on_a_spring(stiffness, duration),), inertia=8.4e-3)
+
+
+def test_a_vane_that_a_hand_turns_back_after_a_rest_is_a_decay() -> None:
+    source = planted.decay(deceleration=0.8)
+    time = source.recording.time
+    turned = source.recording["angle"] - 2.0 * np.clip(time - 6.0, 0.0, 1.0)
+    path = "free_decay.friction_over_inertia"
+    found = free_decay((planted.source("turned", time, angle=(turned, "rad")),), start=1.0, rise=0.0)[path]
+    assert found.low <= 0.8 <= found.high
+
+
+def test_the_part_of_the_recordings_that_was_fitted_is_said() -> None:
+    assert free_decay((planted.decay(),), start=2.0, rise=0.0).summary.startswith("1 decay (6 s of 8 s), ")
 
 
 def test_too_few_samples_between_start_and_end_are_refused() -> None:

@@ -259,6 +259,12 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
         f"Made with: ppafo design {problem.file}",
     )
+    failed = sum(sizing.failures.values())
+    failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
+    noisy = (
+        f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; the error is the "
+        "largest over the streams, the gas the mean"
+    )
     return Finding(
         name="design",
         kicker="Sizing study",
@@ -266,7 +272,14 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         said=(*([problem.description] if problem.description else []), requirements),
         parts=(
             *_tables(sizing),
-            finding.Section(remarks=_remarks(sizing)),
+            finding.Section(
+                remarks=(
+                    suggestion_sentence(sizing),
+                    *(f"{sized.valve.name}: {sized.remark}" for sized in sizing.valves if sized.remark),
+                    *([noisy] if sizing.streams else []),
+                    f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}",
+                )
+            ),
             finding.Section(
                 "Error and gas over pressure",
                 panels=partial(pressure_panels, sizing),
@@ -291,22 +304,6 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         found=sizing,
         passed=sizing.choice is not None,
         files={} if recording is None else {"suggested.csv": partial(marked_csv_bytes, recording)},
-    )
-
-
-def _remarks(sizing: Sizing) -> tuple[str, ...]:
-    """Return the suggestion, a remark on each valve that has one, and the numbers of runs and failures."""
-    failed = sum(sizing.failures.values())
-    failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
-    noisy = (
-        f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; the error is the "
-        "largest over the streams, the gas the mean"
-    )
-    return (
-        suggestion_sentence(sizing),
-        *(f"{sized.valve.name}: {sized.remark}" for sized in sizing.valves if sized.remark),
-        *([noisy] if sizing.streams else []),
-        f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}",
     )
 
 

@@ -301,7 +301,8 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     wrong += [
         StudyError(
             f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{scenario.name}' "
-            f"needs a {kind} valve; name it in a second file (scenario torque-task-proportional or -solenoid)"
+            f"needs a {kind} valve; name it in a second file, with scenario = 'torque-task-"
+            f"{valve.kind.partition('_')[0]}' and overrides = ['device.valve={valve.kind}']"
         )
         for valve in chosen["valves"]
         if valve.kind != kind
@@ -323,7 +324,6 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     use = document.use
     if (use.repetitions is None) == (use.hours is None):
         raise StudyError(f"{file}: [use]: give either repetitions or hours")
-    hours = _SECONDS_PER_HOUR * float(use.hours or 0.0)
     limit = document.limits.rms_error
     try:
         relative = split_quantity(limit)[1] in ("%", "percent")
@@ -339,7 +339,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
         scenario=scenario,
         profile=profile,
         simulated=document.simulated,
-        repetitions=float(use.repetitions) if use.repetitions else hours / profile.period,
+        repetitions=float(use.repetitions or _SECONDS_PER_HOUR * float(use.hours or 0.0) / profile.period),
         reserve=use.reserve,
         largest_error=largest_error,
         valves=tuple(chosen["valves"]),

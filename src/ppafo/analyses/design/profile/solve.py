@@ -55,16 +55,8 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
         columns = trials.columns(choice.valve, np.array([choice.pressure]), np.array([0]), np.ones(1))
         numbers = {path: float(values[0]) for path, values in columns.items()} | dict(choice.gains)
         recording = simulate(with_numbers(problem.scenario, numbers)).recording
-    return Sizing(
-        problem=problem,
-        valves=tuple(sized),
-        suggested=suggested,
-        recording=recording,
-        runs=trials.runs,
-        failures=dict(trials.failures),
-        seconds=time.perf_counter() - started,
-        streams=trials.seeds.size,
-    )
+    seconds, failures = time.perf_counter() - started, dict(trials.failures)
+    return Sizing(problem, tuple(sized), suggested, recording, trials.runs, failures, seconds, trials.seeds.size)
 
 
 def smallest_bottle(bottles: Sequence[Part], gas: float) -> Part | None:

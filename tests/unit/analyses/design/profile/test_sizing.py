@@ -285,17 +285,44 @@ def test_a_lever_cylinder_is_sized_by_the_search_that_its_refusal_names(tmp_path
     assert found.value - ATMOSPHERE > 385.0e3
 
 
-def test_valves_of_two_kinds_are_compared_by_two_files_as_the_refusal_says(tmp_path: Path) -> None:
-    mixed = FILE.replace('["enfield-ls-v05s"]', '["enfield-ls-v05s", "festo-vovg-5v-pair"]')
-    for kind, other in (("proportional", "festo-vovg-5v-pair"), ("solenoid", "enfield-ls-v05s")):
-        (tmp_path / f"{kind}.toml").write_text(mixed.replace("torque-task-proportional", f"torque-task-{kind}"))
-        with pytest.raises(PpafoError, match=f"'{other}' is a .* name it in a second file") as refused:
-            load_design(tmp_path / f"{kind}.toml")
-        assert f"torque-task-{kind}" in str(refused.value)
-        remaining = (tmp_path / f"{kind}.toml").read_text().replace(f'"{other}"', "").replace("[, ", "[")
-        (tmp_path / f"{kind}.toml").write_text(remaining)
-        problem = load_design(tmp_path / f"{kind}.toml")
-        assert {valve.kind for valve in problem.valves} == {problem.scenario.device.valve.kind} == {kind}
+RECYCLING = """
+schema_version = 1
+name = "own"
+title = "own"
+[valves.own]
+kind = "solenoid_recycling"
+maker = "Acme"
+model = "R"
+mass = { value = 300, unit = "g", origin = "datasheet", source = "its sheet" }
+area = { value = 3, unit = "mm^2", origin = "datasheet", source = "its sheet" }
+discharge_coefficient = { value = 0.6, unit = "", origin = "datasheet", source = "its sheet" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("scenario", "valve", "kind"),
+    [
+        ("torque-task-proportional", "festo-vovg-5v-pair", "solenoid"),
+        ("torque-task-solenoid", "enfield-ls-v05s", "proportional"),
+        ("torque-task-proportional", "own", "solenoid_recycling"),
+    ],
+)
+def test_a_valve_of_another_kind_is_sized_by_the_second_file_that_its_refusal_names(
+    tmp_path: Path, scenario: str, valve: str, kind: str
+) -> None:
+    (tmp_path / "own.toml").write_text(RECYCLING)
+    catalogue = 'catalogue = "own.toml"\n' * (valve == "own")
+    text = FILE.replace("simulated = 1", f"simulated = 1\n{catalogue}").replace("enfield-ls-v05s", valve)
+    (tmp_path / "first.toml").write_text(text.replace("torque-task-proportional", scenario))
+    with pytest.raises(PpafoError) as refused:
+        load_design(tmp_path / "first.toml")
+    second = re.search(r"second file, with (scenario = '\S+') and (overrides = \['\S+'\])$", str(refused.value))
+    assert second is not None
+    lines = f"{second[1]}\n{second[2]}"
+    (tmp_path / "second.toml").write_text(text.replace('scenario = "torque-task-proportional"', lines))
+    problem = load_design(tmp_path / "second.toml")
+    assert problem.scenario.device.valve.kind == kind
+    assert [part.kind for part in problem.valves] == [kind]
 
 
 @pytest.mark.parametrize(
@@ -305,7 +332,8 @@ def test_valves_of_two_kinds_are_compared_by_two_files_as_the_refusal_says(tmp_p
             "enfield-ls-v05s",
             "festo-vovg-5v-pair",
             "'festo-vovg-5v-pair' is a solenoid valve, but scenario 'torque-task-proportional' needs a proportional "
-            "valve; name it in a second file (scenario torque-task-proportional or -solenoid)",
+            "valve; name it in a second file, with scenario = 'torque-task-solenoid' and overrides = "
+            "['device.valve=solenoid']",
         ),
         ("co2-3_5oz", "co2-3oz", "bottles has no part 'co2-3oz', did you mean 'co2-3_5oz'?"),
         ("repetitions = 100", "", "[use]: give either repetitions or hours"),
