@@ -8,7 +8,7 @@ from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.scenario import RunSettings, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
@@ -50,7 +50,9 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     ]
     for cause, remedy, left in judged:
         if left is None:
-            text = f"with {remedy.text} it follows, as a further run shows"
+            # A number that was tried is one of many; a kind is none.
+            example = "for example, " * any(".kind=" not in text for text in remedy.overrides)
+            text = f"{example}with {remedy.text} it follows, as a further run shows"
             return replace(verdict, cause=cause, tried=text, mended=remedy.overrides if is_of_file else ())
     of_cause = [(remedy, left.error) for cause, remedy, left in judged if left and cause == verdict.cause]
     return replace(verdict, tried=_remainder_text(verdict, of_cause))
@@ -64,17 +66,12 @@ def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> "list[
     for cause, remedy in causes[:MOST_TRIED]:
         with contextlib.suppress(PpafoError):
             again = reloaded(scenario, remedy.overrides) if is_of_file else with_numbers(scenario, remedy.numbers)
-            trials.append((cause, remedy, replace(again, run=_trial_run(again))))
+            run, duration = again.run, _STRIDES_TRIED * again.motion.stride_time
+            # Of a walk the first strides: a whole number of output intervals, as the walk itself has.
+            if not again.follows_reference and 0.0 < duration < run.duration:
+                run = replace(run, duration=round(duration / run.output_interval) * run.output_interval)
+            trials.append((cause, remedy, replace(again, run=run)))
     return trials
-
-
-def _trial_run(scenario: Scenario) -> RunSettings:
-    """Return the run settings for a remedy: unchanged for a task, first strides for a walk."""
-    run, duration = scenario.run, _STRIDES_TRIED * scenario.motion.stride_time
-    if scenario.follows_reference or not 0.0 < duration < run.duration:
-        return run
-    # A whole number of output intervals, as the walk itself has.
-    return replace(run, duration=round(duration / run.output_interval) * run.output_interval)
 
 
 def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]") -> str:

@@ -4,6 +4,7 @@ import contextlib
 import logging
 import os
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -97,6 +98,9 @@ def deliver(answer: Any, as_json: bool, out: Path | None, command: str, *, has_w
         folder = str(out)
         # What other commands take, such as the gait of 'ppafo walk --gait'.
         usable_files = [f"file to use: {out / name}" for name in answer.files if name.endswith(".toml")]
+        # A walk that ended before its bottle did.
+        if document.get("supply", {}).get("ending", {}).get("kind") == "walk's end":
+            usable_files.append(f"time until the bottle ends: ppafo bottle {shlex.quote(folder)}")
     if as_json:
         print_result("", document if folder is None else {**document, "folder": folder}, as_json)
     elif folder is not None:

@@ -87,14 +87,13 @@ class _RunReport:
 
     @property
     def verdict(self) -> list[str]:
-        """Sentences on tracking, switching frequency, replaced values of the set, and changed values."""
+        """Sentences on tracking, stops, switching frequency, replaced values of the set, and changed values."""
         from ppafo.simulation.numbers import changes_in
-        from ppafo.simulation.tracking.pair_step import unlimited_switching
+        from ppafo.simulation.tracking.remarks import remarks_on
 
-        scenario = self.result.scenario
         sentence = self.result.following if self.tracking is None else self.tracking.sentence
-        sentences = (sentence, unlimited_switching(self.result), scenario.origin.replaced)
-        return [said for said in (*sentences, changed_text(changes_in(scenario))) if said]
+        remarks = remarks_on(self.result, self.tracking is None and bool(sentence))
+        return [said for said in (sentence, *remarks, changed_text(changes_in(self.result.scenario))) if said]
 
     @property
     def usage(self) -> list[str]:

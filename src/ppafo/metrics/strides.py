@@ -241,10 +241,7 @@ METRICS = (
     ),
     _kind("strides", "-", "whole strides of the walk", ReadAt(("meters.strides.ended.whole",))),
     _kind(
-        "helped_strides",
-        "-",
-        "whole strides with help from strike to strike",
-        ReadAt(("meters.strides.ended.helped",)),
+        "helped_strides", "-", "whole strides with help from strike to strike", ReadAt(("meters.strides.ended.helped",))
     ),
     _kind(
         "vented_strides",

@@ -77,12 +77,7 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
         return None
     links, terms = scenario.links, terms_of(scenario, law)
     gains = tuple(
-        _Gain(
-            quantity.name,
-            quantity.unit,
-            float(settings[quantity.name]),
-            f"controller.{quantity.name}" in links,
-        )
+        _Gain(quantity.name, quantity.unit, float(settings[quantity.name]), f"controller.{quantity.name}" in links)
         for quantity in items
     )
     rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))

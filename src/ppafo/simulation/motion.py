@@ -159,10 +159,7 @@ def _read_free(reading: DocumentReader, device: Device, _duration: float, _step:
 
 
 FREE_MOTION = VaneKind(
-    name="free",
-    section=MotionSection("the torques move the vane", FREE, _read_free),
-    plan=_plan,
-    measured=_measured,
+    name="free", section=MotionSection("the torques move the vane", FREE, _read_free), plan=_plan, measured=_measured
 )
 """Free motion by equation (1), with a constant external torque."""
 
@@ -256,11 +253,7 @@ LEG_MOTION = VaneKind(
         LEG,
         _read_leg,
         ProfileTable(
-            "shank",
-            "angle of the shank in time, 0 upright",
-            shank_settings,
-            shank_table,
-            {GAIT_SHANK: ("gait",)},
+            "shank", "angle of the shank in time, 0 upright", shank_settings, shank_table, {GAIT_SHANK: ("gait",)}
         ),
     ),
     plan=_plan_leg,

@@ -214,7 +214,9 @@ def unknown_value(override: Override, known: tuple[str, ...], owner: str) -> Sce
     section = override.typed.partition(".")[0]
     examples = [name for name in known if name.startswith(f"{section}.")] or known
     hint = nearest_name(override.typed, allowed) or f"; for example {', '.join(examples[:6])}"
-    return ScenarioError(f"override '{override}': {owner} no value '{override.typed}'{hint}")
+    # No file has a torque sensor.
+    source = "; the torque is computed from the measured pressures" * override.typed.startswith("sensors.torque")
+    return ScenarioError(f"override '{override}': {owner} no value '{override.typed}'{hint}{source}")
 
 
 def _set(document: dict[str, Any], path: str, text: str, file: str, declared: DeclaredContent) -> None:

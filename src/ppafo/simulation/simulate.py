@@ -125,13 +125,13 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Remarks on the use of the run: a missed reference, a too coarse pair of valves, replaced values."""
-        from ppafo.simulation.tracking.pair_step import coarse_pair, unlimited_switching
+        """Remarks on the use of the run: a missed reference, a stop, a too coarse pair of valves, replaced values."""
+        from ppafo.simulation.tracking.pair_step import coarse_pair
+        from ppafo.simulation.tracking.remarks import remarks_on
 
         verdict = self.tracking
-        sentence = "" if verdict is None else verdict.sentence
-        said = (sentence, unlimited_switching(self), coarse_pair(self.scenario), self.scenario.origin.replaced)
-        return tuple(sentence for sentence in said if sentence)
+        said = ("" if verdict is None else verdict.sentence, *remarks_on(self, bool(self.following)))
+        return tuple(sentence for sentence in (*said, coarse_pair(self.scenario)) if sentence)
 
     @_in_own_units
     def __repr__(self) -> str:

@@ -20,14 +20,7 @@ from ppafo.plugins import nearest_kind
 from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, TEXTS, THERMAL, THERMAL_GAS, DeclaredContent, line_paths
 from ppafo.simulation.document import kind_at
 from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, MotionKind, is_walk
-from ppafo.simulation.schema import (
-    controller_table,
-    file_model,
-    kind_field,
-    model_name,
-    number_type,
-    quantity_fields,
-)
+from ppafo.simulation.schema import controller_table, file_model, kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
 from ppafo.walking.preparation import DISTORTED, FROZEN
 from ppafo.walking.wearer import WEARER
@@ -173,12 +166,7 @@ def _check_motion(kind: object, place: str) -> None:
 
 def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of all text values that a document may contain."""
-    kinds = (
-        "controller.kind",
-        "timing.kind",
-        "gas_model.kind",
-        *(f"faults.{part}.kind" for part in FAULTS),
-    )
+    kinds = ("controller.kind", "timing.kind", "gas_model.kind", *(f"faults.{part}.kind" for part in FAULTS))
     return (*TEXTS, "motion.kind", "gait", "task_sequence", BOTTLE_NAME, *kinds)
 
 

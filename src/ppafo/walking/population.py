@@ -157,12 +157,16 @@ def walk_population(
         "stance_share": np.asarray(people.timing.toe_off),
     }
     vented, paused, fault_flags = _reduced_assistance(final)
+    # Totals over strides; those of the toes over heel strikes, at least 1.
+    counts = dict.fromkeys(("toe_clearance", "toe_landing"), np.maximum(final["walk.strides"], 1.0))
     return Population(
         scenario=configuration,
         minutes=seconds / 60.0,
         seed=seed,
         traits={name: values[is_finished] for name, values in traits.items()},
-        outcomes=_mean_outcomes(final, strides[is_finished]),
+        outcomes={
+            name: final[each.total] / counts.get(name, strides[is_finished]) for name, each in PER_STRIDE.items()
+        },
         diverged=int((~is_finished).sum()),
         vented=vented,
         paused=paused,
@@ -181,12 +185,6 @@ def _final_numbers(batch: Batch, progress: Progress) -> dict[str, Floats]:
         states[:, group] = run_batch(part).states
         progress(float(min(start + size, wearers)), float(wearers))
     return {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
-
-
-def _mean_outcomes(final: Mapping[str, Floats], strides: Floats) -> dict[str, Floats]:
-    """Return totals of walks divided by the number of strides, those of the toes by the heel strikes, at least 1."""
-    counts = dict.fromkeys(("toe_clearance", "toe_landing"), np.maximum(final["walk.strides"], 1.0))
-    return {name: final[quantity.total] / counts.get(name, strides) for name, quantity in PER_STRIDE.items()}
 
 
 def _reduced_assistance(final: Mapping[str, Floats]) -> tuple[int, int, dict[str, int]]:

@@ -50,9 +50,7 @@ def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> 
 def device_share(plant: PlantParameters, gravity: float) -> DeviceShare:
     """Return the contribution of a device to the leg; ``plant`` is the bare device under ``gravity`` [m/s^2]."""
     return DeviceShare(
-        inertia=plant.inertia,
-        viscous_damping=plant.viscous_damping,
-        mass_moment=plant.gravity_torque / gravity,
+        inertia=plant.inertia, viscous_damping=plant.viscous_damping, mass_moment=plant.gravity_torque / gravity
     )
 
 

@@ -230,11 +230,11 @@ def without_device(configuration: Scenario) -> Scenario:
     device, control = configuration.device, Control(event_on_off.OFF.name, {}, configuration.controller.period)
     # No torque and no displacement; the stops of the actuator become the range of the ankle.
     stops = Actuator(0.0, 0.0, *ANKLE_RANGE, _LEG_CHAMBER, _LEG_CHAMBER, 0.0, device.actuator.leak)
-    parts = {"actuator": stops, "friction": Friction(0.0, 0.0, 0.0), "foot_plate": FootPlate(0.0, 0.0)}
+    free, massless = Friction(0.0, 0.0, 0.0), FootPlate(0.0, 0.0)
     return replace(
         configuration,
         name=f"{configuration.name}-without",
-        device=replace(device, **parts, effects={}, links={}),
+        device=replace(device, actuator=stops, friction=free, foot_plate=massless, effects={}, links={}),
         controller=control,
         motion=replace(_without_faults(walk_of(configuration)), bottle=None, timing=THRESHOLDS, shut_off={}),
         supply_line=None,

@@ -3,6 +3,7 @@
 import contextlib
 import io
 import json
+import shlex
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -168,6 +169,23 @@ def test_a_bottle_repeats_a_task_sequence_as_a_whole(tmp_path: Path, capsys: pyt
     capsys.readouterr()
     assert main(["bottle", str(folder), "--longest", "5 s"]) == 0
     assert "walk 'solenoid' in task sequence 'stairs'" in capsys.readouterr().out
+
+
+def test_a_walk_that_ends_before_its_bottle_prints_a_command_that_says_how_long_the_bottle_lasts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    walked = ["walk", "proportional", "--bottle", "co2-16g", "--out", str(tmp_path / "a walk")]
+    assert main([*walked, *SHORT]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    name, *words = shlex.split(last.removeprefix("time until the bottle ends: "))
+    assert name == "ppafo"
+    assert main(words) == 0
+    assert "of walking" in capsys.readouterr().out
+    # A walk until the end of the bottle has its time already.
+    assert main([*walked, "--minutes", "2"]) == 0
+    printed = capsys.readouterr().out
+    assert "lasts" in printed
+    assert "time until the bottle ends" not in printed
 
 
 def test_a_stop_is_told_with_its_sign_readings_settings_and_time(

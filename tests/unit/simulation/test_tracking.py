@@ -58,7 +58,8 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
     assert verdict.is_useless
-    assert "with overrides=['supply.pressure=94.5 psi_g'] it follows, as a further run shows" in verdict.sentence
+    said = "for example, with overrides=['supply.pressure=94.5 psi_g'] it follows, as a further run shows"
+    assert said in verdict.sentence
 
 
 def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> None:
@@ -533,6 +534,56 @@ def test_a_free_joint_that_its_torque_presses_on_a_stop_is_told_so() -> None:
     assert told is not None
     assert "only the upper stop, on which the joint lies, resists the torque" in told.cause
     assert told.remedies == ()
+
+
+def test_a_joint_that_reaches_a_stop_is_told_side_time_and_share_although_its_torque_follows() -> None:
+    free = simulate(TASK, ["motion.kind=free", "reference.level=3 N m"])
+    assert free.tracking is None
+    rests = np.degrees(free["angle"]) > 129.9
+    reached, share = free["time"][int(np.argmax(rests))], 100.0 * np.count_nonzero(rests) / rests.size
+    assert free.warnings[0] == (
+        f"the joint reaches its upper stop (130 deg) at {reached:.3g} s and lies on it for {share:.0f} % of the run: "
+        "there the stop bears the torque; not tried: lock the joint (overrides=['motion.kind=locked']) or add a load"
+    )
+    # A run that starts on the lower stop is told the upper one alone, and nothing of a torque that nobody asks for.
+    (opened,) = simulate("step-response").warnings
+    assert re.fullmatch(
+        r"the joint reaches its upper stop \(130 deg\) at 0\.1[78]\d* s and lies on it for \d+ % of the run", opened
+    )
+    pressed = simulate("cylinder-servo", ["motion.external_torque=20 N m"]).warnings
+    assert any(said.startswith("the joint reaches its lower stop (20 deg) at 0.03") for said in pressed)
+    for scenario in ("cylinder-servo", "pressure-loop", "torque-task-moving-ankle"):
+        assert simulate(scenario).warnings == ()
+
+
+@pytest.mark.parametrize("law", ["pid", "damped_proportional", "on_off", "sliding_mode"])
+def test_a_changed_sensor_that_the_controller_does_not_read_is_told_so(law: str) -> None:
+    task, noise = [f"controller.kind={law}", "reference.level=3 N m", "run.duration=0.5 s"], "sensors.angle_noise=2 deg"
+    quiet, noisy = simulate(TASK, task), simulate(TASK, [*task, noise])
+    assert np.array_equal(quiet["command"], noisy["command"])
+    said = (
+        "without effect here: sensors.angle_noise; the controller reads a torque computed from the measured pressures"
+    )
+    assert said in noisy.warnings
+    pressed = simulate(TASK, [*task, "sensors.pressure_noise=0.5 psi_d", "sensors.seed=2"])
+    assert not np.array_equal(quiet["command"], pressed["command"])
+    assert not any("without effect" in said for said in (*quiet.warnings, *pressed.warnings))
+
+
+def test_sensors_of_an_angle_of_a_lever_and_of_an_open_loop_are_told_by_what_is_read() -> None:
+    servo = ["controller.kind=pid", "run.duration=0.3 s"]
+    told = simulate("cylinder-servo", [*servo, "sensors.pressure_noise=0.1 bar_d"])
+    assert np.array_equal(told["command"], simulate("cylinder-servo", servo)["command"])
+    assert "without effect here: sensors.pressure_noise; the controller reads the measured angle" in told.warnings
+    # The torque of a lever depends on its angle: the measured angle counts.
+    lever = ["device.set=cylinder-lever", "reference.level=3 N m", "sensors.angle_noise=2 deg", "run.duration=0.3 s"]
+    assert not any("without effect" in said for said in simulate(TASK, lever).warnings)
+    opened = simulate("step-response", ["sensors.delay=5 ms", "sensors.seed=4"]).warnings
+    assert "without effect here: sensors.delay, sensors.seed; the controller reads no sensor" in opened
+    with pytest.raises(
+        PpafoError, match=r"did you mean 'sensors\.pressure_noise'\?; the torque is computed from the mea"
+    ):
+        load_scenario(TASK, ["sensors.torque_noise=0.1 N m"])
 
 
 @pytest.mark.parametrize("law", ["pid", "sliding_mode", "on_off"])

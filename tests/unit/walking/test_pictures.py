@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from ppafo.analyses.walk.answer import comparison_table
 from ppafo.analyses.walk.wearers import wearers_finding
 from ppafo.report.finding import Section, text_of
+from ppafo.report.style import drawn_at
 from ppafo.signals import Channel, Recording
 from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.figures import task_sequence, whole_walk
@@ -84,6 +85,24 @@ def test_the_strip_of_phases_names_the_tasks_in_the_order_of_the_stride(name: st
         "in the air",
     ]
     assert {"vented", "plantar", "dorsi"} <= {text.get_text() for text in valve.texts}
+
+
+@pytest.mark.parametrize("width", ["84 mm", None])
+@pytest.mark.parametrize("stature", ["1.75 m", "2.2 m"])
+def test_no_leg_of_the_strip_of_phases_is_cut_at_its_edges(stature: str, width: str | None) -> None:
+    walked = walk(load_walk("proportional", [f"wearer.stature={stature}"]), minutes=0.15)
+    with drawn_at(width):
+        figure = strip_figure(walked)
+    (legs,) = figure.axes[0].child_axes
+    drawn = [line.get_xydata() for line in legs.lines[1:]] + [patch.get_xy() for patch in legs.patches]
+    points = np.concatenate(drawn)
+    (left, right), (bottom, top) = legs.get_xlim(), legs.get_ylim()
+    assert left < points[:, 0].min() < points[:, 0].max() < right
+    assert bottom < points[:, 1].min() < points[:, 1].max() < top
+    # The picture itself lies within the figure, and a metre is as long in both directions.
+    box = legs.get_window_extent()
+    assert figure.bbox.x0 < box.x0 < box.x1 < figure.bbox.x1
+    assert box.width / (right - left) == pytest.approx(box.height / (top - bottom), rel=1e-6)
 
 
 def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:

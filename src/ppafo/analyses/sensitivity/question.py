@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from ppafo.studies.study import Study
 
 DistributedStudy = Annotated[
-    "Study | str | Path | Mapping[str, Any]",
-    Word("STUDY", help="a study with distributions: a name, or a .toml file"),
+    "Study | str | Path | Mapping[str, Any]", Word("STUDY", help="a study with distributions: a name, or a .toml file")
 ]
 MethodName = Annotated[str, Word("sobol|shapley")]
 

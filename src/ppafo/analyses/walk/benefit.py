@@ -109,7 +109,7 @@ def _remedied(worn: WalkResult, drags: bool) -> list[str]:
                     continue
                 gain = f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}"
             changes = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
-            return [f"{cause}: with {changes}, {gain}, simulated in another walk"]
+            return [f"{cause}: for example with {changes}, {gain}, simulated in another walk"]
     return [f"{cause}, and {advice}"] if advice else []
 
 

@@ -12,14 +12,7 @@ The learnt stride is a ring buffer: its first knot is the next one, its last kno
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.walking.fractional_timing import (
-    CLOCK_START,
-    AnchorWeight,
-    Delays,
-    GaitClock,
-    next_clock,
-    phase_time,
-)
+from ppafo.control.walking.fractional_timing import CLOCK_START, AnchorWeight, Delays, GaitClock, next_clock, phase_time
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.timing import GaitTime, TimingKind
 from ppafo.model.declaration import Number, quantities_of
@@ -156,11 +149,7 @@ def next_stride(stride: LearntStride, measurement: GaitMeasurement, weight: floa
     angle = stride.angle[0] + weight * (measurement.angle - stride.angle[0])
     heel = stride.heel_force[0] + weight * (measurement.heel_force - stride.heel_force[0])
     toe = stride.toe_force[0] + weight * (measurement.toe_force - stride.toe_force[0])
-    return LearntStride(
-        (*stride.angle[1:], angle),
-        (*stride.heel_force[1:], heel),
-        (*stride.toe_force[1:], toe),
-    )
+    return LearntStride((*stride.angle[1:], angle), (*stride.heel_force[1:], heel), (*stride.toe_force[1:], toe))
 
 
 def knots_passed(fraction: float, next_knot: float) -> float:

@@ -222,8 +222,7 @@ def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     if parts.scenario.supply_lines is not None:
         relieving = parts.scenario.supply_lines.relieving
         lane.lines = rebuilt(
-            SupplyLines,
-            (relieving if name == "relieving" else getattr(settings, name) for name in parts.line_fields),
+            SupplyLines, (relieving if name == "relieving" else getattr(settings, name) for name in parts.line_fields)
         )
 
 

@@ -10,13 +10,7 @@ from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
-from ppafo.exports.c_library.preparation import (
-    counted,
-    set_gas,
-    set_plant,
-    set_timing,
-    start,
-)
+from ppafo.exports.c_library.preparation import counted, set_gas, set_plant, set_timing, start
 from ppafo.exports.c_library.prepared import Preparation, PreparedLane, names_of
 from ppafo.exports.c_library.settings import declared_settings, export_parameters, numbers_of_second_chamber
 from ppafo.model.declaration import Quantity
@@ -227,8 +221,7 @@ def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> N
 def set_walking_law(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the controller parameters; a walk has no reference."""
     lane.controller = rebuilt(
-        law_of(parts.scenario).parameters,
-        (getattr(settings, c_identifier(path)) for path in _control(parts.scenario)),
+        law_of(parts.scenario).parameters, (getattr(settings, c_identifier(path)) for path in _control(parts.scenario))
     )
     lane.reference = parts.constant(profile_parameters(NO_REFERENCE))
 

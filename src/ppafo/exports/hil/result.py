@@ -144,10 +144,7 @@ class HardwareRun:
             stamp = "" if row.controller_time is None else repr(row.controller_time / wire.MICROSECONDS)
             times = ("" if value is None else repr(value) for value in (row.delay, row.response_time))
             writer.writerow([row.sequence, repr(row.due), *times, repr(row.command), stamp, int(row.is_vented)])
-        files = {
-            "log.csv": buffer.getvalue().encode(),
-            "link.json": f"{json_text(self.document())}\n".encode(),
-        }
+        files = {"log.csv": buffer.getvalue().encode(), "link.json": f"{json_text(self.document())}\n".encode()}
         if self.traffic.is_real_time:
             figure = render_figure(self.plot(), ("png", "svg"))
             files |= {f"link.{form}": content for form, content in figure.items()}

@@ -95,10 +95,7 @@ def pid_sample(numbers: _PidNumbers, state: _PidCounts, readings: ConverterCount
     error = error_of(readings, numbers.limits)
     # Without a last error there is no change: no derivative kick at the first sample.
     change = limited(error - state.error, LARGEST_CHANGE) if state.started == 1 else 0
-    slope = limited(
-        state.slope + fraction_of(change * SLOPE_UNIT - state.slope, numbers.filter_share),
-        LARGEST_SLOPE,
-    )
+    slope = limited(state.slope + fraction_of(change * SLOPE_UNIT - state.slope, numbers.filter_share), LARGEST_SLOPE)
     # Gains have 15 bits behind the point: an error of one count would be rounded away without as many of its own.
     wide_error = error * WIDE
     # The integral has 256 parts of a part: what a small error adds in one period is less than a part.

@@ -41,7 +41,7 @@ _WITHIN = 0.95
 """Reduced reference divided by the actuator's reach [-]."""
 LOCKED = Remedy({}, ("motion.kind=locked",))
 """Remedy for a free joint that nothing resists."""
-_ON_STOP = 1.0e-3
+ON_STOP = 1.0e-3
 """Distance from a stop up to which a joint rests on it [rad]."""
 _MOSTLY = 0.5
 """Fraction of the settled part that counts as most of it [-]."""
@@ -228,7 +228,7 @@ def torque_at_its_limit(case: Case) -> TrackingCause | None:
 def stop_of(scenario: Scenario, angle: Floats) -> str:
     """Stop on which a joint rests for most of some samples; "" if on none."""
     ends = (("lower", scenario.device.actuator.angle_min), ("upper", scenario.device.actuator.angle_max))
-    return next((word for word, stop in ends if np.mean(np.abs(angle - stop) <= _ON_STOP) > _MOSTLY), "")
+    return next((word for word, stop in ends if np.mean(np.abs(angle - stop) <= ON_STOP) > _MOSTLY), "")
 
 
 def flung_at_start(case: Case) -> TrackingCause | None:

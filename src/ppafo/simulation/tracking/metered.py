@@ -109,8 +109,7 @@ def tracking_excess(
     # A value that does not move is no oscillation, however far it is from the reference, and a cut wave is none either.
     oscillation = np.fmax(turning, np.where((found.still > 1.0) | (cut > 1.0), 0.0, found.swings))
     return TrackingExcess(
-        largest=np.where(known_verdict, largest, np.nan),
-        oscillation=np.where(counted | known, oscillation, np.nan),
+        largest=np.where(known_verdict, largest, np.nan), oscillation=np.where(counted | known, oscillation, np.nan)
     )
 
 

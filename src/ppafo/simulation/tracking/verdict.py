@@ -107,7 +107,7 @@ class Tracking:
         elif self.tried or not remedies:
             last = f"; {self.tried or self.advice}" if self.tried or self.advice else ""
         else:
-            last = f": {remedies}"
+            last = f"; not tried: {remedies}"
         return f"{self.found}; {self.cause}{last}"
 
     @property

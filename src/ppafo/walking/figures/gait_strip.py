@@ -37,6 +37,8 @@ _HEIGHTS = (1.5, 0.72, 0.72, 0.72, 1.3)
 _PERCENT = 100.0 * PHASES
 _FRAMES, _FEW_FRAMES = 8, 5
 """Number of legs over the stride, and in a narrower figure."""
+_EDGE, _GROUND, _HEIGHT, _OVER = 0.04, 0.12, 0.7, 0.03
+"""Strip at either side that legs may use [widths]; depth of the ground, least height, space over the knee [m]."""
 _LETTER, _LINE = 0.082, 0.14
 """Width of a letter and height of a text line in a block at full width [inches]."""
 
@@ -148,17 +150,20 @@ def _draw_legs(axes: "Axes", result: WalkResult) -> None:
     """Draw stick figures above the strip, each at its instant, in axes scaled in metres over the same percent axis."""
     frames = _FRAMES if printed_width(_SIZE[0]) >= _SIZE[0] else _FEW_FRAMES
     turns = last_phases(result, 1, frames) + 0.5 / frames
-    legs = legs_of(result, turns)
-    box, height = axes.get_window_extent(), 0.7
-    metres = height * box.width / box.height
-    inner = axes.inset_axes((0.0, 0.0, 1.0, 1.0))
+    legs, shares, box = legs_of(result, turns), turns % 1.0, axes.get_window_extent()
+    points = np.array([[leg.knee, leg.heel, leg.toe] for leg in (legs.healthy, legs.worn)]).reshape(-1, turns.size, 2)
+    reach, top = points[..., 0] - legs.healthy.ankle[:, 0], float(points[..., 1].max()) + _OVER
+    # The width of the stride [m] at which no leg passes the edges of the picture, however long it is.
+    sides = np.maximum(-reach / (shares + _EDGE), reach / (1.0 - shares + _EDGE))
+    metres = max(float(sides.max()), max(_HEIGHT, top + _GROUND) * box.width / box.height)
+    inner = axes.inset_axes((-_EDGE, 0.0, 1.0 + 2.0 * _EDGE, 1.0))
     draw_ground(inner, 0.0, metres)
     for index in range(turns.size):
-        offset = legs.healthy.ankle[index, 0] - metres * (turns[index] % 1.0)
+        offset = legs.healthy.ankle[index, 0] - metres * shares[index]
         leg_artists(inner, GHOST, 1.6, is_ghost=True).place(legs.healthy, index, offset)
         leg_artists(inner, WITH, 2.6).place(legs.worn, index, offset)
-    inner.set_xlim(0.0, metres)
-    inner.set_ylim(-0.12, height - 0.12)
+    inner.set_xlim(-_EDGE * metres, (1.0 + _EDGE) * metres)
+    inner.set_ylim(-_GROUND, metres * box.height / box.width - _GROUND)
     inner.set_axis_off()
     axes.set_axis_off()
 

@@ -55,10 +55,11 @@ def whole_walk_figure(result: WalkResult) -> "Figure":
     phase, look = Kind("Phase of the controller"), {"linewidth": 0.9, "drawstyle": "steps-post"}
     has_phases = "controller_phase" in recording
     phases = [Mark("line", time, acting_phase(recording), colour=BLACK, style=look)] if has_phases else []
+    named = {"yticks": range(len(_PHASES)), "yticklabels": _PHASES, "ylim": (-0.3, len(_PHASES) - 0.7)}
     panels = [
         Panel(axis, GAS, [Mark("line", time, recording["supplied_mass"]), *lines], then=name_failures, shares_x=True),
         Panel(axis, TOES, [Mark("line", time, recording["toe_height"], style=THIN), GROUND, *lines], shares_x=True),
-        Panel(axis, phase, [*phases, *lines], then=_name_phases, shares_x=True),
+        Panel(axis, phase, [*phases, *lines], then=lambda axes: axes.set(**named), shares_x=True),
     ]
     if "safe_state" in recording:
         panels.append(_level_panel(recording, axis))
@@ -89,11 +90,6 @@ def _name_failures(failed: Mapping[str, float], end: float, axis: Kind, axes: "A
             color=GREY,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )
-
-
-def _name_phases(axes: "Axes") -> None:
-    axes.set_yticks(range(len(_PHASES)), _PHASES)
-    axes.set_ylim(-0.3, len(_PHASES) - 0.7)
 
 
 def _level_panel(recording: Recording, axis: Kind) -> Panel:

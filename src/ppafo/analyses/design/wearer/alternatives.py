@@ -21,8 +21,10 @@ from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import rated_pressure
 from ppafo.progress import Progress, Report
 
-_MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2)
+_MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2, 2.7, 3.3, 4.0, 5.0)
 """Factors on the gauge pressure that are tried if no torque suffices."""
+_HIGHEST_PRESSURE = STANDARD_ATMOSPHERE + 1.0e6
+"""Highest pressure [Pa absolute] that is tried with parts whose rated pressure is unknown: ten bar gauge."""
 _LESS_PRESSURE = tuple(0.95 - 0.05 * step for step in range(12))
 """Factors on the gauge pressure that are tried if no bottle lasts."""
 _MOST_PAIRS = 5
@@ -71,7 +73,7 @@ def alternatives_to(
     yield from alternatives
     if not able:
         stronger = (
-            _as_walked(candidate, bottle, shelf, report) for candidate in _at_more_pressure(requirements, tried)
+            _as_walked(candidate, bottle, shelf, report) for candidate in _at_more_pressure(requirements, tried, shelf)
         )
         yield from itertools.islice(filter(None, stronger), 1)
     # A walk that ends early is no full answer: less torque for the whole time is offered beside it.
@@ -106,21 +108,27 @@ def _at_less_pressure(
     return candidates
 
 
-def _at_more_pressure(requirements: DesignRequirements, tried: Sequence[WalkedDevice]) -> Iterator[_Candidate]:
+def _at_more_pressure(
+    requirements: DesignRequirements, tried: Sequence[WalkedDevice], shelf: AvailableParts
+) -> Iterator[_Candidate]:
     """Yield pairs that meet the requirements at a higher pressure, the lowest pressure first.
 
-    For each kind of valve, the pair with the largest torque and the pair with the largest toe clearance are tried.
+    For each kind of valve, the pair with the largest torque and the pair with the largest toe clearance are tried; of a
+    kind without assistance at the required pressure, every valve with the actuator of the largest torque constant.
     """
-    best: list[WalkedDevice] = []
-    for kind in dict.fromkeys(pair.valve.kind for pair in tried):
+    valves, actuators = shelf.groups["valves"].values(), shelf.groups["actuators"].values()
+    largest = max(actuators, key=lambda part: part.values["torque_constant"])
+    best: list[tuple[Part, Part]] = []
+    for kind in dict.fromkeys(valve.kind for valve in valves):
         pairs = [pair for pair in tried if pair.valve.kind == kind]
-        strongest, highest = max(pairs, key=lambda pair: pair.torque), max(pairs, key=lambda pair: pair.toes)
-        best += {(pair.valve.name, pair.actuator.name): pair for pair in (strongest, highest)}.values()
+        chosen = [max(pairs, key=lambda pair: pair.torque), max(pairs, key=lambda pair: pair.toes)] if pairs else []
+        best += {(pair.valve.name, pair.actuator.name): (pair.valve, pair.actuator) for pair in chosen}.values()
+        best += [(valve, largest) for valve in valves if valve.kind == kind and not pairs]
     for factor in _MORE_PRESSURE:
         higher = requirements.at_gauge(factor)
-        for pair in best:
-            if rated_pressure(pair.valve, pair.actuator) >= higher.pressure:
-                again = few_strides(higher, pair.valve, pair.actuator)
+        for valve, actuator in best:
+            if min(rated_pressure(valve, actuator), _HIGHEST_PRESSURE) >= higher.pressure:
+                again = few_strides(higher, valve, actuator)
                 yield from (_Candidate(higher, strides) for strides in again if strides.has(requirements))
 
 

@@ -27,16 +27,11 @@ from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import who_walks
 from ppafo.wording import argument_text
 
-_HEAD = (
-    "valve",
-    "actuator",
-    ("peak torque", TORQUE),
-    ("lowest toes", CLEARANCE),
-)
+_HEAD = ("valve", "actuator", ("peak torque", TORQUE), ("lowest toes", CLEARANCE))
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _NONE = (
-    "No device in the catalogue meets these requirements. Alternatives, on the largest bottle (a design takes the "
-    "lightest that lasts):"
+    "No device in the catalogue meets these requirements. Alternatives (examples), on the largest bottle (a design "
+    "takes the lightest that lasts):"
 )
 _READING = (
     "Every pair of valve and actuator in the catalogue is simulated for a few strides at this pressure. Pairs with at "

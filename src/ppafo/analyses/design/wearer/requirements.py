@@ -79,8 +79,7 @@ class DesignRequirements:
         unit = shown_unit("Pa_d")
         step = to_si(10.0 ** round(math.log10(from_si(0.1 * PASCALS_PER_PSI, unit, "Pa_d"))), unit, "Pa_d")
         return replace(
-            self,
-            pressure=STANDARD_ATMOSPHERE + step * round(share * (self.pressure - STANDARD_ATMOSPHERE) / step),
+            self, pressure=STANDARD_ATMOSPHERE + step * round(share * (self.pressure - STANDARD_ATMOSPHERE) / step)
         )
 
     def is_reached_by(self, torque: float) -> bool:

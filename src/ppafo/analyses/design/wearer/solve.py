@@ -83,7 +83,7 @@ def size_for_wearer(
         return replace(sized, device=_device(*lightest, requirements, shelf, report))
     alternatives = alternatives_to(requirements, tried, shelf, report)
     instead = tuple(alternative.text(requirements) for alternative in alternatives)
-    if not tried:
+    if not instead and not tried:
         instead = ("no pair of valve and actuator is rated for this pressure and assists; change the pressure",)
     elif not instead:
         torque = requirements.torque

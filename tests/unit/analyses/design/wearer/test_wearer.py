@@ -105,7 +105,7 @@ def test_toes_may_be_asked_to_drag_no_more_than_the_ground_and_no_device_lifts_t
     high = sized(2.5, 0.2, toes=0.05)
     assert high.device is None
     said = text_of(finding_of(high))
-    assert "meets these requirements. Alternatives, on the largest bottle (a design takes the lightest" in said
+    assert "Alternatives (examples), on the largest bottle (a design takes the lightest that lasts):" in said
     (lower,) = (line for line in high.instead if line.startswith("lower toes: "))
     offered = float(re.search(r"toes (\S+) mm", lower)[1])  # type: ignore[index]
     again = sized(2.5, 0.2, toes=1e-3 * offered).device
@@ -154,6 +154,23 @@ def test_a_pressure_that_wastes_gas_is_answered_with_less_pressure_and_that_is_g
     asked = replace(requirements, pressure=101325.0 + float(words[2]) * PSI)
     strides = few_strides(asked, valve, actuator)
     assert lightest_on_bottle(asked, strides, shelf, report_nothing) is not None
+
+
+def test_a_pressure_far_too_low_for_the_torque_is_answered_with_one_that_gives_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(alternatives, "_LESS_PRESSURE", ())
+    shelf = shelf_of("parts")
+    valve, actuator = shelf.groups["valves"]["enfield-ls-v05s"], shelf.groups["actuators"]["smc-crb2bw40-90d"]
+    requirements = DesignRequirements(72.5, 1.75, 5.0, 101325.0 + 20.0 * PSI, 9.0, 0.001)
+    tried = few_strides(requirements, valve, actuator)
+    # Torque constant times pressure, equation (2): 20 psi give 2 N m, and 5 N m need 50 psi.
+    needed = 5.0 / actuator.values["torque_constant"]
+    assert tried == [], "nothing assists at 20 psi"
+    *_, alternative = alternatives_to(requirements, tried, shelf, report_nothing)
+    assert alternative.requirements.torque == requirements.torque
+    assert needed * 0.97 < alternative.requirements.pressure - 101325.0 < 1.4 * needed
+    assert alternative.text(requirements).startswith("more pressure: 5 N m at ")
 
 
 @pytest.mark.long

@@ -1,0 +1,60 @@
+"""Remarks on a run beside its verdict: stops that the joint reaches, and overridden sensor values without effect."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.parameters.overrides import read_overrides
+from ppafo.parameters.reach import torque_reach
+from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.tracking.load_causes import LOCKED, ON_STOP
+from ppafo.simulation.tracking.pair_step import unlimited_switching
+from ppafo.simulation.tracking.remedies import level_text
+
+if TYPE_CHECKING:
+    from ppafo.simulation.at_hand import RecordedResult
+
+
+def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
+    """Yield remarks on stops, switching frequency, sensor values without effect, and replaced values of the set.
+
+    ``follows``: True if the run follows its reference; a stop may then bear the torque that the reference asks for.
+    """
+    scenario, recording = result.scenario, result.recording
+    motion, actuator, reached = scenario.motion, scenario.device.actuator, []
+    if isinstance(motion, FreeMotion):
+        for side, stop in (("lower", actuator.angle_min), ("upper", actuator.angle_max)):
+            rests = np.abs(recording["angle"] - stop) <= ON_STOP
+            # A start on a stop is the scenario's, unless the joint never leaves the stop.
+            at = np.flatnonzero(rests & ~np.concatenate([[not rests.all()], rests[:-1]]))
+            name, share = f"its {side} stop ({level_text('rad', stop)})", f"{100.0 * np.mean(rests):.0f} % of the run"
+            reached += [f"{name} at {recording.time[index]:.3g} s and lies on it for {share}" for index in at[:1]]
+        if reached and follows and scenario.controlled != ANGLE and motion.leg is None:
+            reached[-1] += f": there the stop bears the torque; not tried: lock the joint ({LOCKED.text}) or add a load"
+    yield from (f"the joint reaches {text}" for text in reached)
+    yield unlimited_switching(result)
+    yield _without_effect(scenario)
+    yield scenario.origin.replaced
+
+
+def _without_effect(scenario: Scenario) -> str:
+    """Overridden sensor values that the controller does not read in this scenario, as text; "" without any."""
+    sensors, law, actuator = scenario.sensors, scenario.law, scenario.device.actuator
+    unread, read = "sensors.angle_", "the measured pressure"
+    if scenario.controller.is_open_loop:
+        unread, read = "sensors.", "no sensor"
+    elif law is None or not scenario.follows_reference or len(law.controls) < 2:
+        # Only laws of several quantities are declared to read nothing but the controlled one.
+        return ""
+    elif scenario.controlled == ANGLE:
+        unread, read = "sensors.pressure_", "the measured angle"
+    elif scenario.controlled == TORQUE:
+        angles = np.linspace(actuator.angle_min, actuator.angle_max, 4).tolist()
+        depends = len({torque_reach(scenario.device, angle) for angle in angles}) > 1
+        unread, read = "none" if depends else unread, "a torque computed from the measured pressures"
+    names = [override.typed for override in read_overrides(scenario.origin.overrides)]
+    is_quiet = not (sensors.angle_noise or sensors.pressure_noise)
+    names = [name for name in names if name.startswith(unread) or (is_quiet and name == "sensors.seed")]
+    return f"without effect here: {', '.join(names)}; the controller reads {read}" if names else ""
