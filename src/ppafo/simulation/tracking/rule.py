@@ -192,7 +192,7 @@ def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
     share = np.asarray(settled.rms_error / wanted)
     is_still = (share > LARGEST_SHARE) & (settled.value_range <= SMALLEST_MOVE * wanted)
     standstill = np.where(is_still, share / LARGEST_SHARE, 0.0)
-    return _TaskExcess(error, oscillation, overshoot, standstill)
+    return _TaskExcess(error=error, oscillation=oscillation, overshoot=overshoot, standstill=standstill)
 
 
 def failure_of_task(settled: SettledPart, turning: float, is_switched: bool) -> Failure | None:
