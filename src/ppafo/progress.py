@@ -55,7 +55,7 @@ class ProgressLine:
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
         self._stream, self._clock = stream, clock
-        self._written, self._activity = -_BETWEEN_LINES, ""
+        self._written, self._last = -_BETWEEN_LINES, ("", False)
         self._open = False
 
     def __call__(self, progress: Progress) -> None:
@@ -67,11 +67,10 @@ class ProgressLine:
             self._stream.flush()
             return
         # In a file a line now and then is enough: when something new begins or ends, else every so often.
-        is_late = self._clock() - self._written >= _BETWEEN_LINES
-        is_complete = 0 < progress.total == progress.done
-        if is_late or is_complete or progress.activity != self._activity:
+        now = progress.activity, 0 < progress.total == progress.done
+        if now != self._last or self._clock() - self._written >= _BETWEEN_LINES:
             self._stream.write(f"ppafo: {progress.line()}\n")
-            self._written, self._activity = self._clock(), progress.activity
+            self._written, self._last = self._clock(), now
         self._stream.flush()
 
     def close(self) -> None:

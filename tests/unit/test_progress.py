@@ -54,6 +54,15 @@ def test_a_file_gets_a_line_now_and_then_and_the_last_one() -> None:
     assert [text.split(" of ")[0] for text in said] == [f"ppafo: {done}" for done in (1, 6, 11, 16, 21, 26, 30)]
 
 
+def test_the_end_of_a_count_is_written_once_and_the_next_count_begins_at_0() -> None:
+    stream = io.StringIO()
+    line = ProgressLine(stream, lambda: 0.0)
+    for done in (0, 1, 2, 2, 2, 0, 1, 2, 2):
+        line(Progress("walking", done, 2))
+    said = stream.getvalue().splitlines()
+    assert [text.split(" of ")[0].removeprefix("ppafo: walking, ") for text in said] == ["0", "2", "0", "2"]
+
+
 def test_what_is_logged_while_a_line_is_open_begins_on_a_line_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr("sys.stderr", terminal)

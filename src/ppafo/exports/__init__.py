@@ -10,7 +10,7 @@ from importlib.resources import files
 from ppafo.wording import one_line
 
 _MARK = re.compile(r"@(\w+)@")
-_OF_MARKDOWN = re.compile(r"([\\`*_{}\[\]()#+\-!|~<>&:])")
+_OF_MARKDOWN = re.compile(r"([\\`*\[\]<~]|(?<![^\W_])_|_(?![^\W_])|:(?=//)|&(?=#?\w+;)|^[#>+=-])")
 
 
 def template(package: str, name: str) -> str:

@@ -153,11 +153,12 @@ def check_moment_time(walk: MeanStride) -> None:
     if at < fraction and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
         return
     where = "" if at >= fraction else f" and is {swing:.2g} N m/kg in swing"
-    # Without a force the toe-off is only as good as the angle of the shank.
-    force = "" if "vertical_force" in walk.curves else "; toe-off follows from the shank angle: give a vertical force"
+    # A gait file states the toe-off.
+    is_known = "vertical_force" in walk.curves or walk.signs_from == "gait_file"
+    force = "" if is_known else "toe-off is guessed without a vertical force: give one; or "
     raise DataError(
         f"{column} peaks at {100.0 * at:.0f} % of the stride{where}, but the foot is off the ground "
-        f"from {100.0 * fraction:.0f} % on; {_OTHER_TIME[walk.signs_from]}{force}"
+        f"from {100.0 * fraction:.0f} % on; {force}{_OTHER_TIME[walk.signs_from]}"
     )
 
 

@@ -36,17 +36,20 @@ def read_clock(reading: DocumentReader) -> RunTimes:
     Raises ScenarioError for contradictory times, and for too many steps.
     """
     duration = reading.number(_DURATION_PATH, _DURATION)
+    until = f"{_DURATION_PATH} = {shown_text(duration, 's')}"
     if value_at(reading.document, _RATE_PATH) is not None:
-        sampling, period = _RATE_PATH, 1.0 / reading.number(_RATE_PATH, RATE)
+        period = 1.0 / reading.number(_RATE_PATH, RATE)
+        given = f"the period of {_RATE_PATH} = {value_at(reading.document, _RATE_PATH)} ({1.0e3 * period:.6g} ms)"
     elif value_at(reading.document, _PERIOD_PATH) is not None:
-        sampling, period = _PERIOD_PATH, reading.number(_PERIOD_PATH, PERIOD)
+        period = reading.number(_PERIOD_PATH, PERIOD)
+        given = f"{_PERIOD_PATH} = {shown_text(period, 's')}"
     else:
         raise ScenarioError(f"{reading.file}: '{_RATE_PATH}' is missing: give for example rate = '1 kHz', or a period")
     has_output = value_at(reading.document, _OUTPUT_PATH) is not None
     if value_at(reading.document, _STEP_PATH) is not None:
         step = reading.number(_STEP_PATH, _STEP)
-        _not_above(reading, _STEP_PATH, step, sampling, period)
-        _not_above(reading, _STEP_PATH, step, _DURATION_PATH, duration)
+        _not_above(reading, _STEP_PATH, step, period, given)
+        _not_above(reading, _STEP_PATH, step, duration, until)
     elif has_output:
         step = step_with_output(duration, period, reading.number(_OUTPUT_PATH, _OUTPUT))
     else:
@@ -59,13 +62,10 @@ def read_clock(reading: DocumentReader) -> RunTimes:
                 _OUTPUT_PATH,
                 f"must not be below {_STEP_PATH} = {shown_text(step, 's')}; reduce the step or record less often",
             )
-        _not_above(reading, _OUTPUT_PATH, output, _DURATION_PATH, duration)
+        _not_above(reading, _OUTPUT_PATH, output, duration, until)
         count = duration / output
         if abs(count - round(count)) > _RELATIVE * count:
-            raise reading.refusal(
-                _OUTPUT_PATH,
-                f"must divide {_DURATION_PATH} = {shown_text(duration, 's')} evenly, not {count:.6g} times",
-            )
+            raise reading.refusal(_OUTPUT_PATH, f"must divide {until} evenly, not {count:.6g} times")
     used = dividing_step(period, step)
     if duration / used > MAXIMUM_STEPS:
         raise reading.refusal(
@@ -88,11 +88,8 @@ def links_of_times(document: Mapping[str, Any]) -> Graph:
     found: dict[str, tuple[LinkedDefault, ...]] = {}
     if not step:
         sources = (_DURATION_PATH, _PERIOD_PATH)
-        term = (
-            LinkFunction((*sources, _OUTPUT_PATH), step_with_output)
-            if output
-            else LinkFunction(sources, step_unless_given)
-        )
+        with_output = LinkFunction((*sources, _OUTPUT_PATH), step_with_output)
+        term = with_output if output else LinkFunction(sources, step_unless_given)
         found[_STEP_PATH] = (LinkedDefault((term,)),)
     if not output:
         found[_OUTPUT_PATH] = (
@@ -130,9 +127,9 @@ def output_unless_given(duration: Numeric, period: Numeric, step: Numeric) -> Nu
     return found
 
 
-def _not_above(reading: DocumentReader, path: str, value: float, limit_path: str, limit: float) -> None:
+def _not_above(reading: DocumentReader, path: str, value: float, limit: float, limit_text: str) -> None:
     if value > limit * (1.0 + _RELATIVE):
-        raise reading.refusal(path, f"must not exceed {limit_path} = {shown_text(limit, 's')}")
+        raise reading.refusal(path, f"must not exceed {limit_text}")
 
 
 TimeTexts = Mapping[str, Mapping[str, Any]]

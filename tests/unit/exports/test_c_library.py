@@ -17,6 +17,7 @@ import pytest
 
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of, batches_of
+from ppafo.exports import in_markdown
 from ppafo.exports.c_library import c_library, library_of, scenario_library
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import Library, c_identifier
@@ -395,10 +396,23 @@ def test_what_a_scenario_says_is_plain_words_in_every_page_and_comment() -> None
     assert len(said) == 3
     for page in said:
         (line,) = [line for line in page.splitlines() if "alert" in line]
-        assert re.search(r"(?<!\\)[<>`\[\]()#]", line.split("Controller `pid_fixed_point`")[0]) is None
+        assert re.search(r"(?<!\\)[<`\[\]]", line.split("Controller `pid_fixed_point`")[0]) is None
         assert "Heading" in line
     for text in texts.values():
         assert not any(mark in text.decode() for mark in "\u202e\x1b")
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("foot flat: a 5 psi_g step (1 - 2 s) & rest!", "foot flat: a 5 psi_g step (1 - 2 s) & rest!"),
+        ("- a list", r"\- a list"),
+        ("# a heading", r"\# a heading"),
+        ("*a* _b_ `c` [d](e) <b> &amp; https://f", r"\*a\* \_b\_ \`c\` \[d\](e) \<b> \&amp; https\://f"),
+    ],
+)
+def test_only_marks_of_markdown_are_escaped(text: str, written: str) -> None:
+    assert in_markdown(text) == written
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake on this machine")

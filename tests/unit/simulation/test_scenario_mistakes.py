@@ -222,7 +222,11 @@ def test_a_ramp_that_would_leave_the_stops_after_the_run_is_allowed() -> None:
         ('"3 s"', '"0 s"', "run.duration = '0 s': must be more than 0 s"),
         ('"3 s"', '"-1 s"', "run.duration = '-1 s': must be more than 0 s"),
         ('"3 s"', '"2 min^2"', "a unit like 's' is needed"),
-        ('step = "1 ms"', 'step = "2 ms"', "run.step = '2 ms': must not exceed controller.rate = 0.001 s"),
+        (
+            'step = "1 ms"',
+            'step = "2 ms"',
+            "run.step = '2 ms': must not exceed the period of controller.rate = 1 kHz (1 ms)",
+        ),
         ('output_interval = "1 ms"', 'output_interval = "0.5 ms"', "must not be below run.step = 0.001 s"),
         ('output_interval = "1 ms"', 'output_interval = "4 s"', "must not exceed run.duration = 3 s"),
         (

@@ -767,7 +767,7 @@ def test_a_wrong_set_up_is_told_its_cause_and_a_remedy_that_works(
     [
         (TASK, "controller.proportional_gain=-0.1 1/(N m)", "must be at least 0 1/(N m)"),
         ("cylinder-servo", "reference.level=200 deg", "leaves the stops of cylinder-lever, 20 deg to 130 deg"),
-        (TASK, "run.step=0.5 s", "must not exceed controller.rate = 0.001 s"),
+        (TASK, "run.step=0.5 s", "must not exceed the period of controller.rate = 1 kHz (1 ms)"),
     ],
 )
 def test_a_wrong_sign_a_reference_beyond_the_stops_and_a_coarse_step_are_refused(

@@ -112,8 +112,7 @@ def design(
             requirements = DesignRequirements(
                 mass, stature, float(torque), float(pressure), 60.0 * minutes, toes, gait=gait
             )
-            parts = DEFAULT if catalogue is None else catalogue
-            return wearer.finding_of(size_for_wearer(requirements, report, parts, bottle))
+            return wearer.finding_of(size_for_wearer(requirements, report, catalogue or DEFAULT, bottle))
     if given:
         raise StudyError(
             f"{', '.join(map(argument_text, given))} cannot be combined with a design file, which states the "

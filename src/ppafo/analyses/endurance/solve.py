@@ -1,6 +1,6 @@
 """Duration of a bottle for a gas demand from given numbers, from a recording, or from a walk."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.bottle.supply import BOTTLE_NAME, is_of_bottle, other_pressure
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
-from ppafo.walking.walk import bottle_life
+from ppafo.walking.walk import bottle_life, silent
 from ppafo.wording import argument_text, override_text
 
 BETWEEN_RESTS = 600.0
@@ -50,10 +50,8 @@ def named_gas_uses(uses: Sequence[GasUse]) -> dict[str, GasUse]:
     for use in uses:
         if any(use is other or (isinstance(use, str | Path) and str(use) == str(other)) for other in named.values()):
             raise ParameterError("the same recording is given twice; give each recording only once")
-        if isinstance(use, Recording):
-            label = use.label
-        else:
-            label = use.scenario.name if isinstance(use, WalkResult) else str(use)
+        walked = use.scenario.name if isinstance(use, WalkResult) else str(use)
+        label = use.label if isinstance(use, Recording) else walked
         # Walks of one scenario with other overrides have one name.
         alike = sum(name == label or name.startswith(f"{label} (") for name in named)
         named[f"{label} ({alike + 1})" if alike else label] = use
@@ -133,11 +131,16 @@ def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -
 
 
 def endurance_of_walk_gas(
-    gas: WalkGas, bottle: str | Path | None, schedule: Schedule, overrides: Iterable[str] = ()
+    gas: WalkGas,
+    bottle: str | Path | None,
+    schedule: Schedule,
+    overrides: Iterable[str] = (),
+    progress: Callable[[float, float], None] = silent,
 ) -> Endurance:
     """Return the duration of a bottle for a walk that continues, from the gas demand of the walk.
 
-    Raises DataError if the walk took no gas or its scenario is unknown.
+    ``progress`` is called with the minutes walked and the longest number of minutes. Raises DataError if the walk took
+    no gas or its scenario is unknown.
     """
     at_set_pressure = demand_of_walk(gas)
     if gas.scenario is None:
@@ -169,7 +172,7 @@ def endurance_of_walk_gas(
     supply = walk_of(walking).bottle
     assert supply is not None, "a walk on a bottle"
     check_schedule(schedule)
-    life = bottle_life(walking, schedule)
+    life = bottle_life(walking, schedule, progress)
     # A bottle may end before the first stride does.
     strides = max(life.repeats, 1.0e-9)
     stride_time, mass = life.walked / strides, life.course.regulated / strides

@@ -15,7 +15,7 @@ from typing import Any
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.documents.models import read_model
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, refused_as
+from ppafo.errors import ParameterError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.gas import SPECIES
 from ppafo.model.source import (
@@ -156,11 +156,8 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     changes = override_set(read_overrides(overrides), forms=FILLS)
     for path, override in changes.items():
         if path not in PATHS:
-            of_file = (
-                "; choose the gas by the name or file of the bottle"
-                if "gas" in path.split(".")
-                else nearest_name(path, PATHS)
-            )
+            is_gas = "gas" in path.split(".")
+            of_file = "; choose the gas by the name or file of the bottle" if is_gas else nearest_name(path, PATHS)
             raise ParameterError(f"override '{override}': a bottle has no parameter '{path}'{of_file}")
         with refused_as(ParameterError, f"override '{override}'", UnitError):
             value, unit = split_quantity(override.text)
@@ -183,18 +180,20 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
     """Build a bottle from its values. Raises ParameterError for missing or impossible values."""
     with refused_as(ParameterError, f"{file}: gas = '{parsed.gas.value}'", ParameterError):
         fluid = load_fluid(parsed.gas.value)
-    values = {}
+    values: dict[str, float] = {}
+    wrong: list[PpafoError] = []
     for path, entry in entries.items():
-        assignment = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
-        values[path] = allowed_number(assignment, entry, PATHS[path])
+        with noted_in(wrong):
+            assignment = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
+            values[path] = allowed_number(assignment, entry, PATHS[path])
     missing = [path for path in REQUIRED if path not in entries]
     if missing:
         has_mass_alone = "bottle.volume" in missing and "bottle.gas_mass" in values
         filling = filling_text(fluid, values["bottle.gas_mass"]) if has_mass_alone else ""
         source = " --from co2-16g" if fluid.name == "CO2" else ""
-        raise ParameterError(
-            f"{file}: {said_missing(missing)}{filling}; 'ppafo new bottle NAME{source}' writes a file with all of them"
-        )
+        remedy = f"'ppafo new bottle NAME{source}' writes a file with all of them"
+        wrong.append(ParameterError(f"{file}: {said_missing(missing)}{filling}; {remedy}"))
+    raise_noted(wrong)
     bottle = Bottle(
         name=parsed.name,
         title=parsed.title,

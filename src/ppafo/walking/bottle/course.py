@@ -10,7 +10,7 @@ from ppafo.report.kind import duration_kind
 from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle.supply import BottleSupply
 
-EndKind = Literal["walk's end", "empty", "too cold", "frozen", "iced", "too little flow", "diverged"]
+EndKind = Literal["walk's end", "empty", "too cold", "frozen", "iced", "too little flow", "stopped", "diverged"]
 WALKED: EndKind = "walk's end"
 DIVERGED: EndKind = "diverged"
 

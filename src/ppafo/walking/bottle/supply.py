@@ -155,18 +155,16 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
     pressure, own_pressure = device.supply.pressure, other_pressure(path, bottle, device)
     wrong: list[PpafoError] = []
     if not is_of_bottle(device.gas.molar_mass, bottle):
-        species = bottle.fluid.name
-        wrong.append(
-            reading.refusal(
-                BOTTLE_NAME,
-                f"contains {species}, but the device uses {device.gas.species}: set gas.species={species}, or "
-                f"choose a bottle of {device.gas.species}",
-            )
+        species, fed = bottle.fluid.name, device.gas.species
+        problem = (
+            f"contains {species}, but the device uses {fed}: set gas.species={species}, or choose a bottle of {fed}"
         )
+        wrong.append(reading.refusal(BOTTLE_NAME, problem))
     if own_pressure is not None:
         room = device.supply.atmospheric_pressure
-        own_text, text = (shown_text(each, "Pa_a", atmosphere=room) for each in (own_pressure, pressure))
-        problem = f"{name} sets {_SET_PRESSURE} to {own_text}, but supply.pressure is {text}: make both equal"
+        own_text = shown_text(own_pressure, "Pa_a", atmosphere=room, unit=bottle.entries[_SET_PRESSURE].unit)
+        problem = f"{name} sets {_SET_PRESSURE} to {own_text}, but supply.pressure is"
+        problem += f" {shown_text(pressure, 'Pa_a', atmosphere=room)}: set supply.pressure={own_text}"
         wrong.append(ScenarioError(f"{reading.file}: {BOTTLE_NAME}: {problem}"))
     raise_noted(wrong)
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
@@ -235,7 +233,7 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
     for path in _OWN:
         if value_at(reading.document, path) is not None:
             raise reading.refusal(
-                path, (f"must be omitted for a walk with a bottle; set {BOTTLE}.regulator.droop or .area")
+                path, f"must be omitted for a walk with a bottle; set {BOTTLE}.regulator.droop or .area"
             )
     # Refuse a bottle of so little gas, or parts of so little heat capacity, that they follow within no time.
     flow = supply.offers_first().largest_flow

@@ -97,6 +97,14 @@ def test_the_nearest_name_is_that_of_a_bottle_or_of_a_part(name: str, near: str)
         load_bottle(name)
 
 
+def test_every_wrong_unit_of_a_file_is_named_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(TEXT.replace('"psi_g"', '"psi"').replace('"cm^3"', '"K"'), encoding="utf-8")
+    words = r"^2 things are wrong: .*bottle\.volume = 375 K: .*regulator\.set_pressure = 50 psi: 'psi' needs the kind"
+    with pytest.raises(ParameterError, match=words):
+        load_bottle(path)
+
+
 def test_a_missing_value_is_named(tmp_path: Path) -> None:
     start = TEXT.index("[regulator.droop]")
     end = TEXT.index("[regulator.pressure_margin]")

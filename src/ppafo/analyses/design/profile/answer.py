@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.profile.search import LIMITS, Limit, ceiling
+from ppafo.analyses.design.wearer.requirements import REACHED
 from ppafo.analyses.parts.sections import doubts_data, part_titles, parts_to_check
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.parameters.parts import Part, rated_pressure
@@ -147,10 +148,9 @@ class Sizing:
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
         """Quoted or assumed figures of parts on which the sizing rests, as pairs of part and figure name."""
-        parts = [sized.valve for sized in self.valves] + [
-            sized.bottle for sized in self.valves if sized.bottle is not None
-        ]
-        unique = {(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values()
+        bottles = [sized.bottle for sized in self.valves if sized.bottle is not None]
+        parts = *(sized.valve for sized in self.valves), *bottles, *self.problem.carried
+        unique = {(part.group, part.name): part for part in parts}.values()
         return tuple((part, name) for part in unique for name in part.doubtful)
 
     def json_document(self) -> dict[str, Any]:
@@ -355,33 +355,38 @@ def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
 
 def suggestion_sentence(sizing: Sizing) -> str:
     """Return a sentence with the suggestion and its reason, or the reason why there is none."""
-    choice = sizing.choice
-    if choice is None:
+    choice, recording, profile = sizing.choice, sizing.recording, sizing.problem.profile
+    if choice is None or recording is None:
         working = [sized for sized in sizing.valves if sized.works]
-        kept = "valves keep the error limit, but no bottle holds enough gas for the requested use"
+        kept = "valves keep the error limit, but no bottle lasts for the requested use"
         reasons = [kept if working else "no valve keeps the error limit at any of the pressures"]
-        reasons += [
-            f"{sized.valve.name}{cut}" for sized in working or sizing.valves if (cut := _cut_peak(sizing, sized))
-        ]
+        reasons += [f"{each.valve.name}{cut}" for each in working or sizing.valves if (cut := _cut_peak(sizing, each))]
         return f"no suggestion: {'; '.join(reasons)}"
     bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
+    short = [
+        f"{TORQUE.number(sign * reached)} of {TORQUE.text(sign * peak)}"
+        for sign in (1.0, -1.0)
+        if (peak := np.max(sign * profile.knot_values)) > _WHOLE_PEAK * profile.largest
+        and (reached := np.max(sign * recording["torque"])) < REACHED * peak
+    ]
+    reaches = f"; reaches {' and '.join(short)} in the simulated run" if short else ""
     return (
         f"suggested: {choice.valve.name} at {PRESSURE.text(choice.pressure)}{bottle}, the lightest that lasts "
-        f"and keeps the error limit{_cut_peak(sizing, choice)}, {_MASS.text(choice.mass or 0.0, '.0f')}; a lower "
-        f"pressure is prevented by {LIMITS[choice.limit]}"
+        f"and keeps the error limit{_cut_peak(sizing, choice)}, {_MASS.text(choice.mass or 0.0, '.0f')}{reaches}; a "
+        f"lower pressure is prevented by {LIMITS[choice.limit]}"
     )
 
 
 def _cut_peak(sizing: Sizing, sized: SizedValve) -> str:
     """Return the fraction of the peak torque that a valve's pressure cuts off, with a remedy; "" for a whole peak."""
     problem, largest = sizing.problem, sizing.problem.profile.largest
-    cut = 1.0 - ceiling(problem, sized.pressure) / largest
-    if cut <= _WHOLE_PEAK or np.isnan(sized.error):
+    most = ceiling(problem, sized.pressure)
+    if (cut := 1.0 - most / largest) <= _WHOLE_PEAK or np.isnan(sized.error):
         return ""
     whole, rated = problem.atmosphere + largest / problem.torque_constant, rated_pressure(sized.valve, *problem.carried)
     higher = " and a higher pressure.highest" * bool(whole >= problem.highest_pressure)
     needs = f"pressure.lowest = '{PRESSURE.text(whole)}'{higher}"
     if whole > rated:
         needs = f"{PRESSURE.text(whole)}, but its parts are rated for {PRESSURE.text(rated)}: name other parts"
-    at_most = f"at most {TORQUE.text((1.0 - cut) * largest)} of {TORQUE.text(largest)}; the whole peak needs {needs}"
+    at_most = f"at most {TORQUE.text(most)} of {TORQUE.text(largest)}; the whole peak statically needs {needs}"
     return f", with {100.0 * cut:.0f} % of the peak cut off ({at_most})"

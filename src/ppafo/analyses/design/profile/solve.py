@@ -86,17 +86,15 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     gas_in_all = float(in_all[chosen])
     bottle, is_cold, remarks = None, False, []
     if lowest is None:
-        rated = highest_pressure(problem, valve)
-        if rated < problem.highest_pressure:
+        if (rated := highest_pressure(problem, valve)) < problem.highest_pressure:
             remarks.append(f"not tried above {PRESSURE.text(rated)}, the rated pressure of its parts")
     else:
         bottle, is_cold = _lasting_bottle(problem, gas, gas_in_all, pressure)
-        failing = np.flatnonzero(~works[lowest:])
-        if failing.size:
+        if (failing := np.flatnonzero(~works[lowest:])).size:
             text = PRESSURE.text(float(tried["pressure"][lowest + failing[0]]))
             remarks.append(f"at {text} the error limit is exceeded again")
     if is_cold:
-        remarks.append("a lighter bottle has enough gas, but gets too cold before the end")
+        remarks.append(f"a{' lighter' * (bottle is not None)} bottle has enough gas, but gets too cold before the end")
     if lowest is not None and bottles[chosen] is None:
         largest = max(problem.bottles, key=lambda part: part.values["content"])
         duration = f"{largest.name} lasts for {100.0 * largest.values['content'] / gas_in_all:.0f} % of the use"
@@ -122,11 +120,9 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         slow = [f"the valve has {', '.join(lags)}"] if lags else []
         slow += [f"the controller decides every {period:.3g} ms (controller.rate)"] if period > _LONG_PERIOD else []
         slowed = f"; {' and '.join(slow)}" if slow else ""
-        found = (
-            "no gains were found with which the torque loop follows" if problem.gains else "the loop does not follow"
-        )
+        said = "no gains were found with which the torque loop follows" if problem.gains else "the loop does not follow"
         remarks.append(
-            f"{found}: RMS error {TORQUE.text(error)} at best, limit {TORQUE.text(problem.largest_error)}{slowed}"
+            f"{said}: RMS error {TORQUE.text(error)} at best, limit {TORQUE.text(problem.largest_error)}{slowed}"
         )
     return SizedValve(
         valve=valve,

@@ -69,9 +69,7 @@ def alternatives_to(
     weak.sort(key=lambda candidate: -candidate.pair.torque)
     low.sort(key=lambda candidate: -candidate.pair.toes)
     nearest = [] if able else [_as_walked(group[0], bottle, shelf, report) for group in (weak, low) if group]
-    alternatives = [
-        alternative for alternative in (_thriftiest(able, bottle, shelf, report), *nearest) if alternative is not None
-    ]
+    alternatives = list(filter(None, (_thriftiest(able, bottle, shelf, report), *nearest)))
     yield from alternatives
     if not able:
         stronger = (

@@ -29,6 +29,10 @@ from ppafo.wording import argument_text
 
 _HEAD = ("valve", "actuator", ("peak torque", TORQUE), ("lowest toes", CLEARANCE))
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
+_NONE = (
+    "No device in the catalogue meets these requirements. Alternatives (examples), on the largest bottle (a design "
+    "takes the lightest that lasts):"
+)
 _READING = (
     "Every pair of valve and actuator in the catalogue is simulated for a few strides at this pressure. Pairs with at "
     "least 95 % of the torque in the mean stride and the toes above the ground are simulated on bottles, lightest "
@@ -66,15 +70,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
             f"the lowest height of the toes in the healthy gait itself is {CLEARANCE.text(sizing.healthy_toes)}"
         )
     sections = (
-        (
-            finding.Section(
-                remarks=(
-                    "No device in the catalogue meets these requirements. Alternatives (examples):",
-                    *sizing.instead,
-                )
-            ),
-            table,
-        )
+        (finding.Section(remarks=(_NONE, *sizing.instead)), table)
         if device is None
         else (*_sections(requirements, device), table, part_titles(sizing.parts))
     )

@@ -7,6 +7,7 @@ from dataclasses import replace
 from ppafo.analyses.design.wearer.available_parts import AvailableParts
 from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
 from ppafo.errors import ScenarioError
+from ppafo.model.helping import STOPPED
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report
 from ppafo.walking.bottle.course import WALKED
@@ -16,6 +17,9 @@ from ppafo.walking.walk import walk
 
 _ALLOWANCE = 1.15
 """Allowance factor on the gas flow of a pair, relative to the gas that another pair drew from the same bottle."""
+
+_AT_THE_END = 3.0
+"""Time before the end of a walk [s] within which a stop of the device belongs to the end of its bottle."""
 
 
 def lightest_on_bottle(
@@ -43,7 +47,9 @@ def lightest_on_bottle(
 
 def walk_on_bottle(pair: WalkedDevice, bottle: str, seconds: float, report: Report) -> WalkResult | None:
     """Walk for a time [s] or until the bottle is exhausted; None if the bottle cannot supply the device."""
-    counted = Progress(f"walking on {bottle}", 0, round(seconds), noun="s of walking")
+    counted = Progress(
+        f"walking with {pair.valve.name} and {pair.actuator.name} on {bottle}", 0, round(seconds), noun="s of walking"
+    )
     report(counted)
     try:
         walking = load_walk(WALKS[pair.valve.kind], pair.overrides, bottle=bottle)
@@ -55,9 +61,12 @@ def walk_on_bottle(pair: WalkedDevice, bottle: str, seconds: float, report: Repo
 
 
 def walking_time(walked: WalkResult | None) -> float:
-    """Return the duration of a walk on a bottle [s], infinite if the bottle did not end it; 0 without a walk."""
+    """Return the time that a device walks on a bottle [s], infinite if it helps until the end; 0 without a walk."""
     if walked is None or walked.supply is None or not walked.status.is_completed:
         return 0.0
+    last = [event.time for event in walked.events[-1:] if event.level == STOPPED]
+    if last and last[0] < walked.recording.time[-1] - _AT_THE_END:
+        return last[0]
     return math.inf if walked.supply.ending.kind == WALKED else float(walked.recording.time[-1])
 
 

@@ -29,7 +29,7 @@ BODY_MASS_INDEX = 22.0
 TOES = 0.01
 """Default toe clearance [m], unless the healthy gait has less."""
 REACHED = 0.95
-"""Least ratio [-] of the peak torque of the mean stride to the required torque that counts as reached."""
+"""Least ratio [-] to the required peak torque that counts as reached: of the mean stride, of the run on a profile."""
 SHORTEST = 6.0
 """Shortest time [s] of a walk on a bottle that may be required."""
 _SHORTEST_WEARER = 1.0

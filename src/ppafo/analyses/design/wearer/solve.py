@@ -5,6 +5,7 @@ bottles, lightest first, until one lasts; this complete walk is the suggestion. 
 alternatives.
 """
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,7 +27,8 @@ from ppafo.analyses.design.wearer.requirements import (
     shown_clearance,
 )
 from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of_wearer
-from ppafo.analyses.endurance.solve import endurance_of_walk
+from ppafo.analyses.endurance.solve import WITHOUT_REST, endurance_of_walk_gas
+from ppafo.analyses.endurance.walk_gas import walk_gas
 from ppafo.parameters.bottles.bottle import bottle_part
 from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import DEFAULT, rated_pressure
@@ -67,12 +69,8 @@ def size_for_wearer(
     # What the healthy gait itself does not do is not asked of a device, unless somebody does.
     requirements = replace(requirements, usual_toes=shown_clearance(min(TOES, healthy)))
     # A part without a rated pressure in the catalogue is included.
-    pairs = [
-        (valve, actuator)
-        for valve in shelf.groups["valves"].values()
-        for actuator in shelf.groups["actuators"].values()
-        if rated_pressure(valve, actuator) >= requirements.pressure
-    ]
+    every_pair = itertools.product(shelf.groups["valves"].values(), shelf.groups["actuators"].values())
+    pairs = [pair for pair in every_pair if rated_pressure(*pair) >= requirements.pressure]
     tried: list[WalkedDevice] = []
     for number, (valve, actuator) in enumerate(pairs):
         report(Progress(f"walking with {valve.name}", number, len(pairs), noun="pairs"))
@@ -82,10 +80,9 @@ def size_for_wearer(
     own = tuple(shelf.groups["valves"].values()) if "valves" in shelf.own_groups else ()
     sized = WearerSizing(requirements, healthy, tuple(tried), None, (), gas, own)
     if lightest is not None:
-        return replace(sized, device=_device(*lightest, requirements, shelf))
-    instead = tuple(
-        alternative.text(requirements) for alternative in alternatives_to(requirements, tried, shelf, report)
-    )
+        return replace(sized, device=_device(*lightest, requirements, shelf, report))
+    alternatives = alternatives_to(requirements, tried, shelf, report)
+    instead = tuple(alternative.text(requirements) for alternative in alternatives)
     if not instead and not tried:
         instead = ("no pair of valve and actuator is rated for this pressure and assists; change the pressure",)
     elif not instead:
@@ -101,11 +98,18 @@ def size_for_wearer(
 
 
 def _device(
-    pair: WalkedDevice, bottle: Part, walked: WalkResult, requirements: DesignRequirements, shelf: AvailableParts
+    pair: WalkedDevice,
+    bottle: Part,
+    walked: WalkResult,
+    requirements: DesignRequirements,
+    shelf: AvailableParts,
+    report: Report,
 ) -> SizedDevice:
     """Assemble the device of a pair and a bottle, with regulators, shut-off valve, processor and battery."""
-    life = endurance_of_walk(walked)
-    assert life is not None, "a walk with torque has used gas of its bottle"
+    until = f"walking until {bottle.name} is exhausted"
+    life = endurance_of_walk_gas(
+        walk_gas(walked), None, WITHOUT_REST, progress=lambda done, _: report(Progress(f"{until}, {int(done)} min"))
+    )
     processor, cell = shelf.part("processors", _PROCESSOR), shelf.part("batteries", _CELL)
     electrical = electrical_of(
         walked.recording, pair.valve, SHUT_OFF_PARTS["power"], processor, cell, requirements.seconds

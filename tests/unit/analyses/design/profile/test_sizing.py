@@ -28,6 +28,7 @@ from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.ensemble import COMPLETED
 from ppafo.storage import write_csv
+from ppafo.units.shown import shown_in
 
 SHIPPED = Path(__file__).parents[5] / "src" / "ppafo" / "analyses" / "design" / "library" / "push-off.toml"
 ATMOSPHERE = 101325.0
@@ -465,8 +466,8 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
     most = TORQUE_CONSTANT * (sizing.choice.pressure - ATMOSPHERE)
     said = suggestion_sentence(sizing)
     assert (
-        f"% of the peak cut off (at most {most:.3g} N m of 5 N m; the whole peak needs pressure.lowest = '50 psi_g')"
-        in said
+        f"% of the peak cut off (at most {most:.3g} N m of 5 N m; "
+        "the whole peak statically needs pressure.lowest = '50 psi_g')" in said
     )
     # The remedy, in the file, gives the whole peak.
     file = tmp_path / "brief.toml"
@@ -496,8 +497,11 @@ def test_a_cut_peak_is_told_without_a_bottle_and_without_a_pressure_that_suffice
     assert (sized.works, sized.bottle) == (True, None)
     # Equation (2): 4 N m / 14.51 cm^3 = 275.7 kPa, 39.98 psi above the atmosphere.
     most = sizing.problem.torque_constant * (sized.pressure - ATMOSPHERE)
-    said = f"(at most {most:.3g} N m of 4 N m; the whole peak needs pressure.lowest = '40 psi_g'"
+    said = f"(at most {most:.3g} N m of 4 N m; the whole peak statically needs pressure.lowest = '40 psi_g'"
     assert f"% of the peak cut off {said})" in suggestion_sentence(sizing)
+    assert suggestion_sentence(sizing).startswith(
+        "no suggestion: valves keep the error limit, but no bottle lasts for the requested use; "
+    )
     (tmp_path / "weak.toml").write_text(f'{document.replace("1.2 N m", "0.1 N m")}[pressure]\nhighest = "20 psi_g"\n')
     weak = design(tmp_path / "weak.toml").found
     assert isinstance(weak, Sizing)
@@ -507,9 +511,78 @@ def test_a_cut_peak_is_told_without_a_bottle_and_without_a_pressure_that_suffice
     assert sized.pressure == pytest.approx(ATMOSPHERE + 20.0 * 6894.757)
     assert suggestion_sentence(weak) == (
         "no suggestion: no valve keeps the error limit at any of the pressures; festo-vovg-5v-pair, with "
-        "50 % of the peak cut off (at most 2 N m of 4 N m; the whole peak needs pressure.lowest = '40 psi_g' and a "
-        "higher pressure.highest)"
+        "50 % of the peak cut off (at most 2 N m of 4 N m; the whole peak statically needs "
+        "pressure.lowest = '40 psi_g' and a higher pressure.highest)"
     )
+
+
+def recorded_torques(sizing: Sizing) -> list[float]:
+    """Torques [N m] in the file suggested.csv of a finding."""
+    rows = finding_of(sizing).files["suggested.csv"]().decode().splitlines()
+    head, *samples = [row.split(",") for row in rows if not row.startswith("#")]
+    return [float(sample[head.index("torque [N m]")]) for sample in samples]
+
+
+BOTH_SIGNS = (
+    FILE.replace('"0.3 s", "0.6 s", "0.8 s"', '"0.25 s", "0.5 s", "0.75 s"')
+    .replace('"4 N m", "4 N m", "0 N m"', '"8 N m", "0 N m", "-8 N m"')
+    .replace('"0.4 N m"', '"0.8 N m"')
+)
+"""Torque between 8 N m and -8 N m, whose crests last too briefly for the valve."""
+
+
+def test_a_suggested_run_that_stays_below_a_peak_of_either_sign_says_so(tmp_path: Path, sizing: Sizing) -> None:
+    (tmp_path / "both.toml").write_text(BOTH_SIGNS)
+    both = design(tmp_path / "both.toml").found
+    assert isinstance(both, Sizing)
+    torques = recorded_torques(both)
+    assert 0.0 < max(torques) < 0.95 * 8.0
+    assert -0.95 * 8.0 < min(torques) < 0.0
+    reaches = f"; reaches {max(torques):.3g} of 8 N m and {min(torques):.3g} of -8 N m in the simulated run; "
+    assert reaches in suggestion_sentence(both)
+    assert reaches in str(finding_of(both))
+    # 1 in lbf = 4.44822 N x 0.0254 m.
+    with shown_in({"N m": "in lbf"}):
+        most, least = max(torques) / 0.112985, min(torques) / 0.112985
+        said = f"; reaches {most:.3g} of 70.8 in lbf and {least:.3g} of -70.8 in lbf in the simulated run; "
+        assert said in suggestion_sentence(both)
+    # Torques of one sign: the other has no peak.
+    said = f"; reaches {max(recorded_torques(sizing)):.3g} of 4 N m in the simulated run; "
+    assert said in suggestion_sentence(sizing)
+
+
+@pytest.mark.parametrize(
+    ("largest", "least", "said"),
+    [
+        (7.61, -7.61, ""),
+        (7.59, -7.61, "reaches 7.59 of 8 N m in the simulated run"),
+        (7.61, -7.59, "reaches -7.59 of -8 N m in the simulated run"),
+        (9.0, 0.5, "reaches 0.5 of -8 N m in the simulated run"),
+    ],
+)
+def test_a_peak_is_reached_from_95_percent_on(
+    tmp_path: Path, sizing: Sizing, largest: float, least: float, said: str
+) -> None:
+    (tmp_path / "both.toml").write_text(BOTH_SIGNS)
+    run = Recording("run", np.array([0.0, 1.0]), {"torque": Channel(np.array([largest, least]), "N m")}, "simulated")
+    changed = dataclasses.replace(sizing, problem=load_design(tmp_path / "both.toml"), recording=run)
+    parts = [part for part in suggestion_sentence(changed).split("; ") if "reaches" in part]
+    assert parts == ([said] if said else [])
+
+
+@pytest.mark.parametrize(("bottles", "colder"), [("", "a"), (', "co2-20oz"', "a lighter")])
+def test_a_bottle_that_gets_too_cold_is_lighter_only_than_a_chosen_one(
+    tmp_path: Path, bottles: str, colder: str
+) -> None:
+    document = BOTH_SIGNS.replace("repetitions = 100", "repetitions = 200").replace('"co2-3_5oz", ', "")
+    (tmp_path / "cold.toml").write_text(document.replace('-9oz"]', f'-9oz"{bottles}]'))
+    cold = design(tmp_path / "cold.toml").found
+    assert isinstance(cold, Sizing)
+    (sized,) = cold.valves
+    assert sized.gas_in_all < 0.255  # kg: its gas alone would do
+    assert (sized.bottle is None) == (not bottles)
+    assert sized.remark == f"{colder} bottle has enough gas, but gets too cold before the end"
+    assert ("no bottle lasts for the requested use" in suggestion_sentence(cold)) == (not bottles)
 
 
 def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
