@@ -12,12 +12,14 @@ from typing import Any
 from ppafo.arguments import Overrides, checked
 from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.loading import load_scenario
-from ppafo.page.content import Interval, PageSimulation, page_content, program_content, usual_values, words
+from ppafo.page.content import PageSimulation, page_content, program_content, usual_values
 from ppafo.page.html import block_of, packed_once, page_of
 from ppafo.page.motions import is_walk, tab_title, usual_changes
 from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
+from ppafo.page.setting import Interval
 from ppafo.page.still import still_of
 from ppafo.page.wasm import module_of
+from ppafo.page.words import words
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart

@@ -14,8 +14,8 @@ from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.loading import load_scenario
 from ppafo.page import html as pages
 from ppafo.page import workbench as workbench_module
-from ppafo.page.content import words
 from ppafo.page.opening import LEAST_CHANGE, MOST_FIRST, _key
+from ppafo.page.words import words
 from ppafo.page.workbench import DEFAULT, openings_of, workbench
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.parameters.joint import JointNames
