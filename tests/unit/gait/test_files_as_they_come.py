@@ -372,7 +372,7 @@ def test_all_faults_of_a_mean_stride_over_percent_are_in_one_refusal_and_their_r
     said = (
         "a low pass at 0.5 Hz",
         "first column must be 'time', not 'percent'; a mean stride over percent of the stride cannot be imported: "
-        "give 2 strides over time with vertical_force",
+        "give 3 strides over time with vertical_force",
         "does not state the body mass",
         "shank_angle: there is no column 'shank_angle' .* or add a file that has them",
     )

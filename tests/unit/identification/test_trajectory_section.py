@@ -117,6 +117,15 @@ def test_planted_values_are_found_from_a_scenario_and_from_a_recording_without_o
     assert both.trajectory.remarks == ()
 
 
+def test_a_remark_that_prevents_a_pass_is_the_last_line(both: Identification) -> None:
+    assert both.trajectory is not None
+    assert "exit code 1" not in text_of(finding_of(both))
+    fit = replace(both.trajectory.fit, remarks=("the search stopped",))
+    told = finding_of(replace(both, trajectory=replace(both.trajectory, fit=fit)))
+    assert not told.passed
+    assert text_of(told).splitlines()[-1] == "not passed (exit code 1): the search stopped"
+
+
 def test_tolerances_are_listed_with_what_they_widen_and_do_not_get_into_the_set(both: Identification) -> None:
     assert both.trajectory is not None
     assert {estimate.path for estimate in both.estimates} == {

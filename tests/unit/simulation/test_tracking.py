@@ -817,3 +817,21 @@ def test_a_swing_that_a_law_causes_itself_is_not_blamed_on_its_valves() -> None:
     )
     (narrower,) = verdict.mended
     assert simulate(TASK, [*law, narrower], plugins=[file]).tracking is None
+
+
+def test_an_angle_that_lags_behind_a_wave_does_not_oscillate_in_a_sweep_either() -> None:
+    base = load_scenario("cylinder-servo", ["reference.frequency=4 Hz", "run.duration=4 s"])
+    columns = {"reference.amplitude": np.radians([10.0, 30.0])}
+    alone = [
+        simulate(with_numbers(base, {"reference.amplitude": value})).tracking for value in np.radians([10.0, 30.0])
+    ]
+    assert [verdict and verdict.kind for verdict in alone] == [None, "does not follow"]
+    metered = excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns)
+    assert metered.follows.tolist() == [1.0, 0.0]
+    assert metered.oscillates.tolist() == [0.0, 0.0]
+    stiff = {"controller.angle_stiffness": np.array([10.0, 80.0])}
+    wave = load_scenario(
+        "cylinder-servo", ["reference.frequency=4 Hz", "run.duration=4 s", "reference.amplitude=20 deg"]
+    )
+    metered = excess(run_ensemble(wave, stiff, with_companions([], wave)).metrics, wave, stiff)
+    assert metered.oscillates.tolist() == [0.0, 1.0]

@@ -169,7 +169,10 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     if written:
         count = f"{count_of(len(written), 'value')} of the set identified: {', '.join(written)}"
     fitted_text = f"; for this model only: {', '.join(fitted)}" if fitted else ""
-    problem = (f"the new set is not a complete device yet: {new_set.problem}",) if new_set.problem else ()
+    problem = [f"the new set is not a complete device yet: {new_set.problem}"] if new_set.problem else []
+    # As they are remarks among others, these that prevent a pass are repeated at the end.
+    of_fit = () if identification.trajectory is None else identification.trajectory.fit.remarks
+    problem += [f"not passed (exit code 1): {remark}" for remark in of_fit]
     return Finding(
         name="identify",
         kicker="Identification",

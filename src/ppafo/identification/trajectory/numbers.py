@@ -92,8 +92,12 @@ def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
 
 def broken_rule(device: Device) -> str:
     """Return a sentence on a rule that the parameters of a device violate; empty for a valid device."""
-    if device.friction.dynamic_torque > device.friction.static_torque:
-        return "friction.dynamic_torque was fitted above friction.static_torque"
+    dynamic, static = device.friction.dynamic_torque, device.friction.static_torque
+    if dynamic > static:
+        return (
+            f"friction.dynamic_torque was fitted to {dynamic:.3g} N m, above friction.static_torque of "
+            f"{static:.3g} N m (fitted, or moved within its tolerance); let the section fit both"
+        )
     if device.actuator.angle_min >= device.actuator.angle_max:
         return "actuator.angle_min was fitted above actuator.angle_max"
     return ""

@@ -174,6 +174,10 @@ def settled_tasks(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
     peak = np.where(is_upwards, metrics["settled_top"] - initial, initial - metrics["settled_bottom"])
     rms, mean, error_reversals = (metrics[f"settled_{name}"] for name in ("error", "missing", "turns"))
     is_angle, hold = scenario.controlled == ANGLE, metrics["settled_share_of_hold"]
+    rests = (hold >= SHORTEST_HOLD) & (is_angle or (metrics["settled_angle_range"] <= MOVED_JOINT))
+    # The error of a loop that lags reverses whenever its reference does, a sine twice a period.
+    periods = _settled_periods(scenario)
+    error_reversals = error_reversals - np.where(rests | np.isinf(periods), 0.0, np.ceil(2.0 * periods))
     profile = PROFILES[scenario.reference.kind]
     numbers: dict[str, Any] = {
         "wanted_change": wanted,
@@ -185,11 +189,11 @@ def settled_tasks(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
         "error_reversals": np.where(error_reversals >= SUSTAINED, error_reversals, 0.0),
         "value_range": metrics["settled_highest"] - metrics["settled_lowest"],
         "peak": np.where(change >= wanted, peak, 0.0),
-        "rests": (hold >= SHORTEST_HOLD) & (is_angle or (metrics["settled_angle_range"] <= MOVED_JOINT)),
+        "rests": rests,
         "ends_on_ramp": (hold <= 0.0) & profile.is_monotone,
         "reference_range": np.maximum(change, highest - lowest) if is_angle else 0.0,
         "reference_deviation": metrics["settled_wave"],
-        "reference_periods": _settled_periods(scenario),
+        "reference_periods": periods,
         "is_reference_smooth": profile.is_smooth,
     }
     return SettledPart(samples=slice(None), **numbers)

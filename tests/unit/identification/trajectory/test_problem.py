@@ -175,7 +175,8 @@ def test_a_misspelt_path_is_answered_with_the_nearest_one(step: Scenario) -> Non
 def test_dynamic_friction_above_static_friction_is_named(step: Scenario) -> None:
     assert broken_rule(step.device) == ""
     above = with_numbers(step, {"friction.dynamic_torque": 0.5})
-    assert "friction.dynamic_torque" in broken_rule(above.device)
+    static = step.device.friction.static_torque
+    assert f"fitted to 0.5 N m, above friction.static_torque of {static:.3g} N m" in broken_rule(above.device)
 
 
 def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: FittedExperiment) -> None:

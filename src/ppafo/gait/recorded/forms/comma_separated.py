@@ -23,7 +23,7 @@ _TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
 _COUNTERS = ("", "index", "frame", "frame#", "framenumber", "frame number", "sample")
 """Column names of row counters, in lower case; the first is pandas' index."""
 
-_NO_TIME = "a mean stride over percent of the stride cannot be imported: give 2 strides over time with vertical_force"
+_NO_TIME = "a mean stride over percent of the stride cannot be imported: give 3 strides over time with vertical_force"
 _LONGEST_SHOWN = 40
 """Largest number of characters of a name in a message."""
 
