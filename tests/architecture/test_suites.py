@@ -13,9 +13,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from ppafo.engine import loading
-from ppafo.running import simulate
-from ppafo.simulation.loading import load_scenario
+from ppafo.engine.cache import kept
 from tests import costs
 from tests.repeatable import TOO_SLOW
 
@@ -122,13 +120,11 @@ def test_the_recorded_files_and_tests_are_there() -> None:
         assert [name for name in cost.long if f"def {name}(" not in text] == []
 
 
-@pytest.mark.usefixtures("fresh_cache")
-def test_a_model_that_is_compiled_counts_apart() -> None:
-    # A test before this one in the same process may have loaded the model.
-    loading._load_by.cache_clear()
+def test_models_are_compiled_by_a_function_whose_time_counts_apart() -> None:
     before = costs.BUILT.seconds
-    simulate(load_scenario("step-response", ["sensors.delay=3 ms"]))
+    costs.counted(lambda: sum(range(20_000_000)))()
     assert costs.BUILT.seconds > before + 0.05
+    assert kept.RequestedProgram.compile.__code__ is costs.counted(print).__code__
 
 
 def test_drawn_tests_draw_the_same_every_time_and_may_be_slow() -> None:

@@ -19,7 +19,7 @@ HEAVY = frozenset(
 )
 READING, DRAWING = {"numpy", "pydantic"}, {"matplotlib", "PIL"}
 WRITING = {"h5netcdf", "h5py", "jinja2"}
-MOST_BEFORE_THE_RUN, MOST = 173, 218
+MOST_BEFORE_THE_RUN, MOST = 175, 223
 """Modules of the package that a run of a scenario may load; what has no part in it stays out.
 
 The five phases of a step are among them, though a stored program needs none: their numbers are in its key."""

@@ -33,7 +33,7 @@ def test_a_walk_that_helps_says_with_which_numbers_and_against_which_walk() -> N
 def test_the_remedy_of_a_walk_that_does_not_lift_the_toes_lifts_them(name: str, verdict: str, cause: str) -> None:
     said = sentence(name)
     assert said.startswith(verdict)
-    assert f"; {cause}: with `" in said
+    assert f"; {cause}: for example with `" in said
     remedy = tuple(text.replace(" = ", "=", 1) for text in re.findall("`(.*?)`", said))
     again = sentence(name, *remedy, minutes=0.15)
     assert again.startswith("the device helps, against the same walk without it")
@@ -51,7 +51,9 @@ def test_toes_that_drag_below_the_reach_of_the_actuator_are_mended_at_the_contro
 ) -> None:
     said = sentence("proportional", *overrides)
     cause = rf"as the controller requests {asked} N m at the lowest toes, where the actuator gives 5 N m"
-    assert re.search(rf"; the ankle is not lifted enough, {cause}: with `controller\.{setting}`, toes", said), said
+    assert re.search(
+        rf"; the ankle is not lifted enough, {cause}: for example with `controller\.{setting}`, toes", said
+    ), said
 
 
 def test_a_remedy_that_no_walk_tried_is_said_to_be_untried(monkeypatch: pytest.MonkeyPatch) -> None:
