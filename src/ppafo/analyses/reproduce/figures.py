@@ -208,22 +208,11 @@ def torque_task_figure(
     simulated bench with both valves.
     """
     experiments = synthetic or (None, None)
-    runs = (
-        _TaskRun(
-            valve="solenoid",
-            style=SOLENOID,
-            recording=solenoid,
-            experiment=experiments[0],
-            gas_in_paper=gas_in_paper[0],
-        ),
-        _TaskRun(
-            valve="proportional",
-            style=PROPORTIONAL,
-            recording=proportional,
-            experiment=experiments[1],
-            gas_in_paper=gas_in_paper[1],
-        ),
-    )
+    valves = ("solenoid", SOLENOID, solenoid), ("proportional", PROPORTIONAL, proportional)
+    runs = [
+        _TaskRun(valve=valve, style=style, recording=recording, experiment=experiment, gas_in_paper=gas)
+        for (valve, style, recording), experiment, gas in zip(valves, experiments, gas_in_paper, strict=True)
+    ]
     torques = [_torque_marks(run, ceiling) for run in runs]
     opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)
     errors = [Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8})]

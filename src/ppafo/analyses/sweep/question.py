@@ -102,6 +102,9 @@ def _study_into_folder(
     """
     from ppafo.analyses.sweep.answer import write_sweep_report
     from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, sweep
+    from ppafo.study.blocks import chunk_count
+    from ppafo.study.folder import study_folder
+    from ppafo.study.store import note_file
 
     # A text stays a text: in a Path, a URL is no longer recognised as one.
     folder = out or Path("out") / study.name
@@ -109,7 +112,8 @@ def _study_into_folder(
         swept = sweep(study, threads=threads, out=folder, agreed=agreed, progress=progress)
         write_sweep_report(swept.found)
     except KeyboardInterrupt:
-        has_finished_chunk = any(Path(folder).glob("finished/chunk-*.json"))
+        names = study_folder(folder).names()
+        has_finished_chunk = any(note_file(number) in names for number in range(chunk_count(study)))
         raise KeyboardInterrupt(INTERRUPTED if has_finished_chunk else INTERRUPTED_AT_ONCE) from None
     return swept
 
