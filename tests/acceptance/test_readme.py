@@ -140,7 +140,7 @@ def test_a_torque_that_a_joint_cannot_give_is_said_as_printed_and_what_is_said_t
     said = capsys.readouterr().out
     (printed,) = re.findall(r"^> (the torque stays .*)$", README, re.MULTILINE)
     assert f"hold: completed\n{printed}\n" in said
-    (pasted,) = re.findall(r"; with (.*?) it follows", printed)
+    (pasted,) = re.findall(r"; for example, with (.*?) it follows", printed)
     mended = ["--set", "device.set=./elbow.toml", "--set", "reference.level=9 N m", *shlex.split(pasted)]
     assert main(["simulate", "hold.toml", *mended, "--check"]) == 0
     # How it follows its reference stands between how it ended and the numbers.
