@@ -143,7 +143,7 @@ def test_a_torque_that_a_joint_cannot_give_is_said_as_printed_and_what_is_said_t
     (pasted,) = re.findall(r"; for example, with (.*?) it follows", printed)
     mended = ["--set", "device.set=./elbow.toml", "--set", "reference.level=9 N m", *shlex.split(pasted)]
     assert main(["simulate", "hold.toml", *mended, "--check"]) == 0
-    # How it follows its reference stands between how it ended and the numbers.
+    # Whether it follows its reference stands between how it ended and the numbers.
     ended, verdict, changed, blank = capsys.readouterr().out.splitlines()[:4]
     assert (ended, blank) == ("hold: completed", "")
     assert changed.startswith("values changed: device.set=./elbow.toml, reference.level=9 N m, ")
