@@ -226,8 +226,7 @@ def reported_parts(
     """
     if opening.law != "both":
         return [size], Paths(size.path)
-    parts = [replace(size, size=alone.size), replace(gap, size=alone.beside)]
-    return parts, Paths(size.path, beside=gap.path)
+    return [replace(size, size=alone.size), replace(gap, size=alone.beside)], Paths(size.path, beside=gap.path)
 
 
 def solve_flow(

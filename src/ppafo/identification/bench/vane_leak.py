@@ -231,10 +231,8 @@ def _closed_leak(
     time, models = np.concatenate(times), np.split(model, np.cumsum([values.size for values in times])[:-1])
     # The legend names the first curve only.
     names = [opening.law, *[""] * (len(times) - 1)]
-    marks = [
-        readings_mark("measured", time, readings.measured),
-        *(curve_mark(*curve) for curve in zip(names, times, models, strict=True)),
-    ]
+    marks = [readings_mark("measured", time, readings.measured)]
+    marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
     is_room = all(decay.room is not None for decay in decays)
     room = (f"the pressure in chamber {3 - chamber} is constant, so it is treated as a reservoir",) if is_room else ()
     longest = max(float(decay.time[-1]) for decay in decays)

@@ -286,16 +286,17 @@ def run_with(prepared: _PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
             "parameter a start and a lower bound above 0"
         )
     planned, _ = scenario.motion.motion_kind.plan(scenario)
-    # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
+    # The tolerance is a fraction of the supply pressure: with a fitted pressure, the error in pascals must stay.
     plant = planned.plant
-
-    def range_of_supply(first: float, second: float, atmosphere: float) -> float:
-        return supply_range(
+    ranges = over_runs(
+        lambda first, second, atmosphere: supply_range(
             plant._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
-        )
-
-    pressures = plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure
-    allowed = supply_range(base.plant) / over_runs(range_of_supply, *pressures)
+        ),
+        plant.supply_pressure,
+        plant.dorsiflexion_pressure,
+        plant.atmospheric_pressure,
+    )
+    allowed = supply_range(base.plant) / ranges
     changed = {name: getattr(planned, name) for name in _NUMBERS_OF_RUN}
     return replace(base, tolerance=base.tolerance * allowed, **changed)
 
