@@ -194,7 +194,7 @@ def _is_at_bound(runs: FitRuns, point: Floats, gradient: Floats) -> Flags:
     """
     slope = gradient + np.square(runs.prior) * (point - runs.start)
     near = _AT_BOUND * np.maximum(1.0, np.abs(point))
-    return ((point - runs.low < near) & (slope > 0.0)) | ((runs.high - point < near) & (slope < 0.0))
+    return np.asarray(((point - runs.low < near) & (slope > 0.0)) | ((runs.high - point < near) & (slope < 0.0)))
 
 
 def _shares_of_variance(runs: FitRuns, covariance: Floats) -> dict[str, tuple[tuple[str, float], ...]]:
