@@ -46,9 +46,7 @@ class ChamberDecay(NamedTuple):
     def changes(self) -> tuple[float, float]:
         """Fall of the pressure in the fuller chamber, and rise in the other chamber [Pa]."""
         edge = self.edge
-        fall, rise = (
-            float(np.mean(pressure[-edge:]) - np.mean(pressure[:edge])) for pressure in (self.first, self.second)
-        )
+        fall, rise = (float(np.mean(each[-edge:]) - np.mean(each[:edge])) for each in (self.first, self.second))
         return -fall, rise
 
     @property
