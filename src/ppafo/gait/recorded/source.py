@@ -244,7 +244,7 @@ def _with_loads(
 ) -> tuple[dict[str, Signal], list[str]]:
     """Return the signals with loads of a known scale, and remarks on the force plates.
 
-    Without a force in the files, the force is that of the plates which this foot steps on. Loads of unknown body mass,
+    Without a force in the files, the plates that this foot steps on give the force. Loads of unknown body mass,
     and a force of a wrong scale, which is added to ``wrong``, get a largest value of 1: their events are still found.
     """
     remarks: list[str] = []

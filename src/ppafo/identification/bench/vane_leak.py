@@ -204,7 +204,7 @@ def _closed_leak(
     tolerances: Tolerances,
     confidence: float,
 ) -> BenchResult:
-    """Identify the leak from the pressures in closed chambers; ``volumes`` are those of chambers 1 and 2 [m^3]."""
+    """Identify the leak from the pressures in closed chambers; ``volumes`` are V of chambers 1 and 2 [m^3]."""
     # The chamber whose pressure determines the leak empties, or fills from a room.
     chamber = decays[0].fuller if decays[0].changing == 0 else 3 - decays[0].fuller
     volume, other_volume = volumes if chamber == 1 else volumes[::-1]
