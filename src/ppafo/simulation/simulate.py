@@ -174,9 +174,10 @@ class Result:
         """
         if not self.status.is_completed:
             raise SimulationError(f"{self.scenario.name}: the run diverged, so its error cannot be estimated")
-        from ppafo.simulation.check import estimated_error, finer
+        from ppafo.simulation.check import estimated_error, finer, with_tolerance
 
-        return estimated_error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
+        fine = results_of(self.scenario, [finer(plan_run(self.scenario))])[0]
+        return with_tolerance(self.scenario, estimated_error(self, fine))
 
     @_in_own_units
     def check(self) -> "Check":
