@@ -10,7 +10,7 @@ With r the ratio of downstream to upstream pressure and k the heat capacity rati
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.identification.bench.law import PooledReadings, Values, solve, sought, tolerance, within
+from ppafo.identification.bench.result import ReportedNumber
 from ppafo.identification.fit import Fit
 from ppafo.identification.residuals import FitVariable
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
@@ -33,6 +34,8 @@ LINEAR_RATIO = 0.99999
 
 The parameter ``flow.linear_ratio`` of a set belongs to the numerics of the engine, not to a measured opening.
 """
+PRODUCT_ONLY = 1.0
+"""Known factor of an orifice if neither Cd [-] nor the area [m^2] is known: the fitted size is the product Cd A."""
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358 [-] in an estimation: start, lowest and highest value."""
 NEXT_LAW: Mapping[Law, str] = {
@@ -162,7 +165,7 @@ class Opening:
 
     gas: GasAt
     law: Law
-    known: float = 1.0
+    known: float = PRODUCT_ONLY
     critical_ratio: float | None = None
 
     def flow(self, sizes: OpeningSizes, first: Floats, second: Floats) -> Floats:
@@ -211,6 +214,20 @@ class Paths(NamedTuple):
             *((sought(self.critical_ratio, *CRITICAL_RATIOS),) if self.critical_ratio else ()),
             *((sought(self.beside, start.beside, 0.0, scale=alone.beside),) if self.beside else ()),
         )
+
+
+def reported_parts(
+    opening: Opening, size: ReportedNumber, gap: ReportedNumber, alone: OpeningSizes
+) -> tuple[list[ReportedNumber], Paths]:
+    """Return the reported sizes of an opening, for the law ``both`` also of its gap, and their names in the fit.
+
+    The magnitudes of parallel parts are the sizes ``alone``, as if each part carried the whole flow: either part may be
+    zero, which is a valid result.
+    """
+    if opening.law != "both":
+        return [size], Paths(size.path)
+    parts = [replace(size, size=alone.size), replace(gap, size=alone.beside)]
+    return parts, Paths(size.path, beside=gap.path)
 
 
 def solve_flow(
