@@ -103,16 +103,15 @@ class ErrorEstimate:
         texts = [f"{without_exponent(value, '.1e')} {unit}" for value, unit in in_display_units]
         over_time = f"{', '.join(texts[:-1])} and {texts[-1]}"
         of_metrics = f"; at most {self.share:.1e} of a metric's value ({self.largest})" if self.largest else ""
-        beyond = ""
-        if self.over_promise > 1.0:
-            remedy = (
-                "; trials with smaller values of `run.tolerance` do not reach it: repeated impacts, or a loop that "
-                "oscillates, may amplify small differences, and the metrics then hold for one run among many"
-            )
-            if self.tolerance:
-                remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it"
-            beyond = f" That is {self.over_promise:.2g} times the promised accuracy of a run{remedy}."
-        return f"Estimated error of the time steps: at most {over_time} over time{of_metrics}.{beyond}"
+        within = f"Estimated error of the time steps: at most {over_time} over time{of_metrics}."
+        if self.over_promise <= 1.0:
+            return within
+        lasting = (
+            "; trials with smaller values of `run.tolerance` do not reach it: repeated impacts, or a loop that "
+            "oscillates, may amplify small differences, and the metrics then hold for one run among many"
+        )
+        remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it" if self.tolerance else lasting
+        return f"{within} That is {self.over_promise:.2g} times the promised accuracy of a run{remedy}."
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,10 +224,6 @@ class Check:
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document}
 
 
-Rerun = Callable[[Sequence[Run]], Sequence[RecordedResult]]
-"""Function that executes other planned runs of the same scenario."""
-
-
 def finer(run: Run) -> Run:
     """Return a run, or an ensemble, with a sixteenth of the allowed error and a quarter of the step size."""
     return replace(
@@ -286,10 +281,9 @@ def with_tolerance(scenario: Scenario, error: ErrorEstimate) -> ErrorEstimate:
     smallest = max(SMALLEST_TRIED * tolerance, SMALLEST_TOLERANCE)
     while over_promise > 1.0:
         # The error is proportional to the tolerance: half of the tolerance that just meets the promise is tried.
-        smaller = float(f"{max(0.5 * tolerance / over_promise, smallest):.1g}")
-        if smaller >= tolerance:
+        last, tolerance = tolerance, float(f"{max(0.5 * tolerance / over_promise, smallest):.1g}")
+        if tolerance >= last:
             return error
-        tolerance = smaller
         run = plan_run(replace(scenario, run=replace(scenario.run, tolerance=tolerance)))
         trial, fine = results_of(scenario, [run, finer(run)])
         over_promise = estimated_error(trial, fine).over_promise if trial.status.is_completed else math.inf
@@ -319,8 +313,8 @@ def _signal_range(result: RecordedResult, unit: str) -> float:
     return float(np.ptp(np.concatenate([*chambers, constant]))) or supply.atmospheric_pressure
 
 
-def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
-    """Return the repeatability check of a result, from its planned run.
+def checked(result: RecordedResult, run: Run, rerun: Callable[[Sequence[Run]], Sequence[RecordedResult]]) -> Check:
+    """Return the repeatability check of a result, from its planned run; ``rerun`` executes runs of the same scenario.
 
     Raises SimulationError for a Python controller that gives a different run each time, which makes a check impossible.
     """

@@ -36,6 +36,8 @@ _SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 FOLLOWS = "follows"
 """Text of the condition that the run follows its reference, by the verdict of ``simulate``."""
+REFUSED = "the value is refused:"
+"""Beginning of the verdict on a value that makes no run."""
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
@@ -234,8 +236,7 @@ def _verdicts(search: FindResult, base: Scenario) -> tuple[tuple[float, str], ..
     """Return the value found and its outer neighbour, or else the nearest value, with the verdict of a run of each."""
     index, neighbour = search.found
     values = [search.nearest if index is None else float(search.tried["value"][index])]
-    if neighbour is not None:
-        values.append(neighbour)
+    values += [] if neighbour is None else [neighbour]
     return tuple((value, _verdict(base, f"{search.path.path}={value!r} {SI}")) for value in values)
 
 
@@ -244,5 +245,5 @@ def _verdict(base: Scenario, override: str) -> str:
     try:
         result = simulate(with_overrides(base, [override]))
     except (ParameterError, ScenarioError) as error:
-        return f"the value is refused: {error}"
+        return f"{REFUSED} {error}"
     return result.following if result.tracking is None else result.tracking.found
