@@ -129,11 +129,11 @@ def _text(report: _RunReport) -> str:
 
     # The result's own text has a verdict whose remedies were not tried.
     head = [f"{report.result.scenario.name}: {report.result.status.kind}", *report.verdict, ""]
-    accuracy = [] if report.error is None else [report.error.sentence]
-    if report.check is not None:
-        accuracy = [repr(report.check)]
+    exact = (
+        repr(report.check) if report.check is not None else report.error.sentence if report.error is not None else ""
+    )
     # Gains that are in force are no news: they stand last.
-    last = [*accuracy, *report.gain_text, *(f"\nCommand with the remedy\n{text}" for text in report.usage)]
+    last = [*filter(None, [exact]), *report.gain_text, *(f"\nCommand with the remedy\n{text}" for text in report.usage)]
     return "\n".join([*head, *metrics_lines(report.result.metrics), *([""] if last else []), *last])
 
 
@@ -145,9 +145,11 @@ def _write(report: _RunReport, folder: Path) -> str:
 
     load_drawing()
     from ppafo.report.finding import REPORT, page_files
+    from ppafo.storage import write_result
 
     checks = {} if report.check is None else {CHECK_FILE: f"{json_text(report.check.document())}\n".encode()}
-    report.result.save(folder, {**page_files(finding_of(report)), **checks})
+    document = {**report.result.to_dict(), "verdict": report.verdict}
+    write_result(folder, report.result.recording, document, {**page_files(finding_of(report)), **checks})
     written = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", REPORT, *checks]
     scenario = report.result.scenario
     next_command = scenario.motion.motion_kind.further_command(str(scenario.origin.file))

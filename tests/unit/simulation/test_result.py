@@ -11,6 +11,7 @@ import pytest
 
 import ppafo
 from ppafo import read_result
+from ppafo.cli.main import main
 from ppafo.documents.json_text import plain
 from ppafo.errors import DataError
 from ppafo.metrics import Metric
@@ -39,10 +40,31 @@ def test_a_result_is_shown_with_its_status_and_a_line_for_every_metric(result: R
     assert repr(diverged).startswith("Result of 'step-response', 0.5 s: diverged at t = 0.05 s\n")
 
 
-def test_a_stored_result_is_shown_without_its_numbers(result: Result, tmp_path: Path) -> None:
-    shown = repr(read_result(result.save(tmp_path / "task")))
-    assert shown.startswith(f"StoredResult in {tmp_path / 'task'}: ")
-    assert len(shown.splitlines()) == 3
+def test_a_stored_result_is_shown_as_its_run_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = ppafo.simulate("cylinder-servo", ["run.duration=0.5 s"])
+    lines = str(run).splitlines()
+    assert lines[1].startswith("the angle follows its reference") or "no verdict" in lines[1]
+    shown = repr(ppafo.read_result(run.save(tmp_path / "run"))).splitlines()
+    assert shown[0] == f"StoredResult in {tmp_path / 'run'}: completed"
+    assert shown[1 : len(lines)] == lines[1:]
+    # The command stores the verdict that it prints, whose remedies were tried.
+    words = ["simulate", "torque-task-proportional", "--set", "controller.proportional_gain=5 1/(N m)", "--out"]
+    main([*words, str(tmp_path / "told")])
+    printed = capsys.readouterr().out.splitlines()
+    assert "; not tried: " not in printed[1]
+    assert repr(ppafo.read_result(tmp_path / "told")).splitlines()[1] == printed[1]
+
+
+def test_a_result_of_an_earlier_version_has_no_verdict_and_a_damaged_verdict_is_refused(tmp_path: Path) -> None:
+    folder = ppafo.simulate("step-response", ["run.duration=0.05 s"]).save(tmp_path / "run")
+    document = json.loads((folder / "run.json").read_text())
+    said = document.pop("verdict")
+    assert said == ["values changed: run.duration=0.05 s"]
+    (folder / "run.json").write_text(json.dumps(document))
+    assert repr(ppafo.read_result(folder)).splitlines()[:2] == [f"StoredResult in {folder}: completed", ""]
+    (folder / "run.json").write_text(json.dumps({**document, "verdict": 3}))
+    with pytest.raises(DataError, match=r"run\.json: verdict = 3 must be a list of texts"):
+        ppafo.read_result(folder)
 
 
 def test_a_stored_result_is_the_dataset_of_its_run(tmp_path: Path) -> None:
