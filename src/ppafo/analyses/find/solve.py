@@ -235,8 +235,8 @@ def outermost(
 def _verdicts(search: FindResult, base: Scenario) -> tuple[tuple[float, str], ...]:
     """Return the value found and its outer neighbour, or else the nearest value, with the verdict of a run of each."""
     index, neighbour = search.found
-    values = [search.nearest if index is None else float(search.tried["value"][index])]
-    values += [] if neighbour is None else [neighbour]
+    first = search.nearest if index is None else float(search.tried["value"][index])
+    values = [first] if neighbour is None else [first, neighbour]
     return tuple((value, _verdict(base, f"{search.path.path}={value!r} {SI}")) for value in values)
 
 
