@@ -161,8 +161,7 @@ class Result:
         from ppafo.report.style import drawn_at
 
         remark = "" if self.status.is_completed else self.status.message
-        valve = self.scenario.device.valve.kind
-        joint = self.scenario.device.joint
+        valve, joint = self.scenario.device.valve.kind, self.scenario.device.joint
         with drawn_at(width):
             return shown(recording_figure(self.recording, self.scenario.name, remark, valve, joint))
 

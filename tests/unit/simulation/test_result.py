@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import pickle
 import re
 from pathlib import Path
 
@@ -74,12 +75,25 @@ def test_a_stored_result_is_the_dataset_of_its_run(tmp_path: Path) -> None:
     in_psi = stored.dataset(units={"pressure_1": "psi_g"})["pressure_1"]
     # Chamber 1 starts at the atmosphere; 1 psi is 6894.757 Pa.
     assert in_psi.attrs["units"] == "psi_g"
+    assert in_psi.attrs["long_name"] == "gauge pressure in chamber 1, whose volume grows with the angle"
+    in_bar = stored.dataset(units={"pressure_2": "bar_a", "angle": "deg"})
+    assert in_bar["pressure_2"].attrs["long_name"] == stored.dataset()["pressure_2"].attrs["long_name"]
+    assert in_bar["pressure_2"].attrs["long_name"] == "absolute pressure in chamber 2"
     assert float(in_psi[0]) == pytest.approx(0.0, abs=1e-9)
     absolute = float(stored["pressure_1"][-1])
     assert float(in_psi[-1]) == pytest.approx((absolute - 101325.0) / 6894.757293, rel=1e-8)
     for result in (run, stored):
         with pytest.raises(ppafo.PpafoError, match="units='psi_g': must be units by channel"):
             result.dataset(units="psi_g")  # type: ignore[arg-type]
+
+
+def test_a_figure_that_the_user_saves_has_no_type_3_font(tmp_path: Path) -> None:
+    figure = ppafo.simulate("step-response", ["run.duration=0.05 s"]).plot()
+    for number, drawn in enumerate((figure, pickle.loads(pickle.dumps(figure)))):
+        drawn.savefig(tmp_path / f"{number}.pdf", metadata={"CreationDate": None})
+        content = (tmp_path / f"{number}.pdf").read_bytes()
+        assert b"/Subtype /Type0" in content
+        assert b"/Subtype /Type3" not in content
 
 
 def test_the_document_holds_every_number_of_the_device_in_si(result: Result) -> None:
