@@ -10,7 +10,7 @@ With r the ratio of downstream to upstream pressure and k the heat capacity rati
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.identification.bench.law import PooledReadings, Values, solve, sought, tolerance, within
+from ppafo.identification.bench.result import ReportedNumber
 from ppafo.identification.fit import Fit
 from ppafo.identification.residuals import FitVariable
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
@@ -33,6 +34,8 @@ LINEAR_RATIO = 0.99999
 
 The parameter ``flow.linear_ratio`` of a set belongs to the numerics of the engine, not to a measured opening.
 """
+PRODUCT_ONLY = 1.0
+"""Known factor of an orifice if neither Cd [-] nor the area [m^2] is known: the fitted size is the product Cd A."""
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358 [-] in an estimation: start, lowest and highest value."""
 NEXT_LAW: Mapping[Law, str] = {
@@ -162,7 +165,7 @@ class Opening:
 
     gas: GasAt
     law: Law
-    known: float = 1.0
+    known: float = PRODUCT_ONLY
     critical_ratio: float | None = None
 
     def flow(self, sizes: OpeningSizes, first: Floats, second: Floats) -> Floats:
@@ -213,6 +216,19 @@ class Paths(NamedTuple):
         )
 
 
+def reported_parts(
+    opening: Opening, size: ReportedNumber, gap: ReportedNumber, alone: OpeningSizes
+) -> tuple[list[ReportedNumber], Paths]:
+    """Return the reported sizes of an opening, for the law ``both`` also of its gap, and their names in the fit.
+
+    The magnitudes of parallel parts are the sizes ``alone``, as if each part carried the whole flow: either part may be
+    zero, which is a valid result.
+    """
+    if opening.law != "both":
+        return [size], Paths(size.path)
+    return [replace(size, size=alone.size), replace(gap, size=alone.beside)], Paths(size.path, beside=gap.path)
+
+
 def solve_flow(
     opening: Opening,
     paths: Paths,
@@ -225,9 +241,8 @@ def solve_flow(
 
     ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second.
     """
-    names, flow = (*pressures,), readings.measured
-    largest = float(np.abs(flow).max())
-    shown_first, shown_second = pressures.values()
+    (first_name, shown_first), (second_name, shown_second) = pressures.items()
+    flow = readings.measured
 
     def law(at: Values) -> Floats:
         first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
@@ -238,7 +253,7 @@ def solve_flow(
     start, alone = opening.rough_sizes(shown_first, shown_second, flow)
     numbers = (
         *paths.sought(start, alone),
-        *flow_tolerances(opening.gas, tolerances, (names[0], names[1]), largest),
+        *flow_tolerances(opening.gas, tolerances, (first_name, second_name), float(np.abs(flow).max())),
         # A gain that differs between small and large flows bends the curve of one opening as a gap beside it does.
         *(within(APPARENT, tolerances.gain_of("mass_flow") * alone.beside) if opening.law == "both" else ()),
     )

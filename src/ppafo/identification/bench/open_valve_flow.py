@@ -14,7 +14,16 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.checks import check_moves, check_not_clipped, check_sources
-from ppafo.identification.bench.flow import NEXT_LAW, GasAt, Law, Opening, Paths, orifice_shape, solve_flow
+from ppafo.identification.bench.flow import (
+    NEXT_LAW,
+    PRODUCT_ONLY,
+    GasAt,
+    Law,
+    Opening,
+    orifice_shape,
+    reported_parts,
+    solve_flow,
+)
 from ppafo.identification.bench.law import PooledReadings, recordings_of
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, meter_readings
@@ -84,12 +93,16 @@ def open_valve_flow(
             f"ratios must cover a range of at least {_SPAN:g} and reach {_SUBSONIC:g}, but lie between "
             f"{ratio.min():.3g} and {ratio.max():.3g}; measure at more pressures, or check the units of the pressures"
         )
-    # Beside a laminar gap the critical ratio decides whether the opening is an orifice.
-    opening = Opening(gas, law, area or 1.0, critical_ratio if law == "both" else None)
-    reported, paths = _reported(opening, area, path, readings)
-    choked = critical_pressure_ratio(gas.heat_capacity_ratio)
-    # The noise of the pressures shows the more in the flow the nearer they are to each other.
-    regimes = [_REGIMES[regime] for regime in np.digitize(ratio, (choked, _NEARLY_EQUAL)).tolist()]
+    # In parallel with a laminar gap, b selects ISO 6358; the law ``iso6358`` estimates b.
+    opening = Opening(gas, law, area or PRODUCT_ONLY, critical_ratio if law == "both" else None)
+    _, alone = opening.rough_sizes(upstream, readings.downstream, flow)
+    reported, paths = reported_parts(opening, _size(opening, area, path), _GAP, alone)
+    if law == "iso6358":
+        reported.append(ReportedNumber(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358"))
+        paths = paths._replace(critical_ratio=reported[-1].path)
+    # The nearer the pressures are to each other, the more their noise affects the computed flow.
+    limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
+    regimes = [_REGIMES[regime] for regime in np.digitize(ratio, limits).tolist()]
     fitted, model = solve_flow(
         opening,
         paths,
@@ -98,9 +111,9 @@ def open_valve_flow(
         tolerances,
         confidence,
     )
+    scatter = float(np.std(flow - model) / flow.max())
     measured_ordinate, fitted_ordinate = (_GRAMS_PER_BAR * values / upstream for values in (flow, model))
     marks = readings_mark("measured", ratio, measured_ordinate), curve_mark(law, ratio, fitted_ordinate)
-    scatter = float(np.std(flow - model) / flow.max())
     axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")
     result = result_of(
         PROCEDURE,
@@ -114,14 +127,19 @@ def open_valve_flow(
         readings.remarks,
         scatter,
     )
-    # The size is the first of the estimates; without a unit it is a discharge coefficient.
+    return _with_doubt(result, area)
+
+
+def _with_doubt(result: BenchResult, area: float | None) -> BenchResult:
+    """Return the result, with a remark if its discharge coefficient is impossible; ``area`` is the set's [m^2]."""
     coefficient, *others = result.estimates
+    # Other sizes than a discharge coefficient have a unit.
     if area is None or coefficient.unit or coefficient.low <= _LARGEST_COEFFICIENT:
         return result
     doubt = (
-        f"Cd = {coefficient.value:.3g} is impossible, above 1: mass_flow or a pressure has "
-        f"a wrong unit (a flow per minute is 60 times a flow per second), or the valve is larger than the set's "
-        f"{area * 1e6:.4g} mm^2; Cd A is {coefficient.value * area * 1e6:.4g} mm^2"
+        f"Cd = {coefficient.value:.3g} is impossible, above 1: mass_flow or a pressure has a wrong unit (a flow per "
+        f"minute is 60 times a flow per second), or the valve is larger than the set's {area * 1e6:.4g} mm^2; Cd A is "
+        f"{coefficient.value * area * 1e6:.4g} mm^2"
     )
     doubted = replace(coefficient, verdict="holds for this model only")
     return replace(result, estimates=(doubted, *others), remarks=(doubt, *result.remarks))
@@ -145,12 +163,12 @@ def _open_readings(sources: tuple[RecordingSource, ...], gas: GasAt, tolerances:
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS[:2])
     for source in sources:
         upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
-        # A meter that is saturated stays where these pressures would have the flow change.
+        # A saturated meter shows a constant flow although the pressures change the flow.
         driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
         check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
     recordings = [source.recording for source in sources]
+    # In a recording without commands, the valve is taken to be open.
     commands = [item["command"] if "command" in item else np.ones(len(item)) for item in recordings]
-    # A recording without commands is taken for one of an open valve.
     is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
     if is_open.sum() < MINIMUM_SAMPLES:
         raise IdentificationError(
@@ -158,15 +176,14 @@ def _open_readings(sources: tuple[RecordingSource, ...], gas: GasAt, tolerances:
             f"open (command 1 or -1), not {int(is_open.sum())}"
         )
     upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
-    # A log that begins before the air is on says nothing there, and no column of it is wrong.
-    limit = tolerances.zero_of_flow * float(np.abs(flow[is_open]).max())
-    rests = is_open & (downstream >= upstream) & (np.abs(flow) <= limit)
-    remarks: tuple[str, ...] = ()
-    if rests.sum() > is_open.sum() // _FEW and (is_open & ~rests).sum() >= MINIMUM_SAMPLES:
-        remarks = (f"left out: {rests.sum()} of {is_open.sum()} readings without flow and pressure difference",)
-        is_open = is_open & ~rests
-    crossed = np.count_nonzero((downstream >= upstream)[is_open])
-    # A few readings may cross by noise where both pressures are nearly equal.
+    is_crossed, zero, remarks = downstream >= upstream, tolerances.zero_of_flow, tuple[str, ...]()
+    # A log may begin before the gas supply is on: no flow without pressure difference is then no error of a column.
+    is_at_rest = is_open & is_crossed & (np.abs(flow) <= zero * float(np.abs(flow[is_open]).max()))
+    if is_at_rest.sum() > is_open.sum() // _FEW and (is_open & ~is_at_rest).sum() >= MINIMUM_SAMPLES:
+        remarks = (f"left out: {is_at_rest.sum()} of {is_open.sum()} readings without flow and pressure difference",)
+        is_open = is_open & ~is_at_rest
+    crossed = np.count_nonzero(is_crossed[is_open])
+    # Noise may exchange a few pressures that are nearly equal.
     if crossed > is_open.sum() // _FEW:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: downstream_pressure is at or above upstream_pressure in {crossed} of "
@@ -175,31 +192,14 @@ def _open_readings(sources: tuple[RecordingSource, ...], gas: GasAt, tolerances:
     if np.ptp(flow[is_open]) <= 0.0:
         check_moves(sources[0], PROCEDURE, "mass_flow")
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", (upstream, downstream), is_open)
-    zero = tolerances.zero_of_flow
     _, used, meter_remarks = meter_readings(sources, PROCEDURE, upstream - downstream, zero, is_open)
-    labels = np.array(recordings_of(sources))[used].tolist()
     return _OpenReadings(
         upstream=upstream[used],
         downstream=downstream[used],
         flow=np.abs(flow[used]),
-        labels=labels,
+        labels=np.array(recordings_of(sources))[used].tolist(),
         remarks=(*remarks, *meter_remarks),
     )
-
-
-def _reported(
-    opening: Opening, area: float | None, path: str, readings: _OpenReadings
-) -> tuple[list[ReportedNumber], Paths]:
-    """Return the quantities to report, starting with the size of the opening, and their names in the fit."""
-    size = _size(opening, area, path)
-    if opening.law == "iso6358":
-        ratio = ReportedNumber(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358")
-        return [size, ratio], Paths(size.path, critical_ratio=ratio.path)
-    if opening.law == "both":
-        _, alone = opening.rough_sizes(readings.upstream, readings.downstream, readings.flow)
-        # Either part may be zero, which is an answer.
-        return [replace(size, size=alone.size), replace(_GAP, size=alone.beside)], Paths(size.path, beside=_GAP.path)
-    return [size], Paths(size.path)
 
 
 def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:

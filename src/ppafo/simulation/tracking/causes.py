@@ -242,13 +242,18 @@ def _static_friction(case: Case) -> TrackingCause | None:
     return TrackingCause(text, (*remedies, *stiffer_laws(scenario, holding, settled)), advice)
 
 
-def _fully_open_valve(case: Case) -> TrackingCause | None:
-    """Cause: the valve is fully open for most of the settled part, and too small."""
+def small_valve(
+    case: Case, least_share: float, demand: str, factors: tuple[float, ...], advice: str
+) -> TrackingCause | None:
+    """Cause: the valve is fully open for more than a share [-] of the settled part, and too small for the demand.
+
+    ``factors`` [-] enlarge the valve in trials.
+    """
     share = float(np.mean(case.is_fully_open))
-    if share <= _MOSTLY:
+    if share <= least_share:
         return None
-    text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for this task"
-    return TrackingCause(text, sized_valves(case.scenario, _LARGER_VALVES), "use a larger valve or a slower reference")
+    text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for {demand}"
+    return TrackingCause(text, sized_valves(case.scenario, factors), advice)
 
 
 def _opened_away(case: Case) -> TrackingCause | None:
@@ -364,7 +369,7 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _shut_valve,
     _opened_away,
     oscillation,
-    _fully_open_valve,
+    lambda case: small_valve(case, _MOSTLY, "this task", _LARGER_VALVES, "use a larger valve or a slower reference"),
     gains_of_another_device,
     _lag,
     _poor_sensors,

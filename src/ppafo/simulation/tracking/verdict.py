@@ -129,9 +129,8 @@ class Tracking:
         if self.worst:
             worst, limit = (change_text(self.controlled, each) for each in (self.worst, self.allowed))
             number = "swing" if self.at_rest else "largest error"
-            return (
-                f"the {words} does not follow its reference: {number} {worst} ({limit} allowed){time_text(self.since)}"
-            )
+            allowed = f"({limit} allowed){time_text(self.since)}"
+            return f"the {words} does not follow its reference: {number} {worst} {allowed}"
         if self.rests and self.at_rest:
             missing = change_text(self.controlled, abs(self.missing))
             side = "below" if self.missing < 0.0 else "above"
@@ -296,7 +295,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     # An error at the cut peaks of a wave reverses more often than the wave, and is no oscillation.
     if failure == "oscillates" and turning <= 1.0 and is_task and cuts_wave(case):
         return case._replace(failure="does not follow"), turning, reversals / recording.duration, stride_time
-    # What lies beyond reach may not have been asked for yet on the ramp.
+    # A run that ends on its ramp has not yet requested its largest torque.
     beyond = float(np.max(shortfall(scenario))) if is_task and not settled.ends_on_ramp else 0.0
     # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error. The
     # mean error of a wave does not show its peaks.

@@ -9,12 +9,14 @@ from ppafo.metrics.switching import SHUT
 from ppafo.parameters.reach import supply_for
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
-from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation
+from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation, small_valve
 from ppafo.simulation.tracking.load_causes import ONE_WAY, reach_at_samples
 from ppafo.simulation.tracking.remedies import dead_band, larger_gains, level_text, remedy, sized_valves
 
 _OFTEN = 0.1
 """Fraction of the samples with a request that counts as often [-]."""
+_LARGER_VALVES = (2.0, 4.0, 8.0)
+"""Factors by which a valve is enlarged in a trial [-]."""
 _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
 """Settings of a walking controller that request a torque in dorsiflexion."""
 
@@ -64,18 +66,6 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     return TrackingCause(text, tuple(remedies), advice, is_beyond_reach=True)
 
 
-def _valve_of_walk(case: Case) -> TrackingCause | None:
-    """Cause: the valve of a walk is often fully open, too small for the speed of the joint."""
-    fully_open = float(np.mean(case.is_fully_open))
-    if case.oscillates or case.only_switches or fully_open <= _OFTEN:
-        return None
-    text = (
-        f"the valve is fully open for {100.0 * fully_open:.0f} % of the time: it is too small for the joint speed of "
-        "this gait"
-    )
-    return TrackingCause(text, sized_valves(case.scenario, (2.0, 4.0, 8.0)), "use a larger valve")
-
-
 def _speed_of_gait(case: Case) -> TrackingCause:
     """Cause: the gait moves the joint faster than the torque loop follows."""
     scenario = case.scenario
@@ -113,7 +103,12 @@ CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
         oscillation(case) if case.oscillates or (case.failure == "overshoots" and case.only_switches) else None
     ),
     _dead_band_of_walk,
-    _valve_of_walk,
+    # An oscillating loop, and on/off valves, are fully open for other reasons.
+    lambda case: (
+        None
+        if case.oscillates or case.only_switches
+        else small_valve(case, _OFTEN, "the joint speed of this gait", _LARGER_VALVES, "use a larger valve")
+    ),
     gains_of_another_device,
     _speed_of_gait,
 )
