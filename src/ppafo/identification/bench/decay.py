@@ -91,13 +91,12 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
         )
     rows = slice(first, last)
     angle = part[ANGLE][rows]
-    before = skipped + first
     for plateau in plateaus(angle):
         if is_at_limit(angle, plateau):
             raise IdentificationError(
                 f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
-                f"{plateau.count} samples, from sample {before + plateau.first + 1}, although the vane still moved "
-                "before: the sensor is saturated or the vane is at a stop; give an end before this sample"
+                f"{plateau.count} samples, from sample {skipped + first + plateau.first + 1}, although the vane still "
+                "moved before: the sensor is saturated or the vane is at a stop; give an end before this sample"
             )
     time, velocity = part.time[rows], None
     if VELOCITY in part:
