@@ -12,7 +12,9 @@ from ppafo.metrics import METRICS
 from ppafo.progress import Report
 from ppafo.running import simulate
 from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.remarks import standing_still
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
@@ -109,7 +111,8 @@ TRIED = np.dtype(
 class FindResult:
     """Search result: tried values, ascending, as a structured array of ``TRIED``, and the counted ``runs``.
 
-    ``verdicts`` are values [SI] with the verdict of a run of their own, for the condition that the run follows.
+    ``gains`` is a remark on gains that follow the varied number. ``verdicts`` are values [SI] with the verdict of a run
+    of their own, for the condition that the run follows.
     """
 
     scenario: str
@@ -119,6 +122,7 @@ class FindResult:
     noise_streams: int
     runs: Runs
     tried: NDArray[np.void]
+    gains: str = ""
     verdicts: tuple[tuple[float, str], ...] = ()
 
     @property
@@ -206,7 +210,16 @@ def outermost(
     seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
     counter = RunCounter(grid * max(1, seeds.size), progress)
     runs = scenario_runs(base, with_companions([condition.metric], base), counter, (), threads)
-    search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED))
+    search = FindResult(
+        base.name,
+        path,
+        condition,
+        highest,
+        seeds.size,
+        runs,
+        np.empty(0, TRIED),
+        remark_on_following_gains(base, [path.path]),
+    )
     search = search.with_values(base, np.linspace(low, high, grid), seeds, True)
     if not np.isfinite(search.tried["judged"]).any():
         ends = f"from {path.quote(low)} to {path.quote(high)}"
@@ -226,23 +239,18 @@ def outermost(
         search = search.with_values(base, np.linspace(value, neighbour, _PARTS + 1)[1:-1], seeds, False)
         index, neighbour = search.found
     # With noise a single run does not represent the mean over the noise streams.
-    is_single_run = condition.text == FOLLOWS and not seeds.size
-    return replace(search, verdicts=_verdicts(search, base)) if is_single_run else search
-
-
-def _verdicts(search: FindResult, base: Scenario) -> tuple[tuple[float, str], ...]:
-    """Return the value found and its outer neighbour, or else the nearest value, with the verdict of a run of each."""
-    index, neighbour = search.found
+    if condition.text != FOLLOWS or seeds.size:
+        return search
     values = [search.nearest if index is None else float(search.tried["value"][index])]
-    if neighbour is not None:
-        values.append(neighbour)
-    return tuple((value, _verdict(base, f"{search.path.path}={value!r} {SI}")) for value in values)
+    values += [] if neighbour is None else [neighbour]
+    return replace(search, verdicts=tuple((each, _verdict(base, f"{path.path}={each!r} {SI}")) for each in values))
 
 
 def _verdict(base: Scenario, override: str) -> str:
-    """Return the verdict on a run with an override, or the refusal of its value."""
+    """Return the verdict on a run with an override, with a remark if it stands still, or the refusal of its value."""
     try:
         result = simulate(with_overrides(base, [override]))
     except (ParameterError, ScenarioError) as error:
         return f"the value is refused: {error}"
-    return result.following if result.tracking is None else result.tracking.found
+    said = result.following if result.tracking is None else result.tracking.found
+    return "; ".join(filter(None, (said, standing_still(result))))
