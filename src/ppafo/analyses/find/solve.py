@@ -38,6 +38,8 @@ _SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 FOLLOWS = "follows"
 """Text of the condition that the run follows its reference, by the verdict of ``simulate``."""
+REFUSED = "the value is refused:"
+"""Beginning of the verdict on a value that makes no run."""
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
@@ -251,6 +253,6 @@ def _verdict(base: Scenario, override: str) -> str:
     try:
         result = simulate(with_overrides(base, [override]))
     except (ParameterError, ScenarioError) as error:
-        return f"the value is refused: {error}"
+        return f"{REFUSED} {error}"
     said = result.following if result.tracking is None else result.tracking.found
     return "; ".join(filter(None, (said, standing_still(result))))

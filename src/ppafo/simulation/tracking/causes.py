@@ -321,10 +321,9 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
 
 def _law_without_torque_loop(case: Case) -> TrackingCause | None:
     """Cause: an angle controller without inner torque loop, slow because the gas spring swings the joint."""
-    law = case.law
-    if case.scenario.controlled != ANGLE or law is None or law.only_switches:
-        return None
-    if torque_asked(case.scenario, law, case.settled.rms_error) is not None:
+    scenario, law, error = case.scenario, case.law, case.settled.rms_error
+    is_other = scenario.controlled != ANGLE or torque_asked(scenario, law, error) is not None
+    if is_other or law is None or law.only_switches:
         return None
     text = f"`{law.name}` controls the angle without an inner torque loop and is slow against load and friction"
     return TrackingCause(text, (CASCADE,))

@@ -176,8 +176,7 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
     if lowest <= needed_torque <= highest:
         return None
     reach, supply = highest if is_high else lowest, supply_that_moves(device, is_high)
-    stop = stop_of(scenario, angle)
-    rests = f"the joint lies on its {stop} stop: " if stop else ""
+    rests = f"the joint lies on its {stop} stop: " if (stop := stop_of(scenario, angle)) else ""
     works, gives = level_text("N m", needed_torque), reach_text(reach, is_high)
     against = "" if not is_within else f" to break its static friction of {level_text('N m', holding)}"
     text = f"{rests}the load needs {works} at {level_text('rad', wanted)}{against}, the actuator gives {gives}"
@@ -254,8 +253,7 @@ def flung_at_start(case: Case) -> TrackingCause | None:
     deviation = float(np.max((reference - angle) * np.sign(lacking)))
     if abs(lacking) <= float(device.friction.static_torque) or deviation <= _FLUNG * case.settled.wanted_change:
         return None
-    atmosphere = float(device.supply.atmospheric_pressure)
-    needed = supply_for(device, start, load)
+    atmosphere, needed = float(device.supply.atmospheric_pressure), supply_for(device, start, load)
     text = (
         f"at the start the chambers give {level_text('N m', load - lacking)} for a load of "
         f"{level_text('N m', load)}: the joint moves away by {change_text(ANGLE, deviation)} "

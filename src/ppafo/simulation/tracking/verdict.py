@@ -96,38 +96,32 @@ class Tracking:
     def sentence(self) -> str:
         """Verdict in one line."""
         remedies = " or ".join(remedy.text for remedy in self.remedies[:2])
-        if self.accepted:
-            last = f"; intended: {self.accepted}"
-        elif self.tried or not remedies:
-            last = f"; {self.tried or self.advice}" if self.tried or self.advice else ""
-        else:
-            last = f"; not tried: {remedies}"
-        return f"{self.found}; {self.cause}{last}"
+        untried = f"not tried: {remedies}" if remedies else self.advice
+        last = f"intended: {self.accepted}" if self.accepted else self.tried or untried
+        return "; ".join(filter(None, (self.found, self.cause, last)))
 
     @property
     @in_units(lambda tracking: tracking.units)
     def found(self) -> str:
         """Failure with the number that decided, without cause and remedy."""
-        words = CONTROLLED[self.controlled].words
-        numbers = (self.error, self.wanted, self.moved, abs(self.missing), self.worst, self.allowed)
-        error, wanted, moved, missing, worst, allowed = (change_text(self.controlled, each) for each in numbers)
-        plain_moved, rms = moved.partition(" ")[0], f"RMS error {error} (requested {wanted}){time_text(self.since)}"
+        words, since = CONTROLLED[self.controlled].words, time_text(self.since)
+        numbers = (self.error, self.wanted, self.moved, abs(self.missing), self.span, self.worst, self.allowed)
+        error, wanted, moved, missing, swing, worst, allowed = (change_text(self.controlled, each) for each in numbers)
+        plain_moved = moved.partition(" ")[0]
         if self.kind == "does not move":
             return f"the {words} loop does not move: {plain_moved} of the requested {wanted}"
         if self.kind == "oscillates":
             if self.span:
-                swing = change_text(self.controlled, self.span)
-                return f"the {words} swings by {swing} (requested change {wanted}){time_text(self.since)}"
+                return f"the {words} swings by {swing} (requested change {wanted}){since}"
             often = f"{without_exponent(self.reversals, '.3g')} reversals a {self.per}"
-            return f"the {words} loop oscillates: {often}, {rms}"
+            return f"the {words} loop oscillates: {often}, RMS error {error} (requested {wanted}){since}"
         if self.kind == "overshoots":
             return f"the {words} overshoots: {plain_moved} instead of at most {wanted}"
         is_constant = abs(self.missing) > max(0.9 * self.error, self.allowed)
         if is_constant and self.at_rest and self.criterion.endswith("error"):
             side = "below" if self.missing < 0.0 else "above"
             return f"the {words} stays {missing} {side} its reference ({allowed} allowed)"
-        number = f"{self.criterion} {worst} ({allowed} allowed){time_text(self.since)}"
-        return f"the {words} does not follow its reference: {number}"
+        return f"the {words} does not follow its reference: {self.criterion} {worst} ({allowed} allowed){since}"
 
 
 @in_units(lambda result: result.scenario.device.shown)
