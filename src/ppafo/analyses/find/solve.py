@@ -232,7 +232,7 @@ def outermost(
             )
         reason = f"; the first: {runs.reason}" if runs.reason else ""
         raise StudyError(f"scenario '{base.name}': no run {ends} gives the metric '{condition.metric}'{reason}")
-    # All parts of a bracket side by side: a bisection would wait for every one of its runs.
+    # The runs of a bracket are simulated side by side, which is faster than one run at a time by bisection.
     index, neighbour = search.found
     while index is not None and neighbour is not None:
         value = float(search.tried["value"][index])
@@ -243,9 +243,10 @@ def outermost(
     # With noise a single run does not represent the mean over the noise streams.
     if condition.text != FOLLOWS or seeds.size:
         return search
+    # The value found and its outer neighbour, or else the nearest value.
     values = [search.nearest if index is None else float(search.tried["value"][index])]
     values += [] if neighbour is None else [neighbour]
-    return replace(search, verdicts=tuple((each, _verdict(base, f"{path.path}={each!r} {SI}")) for each in values))
+    return replace(search, verdicts=tuple((value, _verdict(base, f"{path.path}={value!r} {SI}")) for value in values))
 
 
 def _verdict(base: Scenario, override: str) -> str:
