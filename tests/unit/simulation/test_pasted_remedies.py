@@ -69,7 +69,9 @@ def test_a_remedy_is_pasted_into_a_command_and_into_a_file_and_both_are_the_run_
         verdict = tried(loaded, simulate(loaded).tracking)
         assert verdict is not None
         assert verdict.mended
-        (printed,) = re.findall(r"; (?:for example, )?with (--set .*) it follows, as a further run shows", verdict.sentence)
+        (printed,) = re.findall(
+            r"; (?:for example, )?with (--set .*) it follows, as a further run shows", verdict.sentence
+        )
     mended = reloaded(loaded, verdict.mended)
     # The words are exactly those of the override set.
     assert [word for word in shlex.split(printed) if word != "--set"] == list(verdict.mended)

@@ -12,6 +12,7 @@ from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation, small_valve
 from ppafo.simulation.tracking.load_causes import ONE_WAY, reach_at_samples
 from ppafo.simulation.tracking.remedies import dead_band, larger_gains, level_text, remedy, sized_valves
+from ppafo.simulation.tracking.rule import LEAST_PEAK_WALK
 
 _OFTEN = 0.1
 """Fraction of the samples with a request that counts as often [-]."""
@@ -30,7 +31,8 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     places, reaches = reach_at_samples(case)
     above, below = reference[places] - reaches[:, 1], reaches[:, 0] - reference[places]
     share = float(np.mean((above > 0.0) | (below > 0.0)))
-    if share <= _OFTEN:
+    lacks_peak = case.settled.peak < LEAST_PEAK_WALK * case.settled.requested_peak
+    if share <= (0.0 if lacks_peak else _OFTEN):
         return None
     if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():
         # Dorsiflexion torque requested from an actuator that pushes in plantarflexion only.
@@ -76,11 +78,8 @@ def _speed_of_gait(case: Case) -> TrackingCause:
         for factor in (2.0, 4.0)
         if min(volumes.values()) > 0.0
     ]
-    return TrackingCause(
-        "the gait moves the joint faster than the torque loop can follow",
-        tuple(remedies),
-        "use larger dead volumes or a faster valve",
-    )
+    text = "the gait moves the joint faster than the torque loop can follow"
+    return TrackingCause(text, tuple(remedies), "use larger dead volumes or a faster valve")
 
 
 def _dead_band_of_walk(case: Case) -> TrackingCause | None:
