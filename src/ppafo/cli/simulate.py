@@ -103,11 +103,6 @@ class _RunReport:
         mended = () if self.tracking is None else self.tracking.mended
         return [usage_text(reloaded(self.result.scenario, mended))] if mended else []
 
-    @property
-    def gain_text(self) -> list[str]:
-        """Sentence on the gains in use; empty for a controller without gains."""
-        return [] if self.gains is None else [self.gains.sentence]
-
 
 def assessed(result: "Result", check: bool) -> _RunReport:
     """Assess a result for its report; ``check`` runs the scenario again to test its repeatability."""
@@ -129,11 +124,11 @@ def _text(report: _RunReport) -> str:
 
     # The result's own text has a verdict whose remedies were not tried.
     head = [f"{report.result.scenario.name}: {report.result.status.kind}", *report.verdict, ""]
-    accuracy = [] if report.error is None else [report.error.sentence]
-    if report.check is not None:
-        accuracy = [repr(report.check)]
+    exact = "" if report.error is None else report.error.sentence
+    exact = exact if report.check is None else repr(report.check)
     # Gains that are in force are no news: they stand last.
-    last = [*accuracy, *report.gain_text, *(f"\nCommand with the remedy\n{text}" for text in report.usage)]
+    gains = "" if report.gains is None else report.gains.sentence
+    last = [*filter(None, [exact, gains]), *(f"\nCommand with the remedy\n{text}" for text in report.usage)]
     return "\n".join([*head, *metrics_lines(report.result.metrics), *([""] if last else []), *last])
 
 
@@ -145,9 +140,11 @@ def _write(report: _RunReport, folder: Path) -> str:
 
     load_drawing()
     from ppafo.report.finding import REPORT, page_files
+    from ppafo.storage import write_result
 
     checks = {} if report.check is None else {CHECK_FILE: f"{json_text(report.check.document())}\n".encode()}
-    report.result.save(folder, {**page_files(finding_of(report)), **checks})
+    document = {**report.result.to_dict(), "verdict": report.verdict}
+    write_result(folder, report.result.recording, document, {**page_files(finding_of(report)), **checks})
     written = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", REPORT, *checks]
     scenario = report.result.scenario
     next_command = scenario.motion.motion_kind.further_command(str(scenario.origin.file))
@@ -182,7 +179,7 @@ def finding_of(report: _RunReport) -> "Finding[None]":
                 draw=result.plot,
             ),
             Section() if check is None else Section("Repeatability", code=repr(check)),
-            Section(remarks=report.gain_text),
+            Section(remarks=() if report.gains is None else (report.gains.sentence,)),
             *(Section("Command with the remedy", code=text) for text in report.usage),
         ),
         found=None,

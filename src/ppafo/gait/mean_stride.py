@@ -21,6 +21,8 @@ class MeanStride:
     signs_from: SignSource
     is_knee_one_marker: bool = False
     """True if both coordinates of the knee are from one marker, so that their scales cannot differ."""
+    is_toe_off_guessed: bool = False
+    """True if toe-off was found in the shank angle, without a vertical force and without events of the file."""
 
 
 def other_sign(signs_from: SignSource, key: str, turned: str = "the opposite sign") -> str:

@@ -153,9 +153,7 @@ def check_moment_time(walk: MeanStride) -> None:
     if at < fraction and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
         return
     where = "" if at >= fraction else f" and is {swing:.2g} N m/kg in swing"
-    # A gait file states the toe-off.
-    is_known = "vertical_force" in walk.curves or walk.signs_from == "gait_file"
-    force = "" if is_known else "toe-off is guessed without a vertical force: give one; or "
+    force = "toe-off is guessed without a vertical force: give one; or " if walk.is_toe_off_guessed else ""
     raise DataError(
         f"{column} peaks at {100.0 * at:.0f} % of the stride{where}, but the foot is off the ground "
         f"from {100.0 * fraction:.0f} % on; {force}{_OTHER_TIME[walk.signs_from]}"
@@ -163,9 +161,10 @@ def check_moment_time(walk: MeanStride) -> None:
 
 
 _OTHER_TIME: dict[SignSource, str] = {
-    "map": "the moment is of the other foot or has another clock: choose the other side, or the column of this foot",
-    "columns": "the moment is of the other foot or has another clock: choose the other side, or the column of this "
-    "foot",
+    **dict.fromkeys(
+        ("map", "columns"),
+        "the moment is of the other foot or has another clock: choose the other side, or the column of this foot",
+    ),
     "gait_file": "give the moment of the same foot, starting at its heel strike",
 }
 

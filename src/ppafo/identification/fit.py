@@ -20,7 +20,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.conflict import Conflict, conflict_of, too_smooth
 from ppafo.identification.intervals import interval_ends, unidentified
 from ppafo.identification.noise import HIGHEST_ORDER, Noise
-from ppafo.identification.residuals import FitRuns, FitVariable, Indices, ResidualBlock, Residuals
+from ppafo.identification.residuals import FitRuns, FitVariable, Flags, Indices, ResidualBlock, Residuals
 from ppafo.identification.whitened import Linear, cost_of, linear_at
 from ppafo.linear_algebra import on_one_thread
 from ppafo.progress import Progress, Report, report_nothing
@@ -94,6 +94,8 @@ _AT_BOUND = 1.0e-6
 """Largest distance of a variable from its bound [-] that counts as at the bound, relative above 1."""
 _SHOWN = 0.01
 """Least share of the variance [-] for a tolerance to be listed."""
+_BETTER = 1.0
+"""Increase of the log-likelihood [-] above which another start replaces the result; equal optima do not."""
 _OTHER_STARTS = 32
 """Number of additional start points tried if the first fit is inconsistent or has not converged."""
 
@@ -135,66 +137,77 @@ def fit(
     if samples <= sought:
         raise IdentificationError(f"{samples} samples cannot determine {sought} parameters; give more samples")
     best = _fit_from(runs, runs.start, confidence)
-    # A right law in its right place has neither.
     if best.conflict is None and best.has_converged:
         return best
-    # Where the law is wrong other starts end where the first does: only one that explains more at once is followed.
+    # With a wrong law, most starts end at the same point: only starts with a lower cost are followed.
     for start in _other_starts(runs, best):
         report(Progress("fit: another start, which fits better than the first result"))
         other = _fit_from(runs, start, confidence)
-        # By more than what the search itself leaves open, so that equal optima do not change the answer.
-        if _likelihood(runs, other) > _likelihood(runs, best) + 1.0:
+        if _likelihood(runs, other) > _likelihood(runs, best) + _BETTER:
             best = other
     return replace(best, evaluations=runs.evaluations)
 
 
 def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     """Return the fit, with intervals and consistency tests, found by a search from a scaled start point."""
-    point, outliers = _search(runs, start)
-    end = _settle(runs, point, outliers)
+    searched, outliers = _search(runs, start)
+    end = _settle(runs, searched, outliers)
     point, linear = end.point, end.linear
-    sensors, jacobian, errors = linear.sensors, linear.rows[:, 1:], linear.rows[:, 0]
+    errors, jacobian = linear.rows[:, 0], linear.rows[:, 1:]
     covariance = linear.root @ linear.root.T
-    # Samples less what the numbers took: a tolerance that the readings do not move takes none.
+    # Effective degrees of freedom: samples less the trace of J C J', to which a prior contributes little.
     freedom = max(len(errors) - float(np.sum(jacobian * (jacobian @ covariance))), 1.0)
     low, high = interval_ends(runs, point, linear, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
-    # At a bound that the squares would leave a number is no longer free, and no group can move it there.
-    gradient = errors @ jacobian + np.square(runs.prior) * (point - runs.start)
-    near = _AT_BOUND * np.maximum(1.0, np.abs(point))
-    is_at_bound = ((point - runs.low < near) & (gradient > 0.0)) | ((runs.high - point < near) & (gradient < 0.0))
-    names = [number.name for number in runs.numbers]
-    # Against the value that was found: against the start a far start would make a known number unknown.
-    # Where the model lacks something, that may be what moves a number so far from its start.
-    conflict = conflict_of(runs, linear.rows, point, ~is_at_bound, freedom) or too_smooth(sensors)
-    moved = point if conflict is None else np.minimum(point, 1.0)
-    typical = np.where((runs.low > 0.0) & (runs.prior == 0.0), moved, 1.0)
-    # What is assumed of each number widens the interval of every one by its share of the variance [-].
-    fractions = np.square(covariance * runs.prior) / np.diag(covariance)[:, None]
-    shares = {
-        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if row[other] >= _SHOWN)
-        for name, row in zip(names, fractions, strict=True)
-    }
+    is_free = ~_is_at_bound(runs, point, errors @ jacobian)
+    conflict = conflict_of(runs, linear.rows, point, is_free, freedom) or too_smooth(linear.sensors)
+    # Positive unknowns count relative to their estimates, because a start may be far off. After a conflict an estimate
+    # may be far too large, so the start limits it.
+    estimated = point if conflict is None else np.minimum(point, 1.0)
+    typical = np.where((runs.low > 0.0) & (runs.prior == 0.0), estimated, 1.0)
     return Fit(
         numbers=runs.numbers,
         values=point * runs.scale,
         covariance=covariance * np.outer(runs.scale, runs.scale),
         low=low * runs.scale,
         high=high * runs.scale,
-        noise={channel: noise.deviation for channel, noise in sensors.items()},
-        correlation={channel: len(noise.reflection) + (noise.gain > 0.0) for channel, noise in sensors.items()},
+        noise={channel: noise.deviation for channel, noise in linear.sensors.items()},
+        correlation={channel: len(noise.reflection) + (noise.gain > 0.0) for channel, noise in linear.sensors.items()},
         residuals=end.residuals,
         outliers=tuple(outliers.tolist()),
         conflict=conflict,
-        unidentified=tuple(unidentified(covariance / np.outer(typical, typical), names)),
-        shares=shares,
+        unidentified=tuple(unidentified(covariance / np.outer(typical, typical), [item.name for item in runs.numbers])),
+        shares=_shares_of_variance(runs, covariance),
         evaluations=runs.evaluations,
-        # Where every step leaves the region in which runs succeed nothing says that this is the least.
+        # A search whose steps all leave the region in which runs succeed has no minimum.
         has_converged=-math.inf < end.gain < _CONVERGED,
-        sensors=sensors,
+        sensors=linear.sensors,
         jacobian=jacobian / runs.scale,
         confidence=confidence,
         edge={} if math.isfinite(end.gain) else _edge(runs, point, end.step),
     )
+
+
+def _is_at_bound(runs: FitRuns, point: Floats, gradient: Floats) -> Flags:
+    """Return flags of the variables at a bound that the sum of squares and priors would cross.
+
+    ``gradient`` is the derivative of half the squares of the whitened residuals by the scaled variables [-].
+    """
+    slope = gradient + np.square(runs.prior) * (point - runs.start)
+    near = _AT_BOUND * np.maximum(1.0, np.abs(point))
+    return np.asarray(((point - runs.low < near) & (slope > 0.0)) | ((runs.high - point < near) & (slope < 0.0)))
+
+
+def _shares_of_variance(runs: FitRuns, covariance: Floats) -> dict[str, tuple[tuple[str, float], ...]]:
+    """Return for each variable the tolerances that contribute to its variance, with fractions [-], largest first.
+
+    A prior of standard deviation s_j contributes (C_ij / s_j)^2 / C_ii to the variance C_ii of variable i.
+    """
+    names = [number.name for number in runs.numbers]
+    fractions = np.square(covariance * runs.prior) / np.diag(covariance)[:, None]
+    return {
+        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if row[other] >= _SHOWN)
+        for name, row in zip(names, fractions, strict=True)
+    }
 
 
 def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
@@ -209,43 +222,48 @@ def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
             "every run fails at the start values; give other start values, or check the recordings"
         )
     noise, _ = runs.deviations(residuals[:, None])
-    begun = time.monotonic()
+    started = time.monotonic()
     for number in range(_PASSES):
-        runs.report(Progress("fit", number, _PASSES, noun="passes", elapsed=time.monotonic() - begun))
+        runs.report(Progress("fit", number, _PASSES, noun="passes", elapsed=time.monotonic() - started))
         weight = 1.0 / noise
         weight[outliers] = 0.0
-
-        def weighted(x: Floats, weight: Floats = weight) -> Floats:
-            return np.concatenate([runs.residuals_at(x) * weight, (x - runs.start) * runs.prior])
-
-        def weighted_slopes(x: Floats, weight: Floats = weight) -> Floats:
-            slopes = runs.jacobian(x, is_central=not runs.is_motion)
-            runs.adapt_steps(slopes, weight)
-            return np.concatenate([slopes * weight[:, None], np.diag(runs.prior)])
-
-        # The first pass is robust: a number can lose its gradient at a bound while the clock is still wrong.
-        result = least_squares(
-            weighted,
-            point,
-            weighted_slopes,
-            (runs.low, runs.high),
-            method="trf",
-            x_scale="jac",
-            xtol=1.0e-9,
-            gtol=None,
-            ftol=_FINE if number else _ROUGH,
-            loss="linear" if number else "soft_l1",
-            max_nfev=_FEW_EVALUATIONS if number > 1 else _EVALUATIONS,
-        )
-        point = np.asarray(result.x)
+        point, has_ended = _minimise(runs, point, weight, number)
         residuals = runs.residuals_at(point).copy()
         if number == 0 and runs.is_motion:
             outliers = _outliers(runs, residuals)
         residuals[outliers] = 0.0
         previous_noise, (noise, _) = noise, runs.deviations(residuals[:, None])
-        if number and result.status > 0 and float(np.abs(np.log(noise / previous_noise)).max()) < _SETTLED:
+        if number and has_ended and float(np.abs(np.log(noise / previous_noise)).max()) < _SETTLED:
             break
     return point, outliers
+
+
+def _minimise(runs: FitRuns, point: Floats, weight: Floats, number: int) -> tuple[Floats, bool]:
+    """Minimise the squares of residuals, with ``weight`` [1/SI] by row, and priors, from a scaled point.
+
+    Returns the scaled minimum, and False if the search stopped at its largest number of evaluations. Pass ``number`` 0
+    uses a robust loss, because a variable at a bound can lose its gradient while the clock is still wrong.
+    """
+
+    def slopes(x: Floats) -> Floats:
+        jacobian = runs.jacobian(x, is_central=not runs.is_motion)
+        runs.adapt_steps(jacobian, weight)
+        return np.concatenate([jacobian * weight[:, None], np.diag(runs.prior)])
+
+    result = least_squares(
+        lambda x: np.concatenate([runs.residuals_at(x) * weight, (x - runs.start) * runs.prior]),
+        point,
+        slopes,
+        (runs.low, runs.high),
+        method="trf",
+        x_scale="jac",
+        xtol=1.0e-9,
+        gtol=None,
+        ftol=_FINE if number else _ROUGH,
+        loss="linear" if number else "soft_l1",
+        max_nfev=_FEW_EVALUATIONS if number > 1 else _EVALUATIONS,
+    )
+    return np.asarray(result.x), result.status > 0
 
 
 def _outliers(runs: FitRuns, residuals: Floats) -> Indices:
@@ -293,7 +311,7 @@ def _settle(runs: FitRuns, point: Floats, outliers: Indices) -> _SearchEnd:
         runs.adapt_steps(jacobian, 1.0 / noise)
         linear, step = linear_at(runs, point, residuals, jacobian, left_out)
         noise, cost = linear.noise, cost_of(runs, residuals, point, linear)
-        # A step may leave where runs succeed, or overshoot: a shorter one is taken then, one that gains or none.
+        # A full step may overshoot, or leave the region in which runs succeed: shorter steps are tried then.
         for share in _SHARES:
             trial = np.clip(point + share * step, runs.low, runs.high)
             trial_residuals = runs.residuals_at(trial)
@@ -306,7 +324,7 @@ def _settle(runs: FitRuns, point: Floats, outliers: Indices) -> _SearchEnd:
             break
         if is_settled:
             is_checked = True
-            # What a sample near an impact seems to say alone is narrow and false: its slope holds on one side only.
+            # Near an impact the derivative holds on one side only, so that a sample would determine a variable falsely.
             leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
             highest = np.argsort(-leverage)[: int(_LEFT_OUT * len(leverage))]
             left_out = np.union1d(outliers, highest[leverage[highest] > _LEVERAGE])
@@ -345,10 +363,10 @@ def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:
     is_ratio = (low > 0.0) & (high > 10.0 * low)
     with np.errstate(invalid="ignore", divide="ignore"):
         ends = [np.where(is_ratio, np.log(end), end) for end in (low, high)]
-    # Seeded, so that the same recordings give the same numbers.
+    # A fixed seed gives the same result for the same recordings.
     drawn = qmc.Sobol(int(sought.sum()), seed=1).random(_OTHER_STARTS).T
     drawn = ends[0][:, None] + drawn * (ends[1] - ends[0])[:, None]
-    # The last is where the fit ended.
+    # The last column is the fitted point.
     points = np.repeat(point[:, None], _OTHER_STARTS + 1, axis=1)
     points[sought, :-1] = np.where(is_ratio[:, None], np.exp(np.where(is_ratio[:, None], drawn, 0.0)), drawn)
     noise = [np.full(block.rows.stop - block.rows.start, fitted.noise[block.channel]) for block in runs.blocks]

@@ -184,9 +184,9 @@ class FreeDecayProblem(StrictTable):
                     f"the stops in the parameter set are {math.degrees(high - low):.4g} deg apart; if 'angle' is in "
                     "degrees, give it the unit deg"
                 )
-        static = number_in_si(context.parameter_set, "friction.static_torque")
-        dynamic = number_in_si(context.parameter_set, "friction.dynamic_torque")
-        # Near standstill a seal grips as hard as at rest at most.
+        paths = "friction.static_torque", "friction.dynamic_torque"
+        static, dynamic = (number_in_si(context.parameter_set, path) for path in paths)
+        # Near standstill, the friction of a seal is at most the static friction.
         rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
         start, end = times_of(self, context.label)
         inertia = self.inertia_of(context)

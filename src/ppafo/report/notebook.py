@@ -4,7 +4,7 @@ import base64
 import html
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ppafo.metrics import Metric
 from ppafo.report.display_units import metric_text, metric_words
@@ -34,6 +34,14 @@ def png_of(figure: "Figure") -> bytes:
 
 
 def shown(figure: "Figure") -> "Figure":
-    """Return the figure, prepared for display in a notebook with or without a Matplotlib backend."""
-    vars(figure)["_repr_png_"] = partial(png_of, figure)
+    """Return the figure, prepared for display in a notebook with or without a backend, and for publishers."""
+    vars(figure).update(_repr_png_=partial(png_of, figure), savefig=partial(_save, figure))
     return figure
+
+
+def _save(figure: "Figure", *arguments: Any, **options: Any) -> None:
+    """Save a figure as ``Figure.savefig`` does, with TrueType fonts: many publishers refuse Type 3 fonts."""
+    import matplotlib
+
+    with matplotlib.rc_context({"pdf.fonttype": 42, "ps.fonttype": 42}):
+        type(figure).savefig(figure, *arguments, **options)

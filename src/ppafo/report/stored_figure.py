@@ -14,6 +14,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError
 from ppafo.metrics.metric import Metric, Metrics
 from ppafo.parameters.joint import ANKLE, JointNames
+from ppafo.report.display_units import metrics_lines
 from ppafo.report.notebook import shown
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.style import drawn_at
@@ -58,7 +59,14 @@ def read_result(folder: str | Path) -> StoredResult:
         except (KeyError, TypeError, ValueError) as error:
             raise _other_form(file, f"metrics.{name}", stated, "a value with unit and summary") from error
     atmosphere = _stated_atmosphere(file, stored.document, "scenario", "device")
-    return replace(stored, metrics=metrics, atmosphere=atmosphere, drawn_by=draw_stored_result)
+    # Folders of earlier versions hold no verdict.
+    said = stored.document.get("verdict", [_ending(file, stored.document)])
+    if not (isinstance(said, list) and all(isinstance(each, str) for each in said)):
+        raise _other_form(file, "verdict", said, "a list of texts")
+    kind = one_line(_under(file, stored.document, "status").get("kind", ""))[:_LONGEST_SHOWN]
+    with shown_in(stated_units(file, stored.document, device=("scenario", "device"))):
+        text = "\n".join([kind, *filter(None, map(one_line, said)), "", *metrics_lines(metrics), ""])
+    return replace(stored, metrics=metrics, atmosphere=atmosphere, drawn_by=draw_stored_result, text=text)
 
 
 def draw_stored_result(stored: StoredResult, width: float | str | None = None) -> "Figure":

@@ -47,11 +47,13 @@ class RigRecording:
 
     ``device``: the true device, which the sensors do not know
     ``truth``: all settings and true values as plain data, for ``rig.json``
+    ``motion``: motion of the vane for ``validate``, "" for an experiment without motion
     """
 
     recording: Recording
     device: Device
     truth: Mapping[str, Any]
+    motion: str = ""
 
 
 def record(
@@ -109,7 +111,7 @@ def record(
         "samples": len(result.recording),
         **({"replaced": result.replaced} if result.replaced else {}),
     }
-    return RigRecording(result.recording, result.device, truth)
+    return RigRecording(result.recording, result.device, truth, result.motion)
 
 
 def find_experiment(name: str) -> tuple[str, Callable[[ExperimentRequest], ExperimentResult]]:

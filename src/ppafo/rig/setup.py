@@ -48,6 +48,7 @@ class ExperimentResult:
     """Result of an experiment: recording, true device, sensor offsets by channel, and other true values by name.
 
     ``replaced`` is a sentence on values of the scenario that replace those of the requested parameter set, else "".
+    ``motion`` is the motion with which ``validate`` replays the recording, "" if it cannot.
     """
 
     recording: Recording
@@ -55,6 +56,7 @@ class ExperimentResult:
     offsets: Mapping[str, float]
     settings: Mapping[str, Any]
     replaced: str = ""
+    motion: str = ""
 
 
 def steady_bench(request: ExperimentRequest) -> tuple[Device, RigPhysics]:

@@ -21,7 +21,7 @@ from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, vane_motion
 
 _LEAK_RATE = 20.0
 """Sample rate [Hz] of a leak experiment of half a minute."""
@@ -148,7 +148,9 @@ def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str
         "impacts": solution.impacts,
         "breakaways": solution.breakaways,
     }
-    return ExperimentResult(recording, bench_run.device, offsets, settings, scenario.origin.replaced)
+    moved = vane_motion(scenario)
+    motion = "leg" if moved.leg else getattr(moved, "kind", "free").replace("prescribed", "measured")
+    return ExperimentResult(recording, bench_run.device, offsets, settings, scenario.origin.replaced, motion)
 
 
 def _of_package(name: str, request: ExperimentRequest) -> Scenario:

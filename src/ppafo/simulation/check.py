@@ -21,6 +21,7 @@ from ppafo.engine.scheme.actuators import pressures_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
 from ppafo.simulation.at_hand import RecordedResult
+from ppafo.simulation.scenario import Scenario
 from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
 from ppafo.wording import argument_text
@@ -33,6 +34,8 @@ LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 
 """Default error limits relative to the ranges of angle and pressures, and to the gas temperature [-]."""
 SMALLEST_TOLERANCE = 1.0e-6
 """Smallest ``run.tolerance`` [-] that a scenario may have."""
+SMALLEST_TRIED = 0.01
+"""Smallest ``run.tolerance`` that is tried for the promised accuracy, divided by the tolerance of the run [-]."""
 
 MOVE = 1.0e-7
 """Perturbation of a start or a measurement, as a fraction of its range."""
@@ -75,7 +78,8 @@ class ErrorEstimate:
     this metric. ``largest`` names the metric with the largest relative error, "" without metrics, and ``share`` is that
     relative error [-], with respect to the value of the metric or the range of its quantity. ``over_promise`` is the
     largest of the errors of angle, pressure and temperature, divided by the default error limit [-]. ``tolerance`` is a
-    ``run.tolerance`` that meets the limit, 0 if none is needed. ``units`` are the display units by SI unit.
+    ``run.tolerance`` with which a trial run met the limit, 0 if none is needed or none that was tried meets the limit.
+    ``units`` are the display units by SI unit.
     """
 
     angle: float
@@ -99,13 +103,15 @@ class ErrorEstimate:
         texts = [f"{without_exponent(value, '.1e')} {unit}" for value, unit in in_display_units]
         over_time = f"{', '.join(texts[:-1])} and {texts[-1]}"
         of_metrics = f"; at most {self.share:.1e} of a metric's value ({self.largest})" if self.largest else ""
-        beyond = ""
-        if self.over_promise > 1.0:
-            remedy = ", which no smaller `run.tolerance` is sure to reduce"
-            if self.tolerance:
-                remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it"
-            beyond = f" That is {self.over_promise:.2g} times the promised accuracy of a run{remedy}."
-        return f"Estimated error of the time steps: at most {over_time} over time{of_metrics}.{beyond}"
+        within = f"Estimated error of the time steps: at most {over_time} over time{of_metrics}."
+        if self.over_promise <= 1.0:
+            return within
+        lasting = (
+            "; trials with smaller values of `run.tolerance` do not reach it: repeated impacts, or a loop that "
+            "oscillates, may amplify small differences, and the metrics then hold for one run among many"
+        )
+        remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it" if self.tolerance else lasting
+        return f"{within} That is {self.over_promise:.2g} times the promised accuracy of a run{remedy}."
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,10 +224,6 @@ class Check:
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document}
 
 
-Rerun = Callable[[Sequence[Run]], Sequence[RecordedResult]]
-"""Function that executes other planned runs of the same scenario."""
-
-
 def finer(run: Run) -> Run:
     """Return a run, or an ensemble, with a sixteenth of the allowed error and a quarter of the step size."""
     return replace(
@@ -235,7 +237,10 @@ def finer(run: Run) -> Run:
 
 
 def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstimate:
-    """Estimated error of a result, from the same run with finer steps; inf if the finer run diverged."""
+    """Estimated error of a result, from the same run with finer steps; inf if the finer run diverged.
+
+    A smaller tolerance for an error beyond the promised accuracy is not sought here (``with_tolerance``).
+    """
     signals = _recorded_signals(result).values()
     errors = {signal.unit: math.inf for signal in signals}
     metric_errors = dict.fromkeys(result.metrics, math.inf)
@@ -256,13 +261,6 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
     over_promise = max(
         errors[signal.unit] / (signal.promised_error * _signal_range(result, signal.unit)) for signal in signals
     )
-    # The error is proportional to the tolerance: half of the tolerance that just meets the promise is proposed.
-    # A loop that oscillates amplifies small differences, whatever the tolerance.
-    from ppafo.simulation.tracking import tracking_in
-
-    tracking = tracking_in(result) if fine.status.is_completed and over_promise > 1.0 else None
-    tolerance = 0.0 if tracking is not None and tracking.kind == "oscillates" else result.scenario.run.tolerance
-    smaller = max(0.5 * tolerance / over_promise, SMALLEST_TOLERANCE) if over_promise > 0.0 else tolerance
     return ErrorEstimate(
         angle=errors["rad"],
         pressure=errors["Pa"],
@@ -271,8 +269,25 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
         largest=worst,
         share=shares.get(worst, 0.0),
         over_promise=over_promise,
-        tolerance=smaller if over_promise > 1.0 and smaller < tolerance else 0.0,
     )
+
+
+def with_tolerance(scenario: Scenario, error: ErrorEstimate) -> ErrorEstimate:
+    """Complete the estimate by a smaller tolerance whose trial run has the promised accuracy, if one is found."""
+    from ppafo.simulation.plan import plan_run
+    from ppafo.simulation.simulate import results_of
+
+    tolerance, over_promise = scenario.run.tolerance, error.over_promise
+    smallest = max(SMALLEST_TRIED * tolerance, SMALLEST_TOLERANCE)
+    while over_promise > 1.0:
+        # The error is proportional to the tolerance: half of the tolerance that just meets the promise is tried.
+        last, tolerance = tolerance, float(f"{max(0.5 * tolerance / over_promise, smallest):.1g}")
+        if tolerance >= last:
+            return error
+        run = plan_run(replace(scenario, run=replace(scenario.run, tolerance=tolerance)))
+        trial, fine = results_of(scenario, [run, finer(run)])
+        over_promise = estimated_error(trial, fine).over_promise if trial.status.is_completed else math.inf
+    return replace(error, tolerance=tolerance) if tolerance < scenario.run.tolerance else error
 
 
 def _recorded_signals(result: RecordedResult) -> dict[str, _ComparedSignal]:
@@ -298,8 +313,8 @@ def _signal_range(result: RecordedResult, unit: str) -> float:
     return float(np.ptp(np.concatenate([*chambers, constant]))) or supply.atmospheric_pressure
 
 
-def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
-    """Return the repeatability check of a result, from its planned run.
+def checked(result: RecordedResult, run: Run, rerun: Callable[[Sequence[Run]], Sequence[RecordedResult]]) -> Check:
+    """Return the repeatability check of a result, from its planned run; ``rerun`` executes runs of the same scenario.
 
     Raises SimulationError for a Python controller that gives a different run each time, which makes a check impossible.
     """
@@ -318,27 +333,26 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
         runs += [(MOVED_MEASUREMENT, noisy) for noisy in _measurement_moved(run, _signal_range(result, "Pa"))]
     results = rerun([planned for _, planned in runs])
     repeats = [(kind, repeat) for (kind, _), repeat in zip(runs, results, strict=True)]
-    signals = _recorded_signals(result)
-    courses = []
-    for name, signal in signals.items():
-        extent = _signal_range(result, signal.unit)
-        changes = _largest_changes(
-            (kind, float(np.max(_largest_differences(repeat.recording, recording, signal.channels))))
-            for kind, repeat in repeats
-        )
-        promised = signal.promised_error * extent / MARGIN
-        courses.append(NumberCheck(name, signal.unit, extent, ALLOWED_PARTING * extent, changes, promised))
+    courses, metrics = [], []
     separations = [repeat.status.time for repeat in results if repeat.status.time is not None]
-    for course in courses:
-        for repeat in results:
-            differences = _largest_differences(repeat.recording, recording, signals[course.name].channels)
-            is_beyond = differences > course.allowed
-            separations += [float(recording.time[np.argmax(is_beyond)])] if is_beyond.any() else []
+    for name, signal in _recorded_signals(result).items():
+        extent = _signal_range(result, signal.unit)
+        parted = [_largest_differences(repeat.recording, recording, signal.channels) for repeat in results]
+        changes = _largest_changes((kind, float(np.max(each))) for (kind, _), each in zip(repeats, parted, strict=True))
+        promised, allowed = signal.promised_error * extent / MARGIN, ALLOWED_PARTING * extent
+        courses.append(NumberCheck(name, signal.unit, extent, allowed, changes, promised))
+        separations += [float(recording.time[np.argmax(each > allowed)]) for each in parted if np.any(each > allowed)]
+    units = {name: metric.unit for compared in (result, *results) for name, metric in compared.metrics.items()}
+    for name, unit in units.items():
+        value = _value(result, name)
+        changes = _largest_changes((kind, _difference(_value(repeat, name), value)) for kind, repeat in repeats)
+        scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, unit))
+        metrics.append(NumberCheck(name, unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
     return Check(
         scenario=scenario.name,
-        metrics=_metric_checks(result, repeats),
+        metrics=tuple(metrics),
         courses=tuple(courses),
-        error=estimated_error(result, results[0]),
+        error=with_tolerance(scenario, estimated_error(result, results[0])),
         parts_at=min(separations, default=None),
         failed=tuple(dict.fromkeys(kind for kind, repeat in repeats if not repeat.status.is_completed)),
     )
@@ -379,21 +393,6 @@ def start_moved(run: Run, move: float, opposite: float) -> Run:
     mass_1 = start.mass_1 * after[0] / before[0] * (1.0 + move)
     mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + opposite * move)
     return replace(run, initial=start._replace(angle=angle, mass_1=mass_1, mass_2=mass_2))
-
-
-def _metric_checks(result: RecordedResult, repeats: list[tuple[str, RecordedResult]]) -> tuple[NumberCheck, ...]:
-    """Changes between run and repeats, for each metric of either."""
-    units: dict[str, str] = {}
-    for compared in (result, *(repeat for _, repeat in repeats)):
-        for name, metric in compared.metrics.items():
-            units.setdefault(name, metric.unit)
-    rows = []
-    for name, unit in units.items():
-        value = _value(result, name)
-        changes = _largest_changes((kind, _difference(_value(repeat, name), value)) for kind, repeat in repeats)
-        scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, unit))
-        rows.append(NumberCheck(name, unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
-    return tuple(rows)
 
 
 def _value(result: RecordedResult, name: str) -> float:

@@ -147,8 +147,8 @@ class Result:
         """Return the output of ``ppafo simulate``: status, verdict, warnings and metrics in the units of the device."""
         from ppafo.report.display_units import metrics_lines
 
-        said = filter(None, (self.following, *self.warnings, changed_text(changes_in(self.scenario))))
-        return "\n".join([f"{self.scenario.name}: {self.status.kind}", *said, "", *metrics_lines(self.metrics)])
+        head = [f"{self.scenario.name}: {self.status.kind}", *self.to_dict()["verdict"]]
+        return "\n".join([*head, "", *metrics_lines(self.metrics)])
 
     @_in_own_units
     def plot(self, width: float | str | None = None) -> "Figure":
@@ -161,8 +161,7 @@ class Result:
         from ppafo.report.style import drawn_at
 
         remark = "" if self.status.is_completed else self.status.message
-        valve = self.scenario.device.valve.kind
-        joint = self.scenario.device.joint
+        valve, joint = self.scenario.device.valve.kind, self.scenario.device.joint
         with drawn_at(width):
             return shown(recording_figure(self.recording, self.scenario.name, remark, valve, joint))
 
@@ -174,9 +173,10 @@ class Result:
         """
         if not self.status.is_completed:
             raise SimulationError(f"{self.scenario.name}: the run diverged, so its error cannot be estimated")
-        from ppafo.simulation.check import estimated_error, finer
+        from ppafo.simulation.check import estimated_error, finer, with_tolerance
 
-        return estimated_error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
+        fine = results_of(self.scenario, [finer(plan_run(self.scenario))])[0]
+        return with_tolerance(self.scenario, estimated_error(self, fine))
 
     @_in_own_units
     def check(self) -> "Check":
@@ -191,10 +191,13 @@ class Result:
 
         return checked(self, plan_run(self.scenario), partial(results_of, self.scenario))
 
+    @_in_own_units
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``run.json`` as plain data in SI units, except the fields added by storage."""
+        said = (self.following, *self.warnings, changed_text(changes_in(self.scenario)))
         return {
             "status": plain(self.status),
+            "verdict": list(filter(None, said)),
             "metrics": {name: plain(metric) for name, metric in self.metrics.items()},
             "versions": dict(self.versions),
             "seed": self.scenario.sensors.seed,

@@ -15,6 +15,7 @@ from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import write_file
+from ppafo.units import conversion
 
 if TYPE_CHECKING:
     import xarray
@@ -44,8 +45,10 @@ def dataset_of(
     joint = joint_of(scenario)
     variables = {name: (TIME, recording[name], channel_attributes(recording, name, joint)) for name in recording.names}
     for name, unit in (units or {}).items():
-        values = recording.in_unit(name, unit, atmosphere)
-        variables[name] = (TIME, values, channel_attributes(recording, name, joint) | {"units": unit})
+        attributes = channel_attributes(recording, name, joint) | {"units": unit}
+        if recording.unit(name) == "Pa" and conversion(unit, "Pa_a")[2]:
+            attributes["long_name"] = attributes["long_name"].replace("absolute", "gauge")
+        variables[name] = (TIME, recording.in_unit(name, unit, atmosphere), attributes)
     coordinates = {TIME: (TIME, recording.time, _TIME_ATTRIBUTES)}
     return xarray.Dataset(variables, coordinates, global_attributes(recording, scenario))
 

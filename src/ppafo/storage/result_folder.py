@@ -44,7 +44,8 @@ class StoredResult:
     """Content of a result folder: recording, metrics by name, and ``run.json`` as plain data.
 
     ``stored["torque"]`` and ``stored["pressure_1", "psi_g"]`` are the values of a channel, as of a ``Result``.
-    ``atmosphere`` [Pa absolute] is the reference of gauge pressures, ``drawn_by`` draws the figure at a width.
+    ``atmosphere`` [Pa absolute] is the reference of gauge pressures, ``drawn_by`` draws the figure at a width, ``text``
+    is the end of the run, its verdict and its metrics.
     """
 
     folder: Path
@@ -53,9 +54,10 @@ class StoredResult:
     metrics: Mapping[str, Any] = field(default_factory=dict)
     atmosphere: float = STANDARD_ATMOSPHERE
     drawn_by: "Callable[[StoredResult, float | str | None], Figure] | None" = field(default=None, compare=False)
+    text: str = field(default="", compare=False)
 
     def __repr__(self) -> str:
-        return f"StoredResult in {self.folder}: {', '.join(self.document)}\n{self.recording!r}"
+        return f"StoredResult in {self.folder}: {self.text}\n{self.recording!r}"
 
     def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
         """Return the values of a channel, in SI or in a given unit; ``time`` gives the sample times [s]."""

@@ -25,6 +25,7 @@ from ppafo.validation.change import SENSORS, CandidateCause, ModelChange
 from ppafo.validation.compared import ANGLE, EXPLAINED_FRACTION
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.record import Record, ScaledResiduals, at_rate, record_of
+from ppafo.validation.replay import Motion
 from ppafo.validation.search import CauseSearch, SizedCause
 from ppafo.validation.settings import ReplaySettings
 from ppafo.wording import argument_text
@@ -332,14 +333,17 @@ def _samples(records: Sequence[Record]) -> list[CandidateCause]:
 
 
 def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[CandidateCause]:
-    """Return a locked vane as candidate cause if the recorded angle is constant while the model moves, else nothing."""
+    """Return another motion as candidate cause: a locked vane for a recorded angle at rest, else a leg for free."""
     if settings.motion not in ("free", "leg"):
         return []
     angles = [record.values[record.channels.index(ANGLE)] for record in records if ANGLE in record.channels]
-    if not angles or any(float(np.std(angle)) >= _AT_REST for angle in angles):
+    is_at_rest = all(float(np.std(angle)) < _AT_REST for angle in angles)
+    if not angles or (settings.motion == "leg" and not is_at_rest):
         return []
-    words = f"the vane seems to be locked, because its recorded angle is constant ({argument_text('motion', 'locked')})"
-    return [CandidateCause("motion", words, lambda _: ModelChange(motion="locked"))]
+    motion: Motion = "locked" if is_at_rest else "leg"
+    seems = "be locked, because its recorded angle is constant" if is_at_rest else "move the foot of the fixture"
+    words = f"the vane seems to {seems} ({argument_text('motion', motion)})"
+    return [CandidateCause("motion", words, lambda _: ModelChange(motion=motion))]
 
 
 def _cause_of(named: Sequence[SizedCause], penalty: float, others: Sequence[SizedCause] = ()) -> ResidualCause:

@@ -1,6 +1,7 @@
 """``ppafo rig``."""
 
 import json
+import shlex
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,20 @@ def test_the_same_command_gives_the_same_bytes(tmp_path: Path) -> None:
         assert main([*words, str(tmp_path / folder)]) == 0
     for name in ("step-response.csv", "rig.json"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+def test_the_command_that_compares_a_recording_names_its_motion_and_the_motion_is_found_without_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["rig", "simulate", "step-response", "--preset", "ideal-laboratory", "--out", str(tmp_path)]) == 0
+    (command,) = (row for row in capsys.readouterr().out.splitlines() if row.startswith("to compare: ppafo "))
+    words = shlex.split(command.removeprefix("to compare: ppafo "))
+    assert words[-2:] == ["--motion", "leg"]
+    assert main(words) == 0
+    capsys.readouterr()
+    assert main(words[:-2]) == 1
+    verdict = capsys.readouterr().out.splitlines()[0]
+    assert verdict.endswith("; the vane seems to move the foot of the fixture (--motion leg)")
 
 
 def test_values_of_an_experiment_that_replace_those_of_the_requested_set_are_said_in_the_answer(

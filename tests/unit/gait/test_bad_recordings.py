@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.gait.plausible import moment_remarks
+from ppafo.gait.mean_stride import MeanStride
+from ppafo.gait.plausible import check_moment_time, moment_remarks
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.mapping import (
     AngleMap,
@@ -618,3 +619,14 @@ def test_a_walker_who_turns_within_the_record_is_remarked(opensim_files: dict[st
         opensim_files["ik"].write_text(f"{top}endheader\n{table}\n")
         found = import_gait(list(opensim_files.values()), ImportSettings(62.0))
         assert any("the walker turns by 80 deg (pelvis_rotation)" in line for line in found.remarks) is is_said
+
+
+def test_a_toe_off_that_events_of_the_file_state_is_not_called_guessed() -> None:
+    phase = np.linspace(0.0, 1.0, 101)
+    in_swing = {"ankle_moment": np.exp(-(((phase - 0.9) / 0.05) ** 2))}
+    for is_guessed in (False, True):
+        with pytest.raises(DataError, match="ankle_moment peaks at 90 % of the stride, but the foot is off") as error:
+            check_moment_time(
+                MeanStride({"ankle_moment": "walk.c3d"}, in_swing, 0.62, 1.1, "columns", False, is_guessed)
+            )
+        assert ("toe-off is guessed" in str(error.value)) is is_guessed

@@ -261,8 +261,10 @@ def test_a_knee_that_counts_flexion_above_zero_is_recognised(opensim_files: dict
     stated = ShankMap(terms=("pelvis_tilt", "hip_flexion_r", "-knee_angle_r"))
     columns_map = opensim_map("right").model_copy(update={"shank_angle": stated, "knee": None})
     settings = ImportSettings(normative.body_mass, columns=columns_map)
-    found = import_gait(list(opensim_files.values()), settings).gait
+    imported = import_gait(list(opensim_files.values()), settings)
+    found, absent = imported.gait, "no acceleration of the knee: no columns of the knee were found; name them by knee."
     assert largest_difference(found, normative, "shank_angle") < LIMITS["shank_angle"], "a map's sign is as it says"
+    assert [absent in remark for remark in imported.remarks].count(True) == 1
 
 
 def test_without_a_force_the_strides_come_from_the_shank(opensim_files: dict[str, Path], normative: Gait) -> None:

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import pickle
 import re
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 import ppafo
 from ppafo import read_result
+from ppafo.cli.main import main
 from ppafo.documents.json_text import plain
 from ppafo.errors import DataError
 from ppafo.metrics import Metric
@@ -39,10 +41,31 @@ def test_a_result_is_shown_with_its_status_and_a_line_for_every_metric(result: R
     assert repr(diverged).startswith("Result of 'step-response', 0.5 s: diverged at t = 0.05 s\n")
 
 
-def test_a_stored_result_is_shown_without_its_numbers(result: Result, tmp_path: Path) -> None:
-    shown = repr(read_result(result.save(tmp_path / "task")))
-    assert shown.startswith(f"StoredResult in {tmp_path / 'task'}: ")
-    assert len(shown.splitlines()) == 3
+def test_a_stored_result_is_shown_as_its_run_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = ppafo.simulate("cylinder-servo", ["run.duration=0.5 s"])
+    lines = str(run).splitlines()
+    assert lines[1].startswith("the angle follows its reference") or "no verdict" in lines[1]
+    shown = repr(ppafo.read_result(run.save(tmp_path / "run"))).splitlines()
+    assert shown[0] == f"StoredResult in {tmp_path / 'run'}: completed"
+    assert shown[1 : len(lines)] == lines[1:]
+    # The command stores the verdict that it prints, whose remedies were tried.
+    words = ["simulate", "torque-task-proportional", "--set", "controller.proportional_gain=5 1/(N m)", "--out"]
+    main([*words, str(tmp_path / "told")])
+    printed = capsys.readouterr().out.splitlines()
+    assert "; not tried: " not in printed[1]
+    assert repr(ppafo.read_result(tmp_path / "told")).splitlines()[1] == printed[1]
+
+
+def test_a_result_of_an_earlier_version_has_no_verdict_and_a_damaged_verdict_is_refused(tmp_path: Path) -> None:
+    folder = ppafo.simulate("step-response", ["run.duration=0.05 s"]).save(tmp_path / "run")
+    document = json.loads((folder / "run.json").read_text())
+    said = document.pop("verdict")
+    assert said == ["values changed: run.duration=0.05 s"]
+    (folder / "run.json").write_text(json.dumps(document))
+    assert repr(ppafo.read_result(folder)).splitlines()[:2] == [f"StoredResult in {folder}: completed", ""]
+    (folder / "run.json").write_text(json.dumps({**document, "verdict": 3}))
+    with pytest.raises(DataError, match=r"run\.json: verdict = 3 must be a list of texts"):
+        ppafo.read_result(folder)
 
 
 def test_a_stored_result_is_the_dataset_of_its_run(tmp_path: Path) -> None:
@@ -52,12 +75,25 @@ def test_a_stored_result_is_the_dataset_of_its_run(tmp_path: Path) -> None:
     in_psi = stored.dataset(units={"pressure_1": "psi_g"})["pressure_1"]
     # Chamber 1 starts at the atmosphere; 1 psi is 6894.757 Pa.
     assert in_psi.attrs["units"] == "psi_g"
+    assert in_psi.attrs["long_name"] == "gauge pressure in chamber 1, whose volume grows with the angle"
+    in_bar = stored.dataset(units={"pressure_2": "bar_a", "angle": "deg"})
+    assert in_bar["pressure_2"].attrs["long_name"] == stored.dataset()["pressure_2"].attrs["long_name"]
+    assert in_bar["pressure_2"].attrs["long_name"] == "absolute pressure in chamber 2"
     assert float(in_psi[0]) == pytest.approx(0.0, abs=1e-9)
     absolute = float(stored["pressure_1"][-1])
     assert float(in_psi[-1]) == pytest.approx((absolute - 101325.0) / 6894.757293, rel=1e-8)
     for result in (run, stored):
         with pytest.raises(ppafo.PpafoError, match="units='psi_g': must be units by channel"):
             result.dataset(units="psi_g")  # type: ignore[arg-type]
+
+
+def test_a_figure_that_the_user_saves_has_no_type_3_font(tmp_path: Path) -> None:
+    figure = ppafo.simulate("step-response", ["run.duration=0.05 s"]).plot()
+    for number, drawn in enumerate((figure, pickle.loads(pickle.dumps(figure)))):
+        drawn.savefig(tmp_path / f"{number}.pdf", metadata={"CreationDate": None})
+        content = (tmp_path / f"{number}.pdf").read_bytes()
+        assert b"/Subtype /Type0" in content
+        assert b"/Subtype /Type3" not in content
 
 
 def test_the_document_holds_every_number_of_the_device_in_si(result: Result) -> None:

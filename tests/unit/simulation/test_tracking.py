@@ -435,6 +435,22 @@ def test_an_error_of_the_steps_beyond_what_is_promised_is_said_with_a_tolerance_
     assert simulate("cylinder-servo", [*coarse[:2], f"run.tolerance={told.tolerance:.1g}"]).error().over_promise < 1.0
 
 
+def test_a_tolerance_that_reduces_an_error_was_tried_where_the_joint_strikes_its_stops() -> None:
+    torque = ["controller.kind=pid", "reference.of=torque", "reference.level=0 N m", "reference.amplitude=5 N m"]
+    joint = [
+        "friction.static_torque=0.001 N m",
+        "friction.dynamic_torque=0.001 N m",
+        "friction.viscous_damping=0 N m s",
+    ]
+    told = simulate("cylinder-servo", [*torque, *joint, "run.tolerance=0.1"]).error()
+    # Half of the tolerance that an error in proportion would need is too large: impacts amplify the difference.
+    guessed = 0.5 * 0.1 / told.over_promise
+    assert simulate("cylinder-servo", [*torque, *joint, f"run.tolerance={guessed}"]).error().over_promise > 1.0
+    assert 0.0 < told.tolerance < guessed
+    kept = simulate("cylinder-servo", [*torque, *joint, f"run.tolerance={told.tolerance}"])
+    assert kept.error().over_promise <= 1.0
+
+
 def test_a_pair_that_is_too_coarse_is_told_by_result_and_comparison() -> None:
     changes = ["reference.level=4 N m", "run.duration=0.3 s"]
     result = simulate("torque-task-solenoid", changes)

@@ -118,14 +118,13 @@ def compared(
             f"draws = {draws.requested}: nothing in this comparison is random; omit draws, or give a study or "
             "sensors with noise"
         )
-    seed_of_study = DEFAULT_SEED if study is None else study.sample.seed
-    seed = seed_of_study if draws.seed is None else draws.seed
+    seed = draws.seed if draws.seed is not None else DEFAULT_SEED if study is None else study.sample.seed
     drawn: dict[tuple[str, str], _DrawnRuns] = {}
     if uncertainty.drawn:
         if study is not None:
             _check_different_values(study, scenarios)
         drawn = _runs_over_draws(scenarios, metrics, study, uncertainty, draws, seed)
-    # With the seed of each scenario: what the tables call nominal is one realisation of its noise.
+    # Nominal runs use the seed of each scenario: with noise, a nominal run is one realisation of the noise.
     results = simulate_many(list(scenarios.values()), draws.threads)
     cases: dict[str, list[ConfigurationResult]] = {task: [] for task, _ in named_tasks}
     remarks: list[str] = []

@@ -19,6 +19,7 @@ from ppafo.parameters.overrides import read_overrides
 from ppafo.report.kind import Kind
 from ppafo.report.stored_figure import stated_units
 from ppafo.signals import Recording
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.owned_folder import read_json
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import RUN_FILE
@@ -72,7 +73,6 @@ def endurance_of_gas_use(
     it raises ParameterError, in which the walk is called ``name``.
     """
     for override in read_overrides(overrides):
-        # The bottle's gas is in its file, and the device's in the scenario of the run: neither is a value of a bottle.
         if "gas" in override.typed.split("."):
             species = override.text if override.text in SPECIES else "NAME"
             again = override_text([f"{SPECIES_PATH}={species}"])
@@ -97,16 +97,15 @@ def endurance_of_gas_use(
         recording, run = read_recording(Path(str(use))), Path(str(use)) / RUN_FILE
         document = read_json(run) if run.is_file() else {}
         units = dict(stated_units(run, document)) if document else {}
-        # A device that was fed with another gas than the bottle holds says nothing of this bottle.
-        gas_data: Any = document
-        for key in ("scenario", "device", "gas"):
-            gas_data = gas_data.get(key) if isinstance(gas_data, dict) else None
-        molar_mass, fluid = gas_data.get("molar_mass") if isinstance(gas_data, dict) else None, full.fluid.name
+        # The gas demand of a device with another gas does not apply to this bottle.
+        molar_mass: Any = document
+        for key in ("scenario", "device", "gas", "molar_mass"):
+            molar_mass = molar_mass.get(key) if isinstance(molar_mass, dict) else None
         if isinstance(molar_mass, float) and not is_of_bottle(molar_mass, full):
             raise DataError(
                 f"{run}: the device uses gas of {1000.0 * molar_mass:.4g} g/mol, but bottle '{full.name}' contains "
-                f"{fluid}; choose a bottle with the gas of the device (ppafo bottle --list), or simulate the device "
-                f"with gas.species={fluid}"
+                f"{full.fluid.name}; choose a bottle with the gas of the device (ppafo bottle --list), or simulate the "
+                f"device with gas.species={full.fluid.name}"
             )
     endurance = follow_bottle(full, demand_of_recording(recording, stride_time), schedule)
     return replace(endurance, is_of_recording=stride_time is None, device_units=units)
@@ -149,25 +148,8 @@ def endurance_of_walk_gas(
         )
     if bottle is None and walk_of(gas.scenario).bottle is None:
         bottle = PAPER_BOTTLE
-    full, device = None if bottle is None else load_bottle(bottle), gas.scenario.device
-    if full is not None and not is_of_bottle(device.gas.molar_mass, full):
-        fed, changes = device.gas.species, [f"{SPECIES_PATH}={full.fluid.name}"]
-        if walk_of(gas.scenario).bottle is not None:
-            changes.append(f"{BOTTLE_NAME}={bottle}")
-        pressure = other_pressure(str(bottle), full, device)
-        if pressure is not None:
-            room, unit = device.supply.atmospheric_pressure, full.entries["regulator.set_pressure"].unit
-            changes.append(f"supply.pressure={shown_text(pressure, 'Pa_a', atmosphere=room, unit=unit)}")
-        problem = f"walk '{gas.name}' uses {fed}, and cannot be repeated on bottle '{full.name}' of {full.fluid.name}"
-        with refused_as(DataError, problem, PpafoError):
-            again = reloaded(gas.scenario, changes)
-        command, seconds = usage_text(again).partition("\n")[0], float(gas.recording.time[-1])
-        if abs(seconds - again.run.duration) > _SAME_TIME * seconds:
-            command += f" --minutes {seconds / 60.0:.6g}"
-        raise DataError(
-            f"walk '{gas.name}': the device uses {fed}, but bottle '{full.name}' contains {full.fluid.name}; "
-            f"repeat the walk with '{command} --out FOLDER' and give FOLDER, or choose a bottle of {fed}"
-        )
+    if bottle is not None:
+        _check_gas_of_walk(gas.name, gas.scenario, float(gas.recording.time[-1]), bottle)
     walking = on_bottle(gas.scenario, bottle, overrides)
     supply = walk_of(walking).bottle
     assert supply is not None, "a walk on a bottle"
@@ -188,6 +170,34 @@ def endurance_of_walk_gas(
         strides_when_warm=usable / demand.mass_per_stride,
         is_of_task_sequence=bool(gas.task_sequence),
         device_units=gas.scenario.device.shown,
+    )
+
+
+def _check_gas_of_walk(name: str, scenario: Scenario, duration: float, bottle: str | Path) -> None:
+    """Raise DataError if a walk uses another gas than the bottle contains; the message has a command to repeat it.
+
+    ``name`` is the walk in the message, ``duration`` its duration [s]. The command changes the gas of the device, its
+    bottle and a supply pressure that does not suit the bottle.
+    """
+    full, device = load_bottle(bottle), scenario.device
+    if is_of_bottle(device.gas.molar_mass, full):
+        return
+    species, changes = device.gas.species, [f"{SPECIES_PATH}={full.fluid.name}"]
+    if walk_of(scenario).bottle is not None:
+        changes.append(f"{BOTTLE_NAME}={bottle}")
+    pressure = other_pressure(str(bottle), full, device)
+    if pressure is not None:
+        room, unit = device.supply.atmospheric_pressure, full.entries["regulator.set_pressure"].unit
+        changes.append(f"supply.pressure={shown_text(pressure, 'Pa_a', atmosphere=room, unit=unit)}")
+    problem = f"walk '{name}' uses {species}, and cannot be repeated on bottle '{full.name}' of {full.fluid.name}"
+    with refused_as(DataError, problem, PpafoError):
+        again = reloaded(scenario, changes)
+    command = usage_text(again).partition("\n")[0]
+    if abs(duration - again.run.duration) > _SAME_TIME * duration:
+        command += f" --minutes {duration / 60.0:.6g}"
+    raise DataError(
+        f"walk '{name}': the device uses {species}, but bottle '{full.name}' contains {full.fluid.name}; "
+        f"repeat the walk with '{command} --out FOLDER' and give FOLDER, or choose a bottle of {species}"
     )
 
 

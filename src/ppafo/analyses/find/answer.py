@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.analyses.find.solve import FOLLOWS, FindResult
+from ppafo.analyses.find.solve import FOLLOWS, REFUSED, FindResult
 from ppafo.parameters.overrides import over
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric, of_path
@@ -145,6 +145,8 @@ def _verdict(outcome: FindResult, kind: Kind) -> str:
     # Verdicts have the number that decided, in a line of their own.
     number = of_condition.text(float(tried["metric"][index]))
     there = "" if outcome.verdicts else f": {condition.metric} is {number} there"
+    if any(said.startswith(REFUSED) for _, said in outcome.verdicts[1:]):
+        lead = f"{path} = {kind.text(value)} is the {wanted} value that is not refused; it {meets}"
     if neighbour is None:
         return f"{lead}, at the end of the range{there}; a wider range may have a {further} value"
     return f"{lead}{there} (bracketed to {kind.change(abs(value - neighbour), '.1g')})"
@@ -164,22 +166,13 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
     )
     if (changes := np.count_nonzero(np.diff(is_met))) > 1:
         side = "below" if outcome.highest else "above"
-        yield (
-            f"the condition changes {changes} times over the range, so it is not met everywhere {side} this "
-            "value; see the table and the figure"
-        )
-    if outcome.noise_streams:
-        noise = (
-            f"sensors are noisy: the metric is the mean over {outcome.noise_streams} noise streams, the same for all "
-            "values"
-        )
+        yield f"the condition changes {changes} times over the range, so it is not met everywhere {side} this value"
+    if streams := outcome.noise_streams:
+        spread = ""
         if index is not None:
-            noise += (
-                f"; at the value that was found it varies by "
-                f"{of_metric(condition.metric).change(float(tried['spread'][index]))} (standard deviation) from stream "
-                "to stream, so a single run may miss the condition there"
-            )
-        yield noise
+            varies = of_metric(condition.metric).change(float(tried["spread"][index]))
+            spread = f"; at the value found it varies by {varies} (standard deviation): one run may miss the condition"
+        yield f"sensors are noisy: the metric is the mean over {streams} noise streams, the same for all values{spread}"
     if unsettled := int(tried["unsettled"].sum()):
         yield (
             f"in {unsettled} runs the loop still oscillates in the second half of the hold, so {condition.metric} "

@@ -36,6 +36,8 @@ _SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 FOLLOWS = "follows"
 """Text of the condition that the run follows its reference, by the verdict of ``simulate``."""
+REFUSED = "the value is refused:"
+"""Beginning of the verdict on a value that makes no run."""
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
@@ -217,7 +219,7 @@ def outermost(
             )
         reason = f"; the first: {runs.reason}" if runs.reason else ""
         raise StudyError(f"scenario '{base.name}': no run {ends} gives the metric '{condition.metric}'{reason}")
-    # All parts of a bracket side by side: a bisection would wait for every one of its runs.
+    # The runs of a bracket are simulated side by side, which is faster than one run at a time by bisection.
     index, neighbour = search.found
     while index is not None and neighbour is not None:
         value = float(search.tried["value"][index])
@@ -226,17 +228,12 @@ def outermost(
         search = search.with_values(base, np.linspace(value, neighbour, _PARTS + 1)[1:-1], seeds, False)
         index, neighbour = search.found
     # With noise a single run does not represent the mean over the noise streams.
-    is_single_run = condition.text == FOLLOWS and not seeds.size
-    return replace(search, verdicts=_verdicts(search, base)) if is_single_run else search
-
-
-def _verdicts(search: FindResult, base: Scenario) -> tuple[tuple[float, str], ...]:
-    """Return the value found and its outer neighbour, or else the nearest value, with the verdict of a run of each."""
-    index, neighbour = search.found
+    if condition.text != FOLLOWS or seeds.size:
+        return search
+    # The value found and its outer neighbour, or else the nearest value.
     values = [search.nearest if index is None else float(search.tried["value"][index])]
-    if neighbour is not None:
-        values.append(neighbour)
-    return tuple((value, _verdict(base, f"{search.path.path}={value!r} {SI}")) for value in values)
+    values += [] if neighbour is None else [neighbour]
+    return replace(search, verdicts=tuple((value, _verdict(base, f"{path.path}={value!r} {SI}")) for value in values))
 
 
 def _verdict(base: Scenario, override: str) -> str:
@@ -244,5 +241,5 @@ def _verdict(base: Scenario, override: str) -> str:
     try:
         result = simulate(with_overrides(base, [override]))
     except (ParameterError, ScenarioError) as error:
-        return f"the value is refused: {error}"
+        return f"{REFUSED} {error}"
     return result.following if result.tracking is None else result.tracking.found

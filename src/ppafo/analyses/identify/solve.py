@@ -72,7 +72,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
                 )
             ]
             tasks.append(_Task(procedure, tuple(sources), f"{file}: procedure {number}, {procedure.kind}"))
-        # In the order in which they are applied.
+        # Each procedure uses the results of the earlier ones.
         tasks.sort(key=lambda task: PROCEDURES.index(task.procedure.kind))
         used = _used_recordings(tasks, before, valve, file)
         tolerances = tolerances_of(problem.bench, file)
@@ -205,8 +205,7 @@ def _used_recordings(tasks: Sequence[_Task], before: ParameterSet, valve: str, f
             used = UsedRecording(name, source.trace, source.recording, frozenset(), *window)
             by_procedure.setdefault(kind, []).append(used)
     for recordings in by_procedure.values():
-        used_twice = double_use(recordings)
-        if used_twice:
+        if used_twice := double_use(recordings):
             raise IdentificationError(f"{file}: {used_twice}")
     return tuple(used for recordings in by_procedure.values() for used in recordings)
 

@@ -13,7 +13,7 @@ from ppafo.validation.causes import Diagnosis, ResidualCause
 from ppafo.validation.compared import COMPARED
 from ppafo.validation.settings import ReplaySettings
 from ppafo.version import __version__
-from ppafo.wording import argument_text
+from ppafo.wording import argument_text, count_of
 
 _EXPLAINS = 0.5
 """Largest ratio of the residual with the nearest cause to the residual without a cause at which a cause is named."""
@@ -75,20 +75,18 @@ def verdict(validation: Validation) -> str:
         for channel, agreement in pairs
         if not channel.passes
     )
-    why = _why(validation.causes, worst.in_noise, validation.passes)
-    explanation = (
-        "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])
-    )
-    if not validation.passes:
+    why, causes = _why(validation.causes, worst.in_noise, validation.passes), validation.causes
+    moved = ""
+    if not validation.passes and causes.found is None and any(row.motion == "free" for row in validation.recordings):
         # A cause is searched with the motion as it was said, which is wrong for a device that something else moved.
-        is_found = validation.causes.found is not None
-        is_free = not is_found and any(agreement.motion == "free" for agreement in validation.recordings)
         motion = argument_text("motion", "leg")
-        moved = f"; if the device was on a leg, locked or driven, give {motion}, locked or measured" if is_free else ""
-        return f"{name} does not agree: {failed}; {explanation}{moved}"
-    return (
-        f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {explanation}"
-    )
+        moved = f"if the device was on a leg, locked or driven, give {motion}, locked or measured first"
+    explanation = "nothing but noise is left" if causes.is_noise else "; ".join(filter(None, (size, moved, why)))
+    if not validation.passes:
+        return f"{name} does not agree: {failed}; {explanation}"
+    wide = f" ({worst.channel}: {100 * worst.limit:.3g} %, which is wider than the noise and may hide a wrong number)"
+    limit = f"every RMS error is within its limit{'' if causes.is_noise else wide}"
+    return f"{name} agrees with {count_of(count, 'recording')}: {limit}; {explanation}"
 
 
 def _why(causes: Diagnosis, without: float, passes: bool) -> str:

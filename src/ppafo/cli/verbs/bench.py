@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -49,7 +50,10 @@ def rig_simulate(
     files = write_rig_recording(out, rig_recording)
     recording = rig_recording.recording
     samples = f"{len(recording)} samples of {', '.join(recording.names)}"
-    lines = (f"{experiment}: {NOTICE}", rig_recording.truth.get("replaced", ""), samples)
+    lines = [f"{experiment}: {NOTICE}", rig_recording.truth.get("replaced", ""), samples]
+    if {"angle", "command"} <= set(recording.names):
+        words = ["ppafo", "validate", device, str(out / files[0]), *(() if valve is None else ("--valve", valve))]
+        lines.append(f"to compare: {shlex.join([*words, '--motion', rig_recording.motion])}")
     text = "\n".join((*filter(None, lines), f"written: {out} ({', '.join(files)})"))
     return CommandOutput(text, {"folder": str(out), "files": list(files), **rig_recording.truth})
 

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from types import FunctionType
 from typing import Any, NamedTuple
 
 from ppafo.engine.entries import HEADER, INLINE, indent, without_origins
@@ -25,12 +24,6 @@ from ppafo.metrics.metric import ReadAt, Readings
 from ppafo.model.columns import over_runs
 from ppafo.model.one_run import FOR_ONE_RUN
 from ppafo.translation.value_types import FLOAT, INT, Array, Row, RowReference, Type
-
-
-def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
-    """Return the definition of a function specialised for a single run."""
-    tree = _ForOneRun(function.__globals__).visit(tree)
-    return ast.fix_missing_locations(tree)
 
 
 class _ForOneRun(ast.NodeTransformer):
@@ -64,7 +57,11 @@ class _ForOneRun(ast.NodeTransformer):
 
 def _collector() -> SourceCollector:
     """Return a collector of functions that specialises array functions for a single run."""
-    return SourceCollector(INLINE, for_one_run, replacements=Replacements(everywhere=dict(FOR_ONE_RUN)))
+    return SourceCollector(
+        INLINE,
+        lambda function, tree: ast.fix_missing_locations(_ForOneRun(function.__globals__).visit(tree)),
+        replacements=Replacements(everywhere=dict(FOR_ONE_RUN)),
+    )
 
 
 LOOP_TYPES: tuple[Type, ...] = (

@@ -15,7 +15,7 @@ from ppafo.gait.mean_stride import MeanStride
 from ppafo.gait.plausible import check_plausible
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.curves import CurveStatistics, check_scatter, over_strides, statistics
-from ppafo.gait.recorded.footfalls import Footfalls, Stride, find_footfalls, strides_of_curve, strides_within
+from ppafo.gait.recorded.footfalls import SHANK, Footfalls, Stride, find_footfalls, strides_of_curve, strides_within
 from ppafo.gait.recorded.knee import check_direction
 from ppafo.gait.recorded.mapping import ImportSettings, check_settings
 from ppafo.gait.recorded.remarks import import_remarks
@@ -68,7 +68,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     except PpafoError as error:
         raise_noted([*wrong, error])
     curves, strides, unmeasured = _curves_over_strides(source, footfalls, wrong)
-    mean_stride = _mean_stride(source, curves, strides)
+    mean_stride = _mean_stride(source, footfalls.events, curves, strides)
     fitted = {name: fit_curve(curve.mean, HARMONICS[name], curve.spread) for name, curve in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     walk = {name: footfalls.walk[name] for name in curves}
@@ -142,7 +142,9 @@ def _curves_over_strides(
     return remaining, strides, remarks
 
 
-def _mean_stride(source: GaitSource, curves: Mapping[str, CurveStatistics], strides: StrideSelection) -> MeanStride:
+def _mean_stride(
+    source: GaitSource, events: str, curves: Mapping[str, CurveStatistics], strides: StrideSelection
+) -> MeanStride:
     """Return the mean curves with stance fraction and stride time, as the plausibility checks need them."""
     # Both coordinates of the knee may be from one marker, whose scale is one.
     knee, is_one_marker = source.columns.knee, False
@@ -156,6 +158,7 @@ def _mean_stride(source: GaitSource, curves: Mapping[str, CurveStatistics], stri
         stride_time=float(np.mean([stride.time for stride in strides.taken])),
         signs_from=source.signs_from,
         is_knee_one_marker=is_one_marker,
+        is_toe_off_guessed=events == SHANK and "vertical_force" not in curves,
     )
 
 

@@ -81,11 +81,11 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
 
     Raises DataError for an implausible length of the thigh.
     """
-    if mapped is None:
-        return []
-    if "knee_forward" not in walk:
-        missing = f"the thigh length is unknown; give {setting_text('stature')}, or a gait map with knee.thigh_length"
-        return [f"no acceleration of the knee: {missing}"] if mapped.thigh is not None else []
+    if mapped is None or "knee_forward" not in walk:
+        why = "no columns of the knee were found; name them by knee.forward and knee.up of a gait map"
+        if mapped is not None and mapped.thigh is not None:
+            why = f"the thigh length is unknown; give {setting_text('stature')}, or a gait map with knee.thigh_length"
+        return [f"no acceleration of the knee: {why}"]
     remarks = []
     if mapped.thigh is not None and mapped.thigh_length is None:
         remarks.append(

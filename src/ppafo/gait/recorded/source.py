@@ -105,14 +105,6 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
     return Convention(GaitMap(**columns), () if has_force else plates, remarks, curve_remarks)
 
 
-def _arranged(table: MotionTable, own: Set[str]) -> MotionTable:
-    """Return a table as its format arranges it, with the columns ``own`` that a gait map names as the file has them."""
-    found = FORMS[table.form].arrange(table)
-    kept = own & table.columns.keys()
-    units = {**found.units, **{name: table.units[name] for name in kept}}
-    return replace(found, columns={**found.columns, **{name: table.columns[name] for name in kept}}, units=units)
-
-
 def _named_in(own: GaitMap | None) -> dict[str, list[str]]:
     """Return the columns that a user's map names, by curve in the order of the map, without their signs."""
     given = set[str]() if own is None else own.model_fields_set - {"schema_version"}
@@ -155,6 +147,8 @@ def _is_there(mapped: object, table: MotionTable) -> bool:
 
 _SAME = 0.02
 """Relative difference up to which two statements of the body mass count as equal."""
+_UNIT_BODY_MASS = 1.0
+"""Body mass [kg] that divides the loads of a person of unknown body mass."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,22 +173,12 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
 
     Raises DataError for a problem that ends the import, including all problems in ``wrong``.
     """
-    if not files:
-        raise DataError("no file was given; a gait needs at least shank and ankle angles")
-    cut, tables = (settings.longest_gap, *((None, None) if wrong else (settings.start, settings.end))), []
-    for path in files:
-        with noted_in(wrong):
-            tables.append(read_table(path, *cut, settings.form))
-    if len(tables) < len(files):
-        raise_noted(wrong)
-    wrong += [DataError(table.problem) for table in tables if table.problem]
-    is_usable = not wrong
     own, named = settings.columns, _named_in(settings.columns)
-    # A user's map names columns as the file has them; the convention of the format names them as arranged.
-    tables = [_arranged(table, {column for columns in named.values() for column in columns}) for table in tables]
+    tables = _read_tables(files, settings, {column for columns in named.values() for column in columns}, wrong)
+    # The columns of unusable tables are still checked, before the import ends.
+    is_usable = not wrong
     settings, remarks = _with_subject(settings, tables, wrong)
-    # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
-    body_mass = settings.body_mass or 1.0
+    body_mass = settings.body_mass or _UNIT_BODY_MASS
     try:
         convention = _completed_map(own, tables, settings.side, body_mass)
     except DataError as error:
@@ -203,7 +187,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     if settings.ankle_neutral is not None:
         neutral = {"neutral": format_quantity(settings.ankle_neutral, "rad")}
         columns = columns.model_copy(update={"ankle_angle": columns.ankle_angle.model_copy(update=neutral)})
-    # Only the columns in use: a gap elsewhere needs no word. A load of exactly 0 is a foot off the plate.
+    # Gaps matter in the columns in use only. A load of exactly 0 is no lost marker but a foot off the plate.
     used = _named_in(columns)
     names = [column for terms in used.values() for column in terms]
     moved = [column for name, terms in used.items() if name not in LOADS for column in terms]
@@ -216,25 +200,67 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         remarks.append(f"not in the gait map, read as the {settings.side} foot by the file format: {shown}")
     if not is_usable:
         raise_noted(wrong)
-    if settings.body_mass is None:
-        walk |= {name: of_largest_one(walk[name]) for name in ("ankle_moment", FORCE) if name in walk}
-    if convention.plates and FORCE not in walk and settings.body_mass is not None:
+    signs_from: SignSource = "columns" if own is None else "map"
+    walk, on_plates = _with_loads(walk, tables, convention, settings.body_mass, signs_from, wrong)
+    remarks += [*on_plates, *convention.remarks, *(remark for _, remark in convention.curve_remarks)]
+    remarks += [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
+    return GaitSource(tables, columns, walk, settings, signs_from, (*remarks, *_ends(walk, tables)))
+
+
+def _read_tables(
+    files: Sequence[str | Path], settings: ImportSettings, own: Set[str], wrong: list[PpafoError]
+) -> list[MotionTable]:
+    """Return the tables of files as their formats arrange them, with the columns ``own`` as the files have them.
+
+    ``own`` are the columns in a user's gait map, which names them as the files do; the convention of a format names
+    them as arranged. Problems of a table are added to ``wrong``. Raises DataError if a file cannot be read.
+    """
+    if not files:
+        raise DataError("no file was given; a gait needs at least shank and ankle angles")
+    start, end = (None, None) if wrong else (settings.start, settings.end)
+    read: list[MotionTable] = []
+    for path in files:
         with noted_in(wrong):
-            force, more = force_of_plates(tables, convention.plates, walk["shank_angle"], body_mass)
+            read.append(read_table(path, settings.longest_gap, start, end, settings.form))
+    if len(read) < len(files):
+        raise_noted(wrong)
+    wrong += [DataError(table.problem) for table in read if table.problem]
+    arranged = []
+    for table in read:
+        found, kept = FORMS[table.form].arrange(table), own & table.columns.keys()
+        columns = {**found.columns, **{name: table.columns[name] for name in kept}}
+        units = {**found.units, **{name: table.units[name] for name in kept}}
+        arranged.append(replace(found, columns=columns, units=units))
+    return arranged
+
+
+def _with_loads(
+    walk: dict[str, Signal],
+    tables: Sequence[MotionTable],
+    convention: Convention,
+    body_mass: float | None,
+    signs_from: SignSource,
+    wrong: list[PpafoError],
+) -> tuple[dict[str, Signal], list[str]]:
+    """Return the signals with loads of a known scale, and remarks on the force plates.
+
+    Without a force in the files, the plates that this foot steps on give the force. Loads of unknown body mass,
+    and a force of a wrong scale, which is added to ``wrong``, get a largest value of 1: their events are still found.
+    """
+    remarks: list[str] = []
+    if body_mass is None:
+        walk |= {name: of_largest_one(walk[name]) for name in ("ankle_moment", FORCE) if name in walk}
+    elif convention.plates and FORCE not in walk:
+        with noted_in(wrong):
+            force, remarks = force_of_plates(tables, convention.plates, walk["shank_angle"], body_mass)
             walk |= {} if force is None else {FORCE: force}
-            remarks += more
-    mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
-    mended += _ends(walk, tables)
-    remarks += [*convention.remarks, *(remark for _, remark in convention.curve_remarks)]
-    signs_from: SignSource = "columns" if settings.columns is None else "map"
     if FORCE in walk:
         try:
             check_force_scale(walk[FORCE].file, walk[FORCE].values, signs_from)
         except DataError as error:
             wrong.append(error)
-            # Scaled to 1, so that its events are still found.
             walk[FORCE] = of_largest_one(walk[FORCE], is_upwards=True)
-    return GaitSource(tables, columns, walk, settings, signs_from, (*remarks, *mended))
+    return walk, remarks
 
 
 def of_largest_one(signal: Signal, is_upwards: bool = False) -> Signal:

@@ -46,9 +46,7 @@ class ChamberDecay(NamedTuple):
     def changes(self) -> tuple[float, float]:
         """Fall of the pressure in the fuller chamber, and rise in the other chamber [Pa]."""
         edge = self.edge
-        fall, rise = (
-            float(np.mean(pressure[-edge:]) - np.mean(pressure[:edge])) for pressure in (self.first, self.second)
-        )
+        fall, rise = (float(np.mean(each[-edge:]) - np.mean(each[:edge])) for each in (self.first, self.second))
         return -fall, rise
 
     @property
@@ -149,9 +147,7 @@ def pressures_of_fall(
         times: times since the start [s]
     """
     start = max(first - second, _LEAST_DIFFERENCE)
-    is_first_room = math.isinf(ratio)
-    share_of_rise = 1.0 if is_first_room else ratio / (1.0 + ratio)
-    both_chambers = 1.0 if is_first_room else 1.0 + ratio
+    share_of_rise, both_chambers = (1.0, 1.0) if math.isinf(ratio) else (ratio / (1.0 + ratio), 1.0 + ratio)
     # A laminar leak falls exponentially, so that equal steps of ln D are equal steps of time.
     logs = np.linspace(0.0, -math.log(_LOWEST), _POINTS)
     difference = start * np.exp(-logs)

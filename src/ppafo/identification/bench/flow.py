@@ -226,8 +226,7 @@ def reported_parts(
     """
     if opening.law != "both":
         return [size], Paths(size.path)
-    parts = [replace(size, size=alone.size), replace(gap, size=alone.beside)]
-    return parts, Paths(size.path, beside=gap.path)
+    return [replace(size, size=alone.size), replace(gap, size=alone.beside)], Paths(size.path, beside=gap.path)
 
 
 def solve_flow(
@@ -242,9 +241,8 @@ def solve_flow(
 
     ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second.
     """
-    names, flow = (*pressures,), readings.measured
-    largest = float(np.abs(flow).max())
-    shown_first, shown_second = pressures.values()
+    (first_name, shown_first), (second_name, shown_second) = pressures.items()
+    flow = readings.measured
 
     def law(at: Values) -> Floats:
         first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
@@ -255,7 +253,7 @@ def solve_flow(
     start, alone = opening.rough_sizes(shown_first, shown_second, flow)
     numbers = (
         *paths.sought(start, alone),
-        *flow_tolerances(opening.gas, tolerances, (names[0], names[1]), largest),
+        *flow_tolerances(opening.gas, tolerances, (first_name, second_name), float(np.abs(flow).max())),
         # A gain that differs between small and large flows bends the curve of one opening as a gap beside it does.
         *(within(APPARENT, tolerances.gain_of("mass_flow") * alone.beside) if opening.law == "both" else ()),
     )

@@ -110,6 +110,8 @@ _START_ANGLE, _START_SPEED = "start angle {}", "start speed {}"
 """Names of the variables for initial angle [rad] and speed [rad/s], by number of the decay."""
 _USUAL_RISE_VELOCITY, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY = 0.1, 1.0e-3, 2.0
 """Velocity at which the friction rise is halved [rad/s]: usual, lowest and highest value."""
+_UNIT_INERTIA = 1.0
+"""Inertia [kg m^2] in place of an unknown one: the fitted parameters are then parameters divided by the inertia."""
 _LEAST_SPEED, _LEAST_SWEPT = 1.0e-6, 1.0e-9
 """Least initial speed [rad/s] and swept angle [rad] for a fit without visible motion."""
 _MOVING = 0.03
@@ -150,55 +152,16 @@ def free_decay(
     sources, remarks = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)
     decays = tuple(decay_of(source, start, end) for source in sources)
     damping, friction = _OF_THE_DEVICE if inertia else _OVER_INERTIA
-    # An inertia of 1 kg m^2 stands for none.
-    stated_inertia = inertia or 1.0
-
-    def slowing_at(at: Values, moved: float) -> Slowing:
-        return Slowing(
-            damping_rate=max(at[damping.path], 0.0) / moved,
-            deceleration=max(at[friction.path], 0.0) / moved,
-            rise=math.expm1(at.get(_RISE, 0.0)),
-            rise_velocity=at.get(_RISE_VELOCITY, 0.0),
-        )
-
-    def law(at: Values) -> Floats:
-        slowing, series = slowing_at(at, stated_inertia * (1.0 + at[_INERTIA])), []
-        for number, decay in enumerate(decays, start=1):
-            _, swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
-            series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
-            if decay.velocity is not None:
-                series.append(decay.sign * speed)
-        return np.concatenate(series)
-
-    starts, rates = list[FitVariable](), []
-    for number, decay in enumerate(decays, start=1):
-        velocity, _ = smoothed_rates(decay.time, decay.angle)
-        speed = max(float(np.abs(velocity[:FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
-        swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
-        starts.append(sought(_START_ANGLE.format(number), float(decay.angle[0]), scale=swept))
-        # The direction is the push's: a speed of 0 or below would be another decay.
-        starts.append(sought(_START_SPEED.format(number), speed, 1e-9 * speed, 10.0 * speed))
-        # With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
-        # deceleration: half of each is a start between the two.
-        rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
-    damping_rate, deceleration = (float(median) for median in np.median(rates, axis=0))
-    most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
-    # Between no rise and all of it nothing is known, not even the order of magnitude: an even distribution of the
-    # logarithm, its width over the root of 12.
-    near_rest = (
-        FitVariable(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
-        FitVariable(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
-    )
+    paths, assumed_inertia = (damping.path, friction.path), inertia or _UNIT_INERTIA
     numbers = (
-        sought(damping.path, stated_inertia * damping_rate, 0.0),
-        sought(friction.path, stated_inertia * deceleration, 0.0),
-        *starts,
-        *(near_rest if most > 0.0 else ()),
-        *tolerance(_INERTIA, inertia_deviation / stated_inertia),
+        *_unknowns(decays, paths, assumed_inertia, rise),
+        *tolerance(_INERTIA, inertia_deviation / assumed_inertia),
         *within(_GAIN, tolerances.gain_of(ANGLE)),
     )
-    fit, model = solve(law, _readings(sources, decays), numbers, confidence)
-    slowing = slowing_at(fit.by_name, stated_inertia)
+    fit, model = solve(
+        lambda at: _shown_motion(at, decays, paths, assumed_inertia), _readings(sources, decays), numbers, confidence
+    )
+    slowing = _slowing(fit.by_name, paths, assumed_inertia)
     at_rest = sum(
         float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
         for number, decay in enumerate(decays, start=1)
@@ -216,6 +179,59 @@ def free_decay(
         _panels(decays, model, slowing),
         "another torque acts, such as gravity, an end stop or friction that depends differently on speed",
         remarks,
+    )
+
+
+def _slowing(at: Values, paths: tuple[str, str], inertia: float) -> Slowing:
+    """Return the deceleration law for values of the unknowns; ``paths`` name damping and friction in the fit."""
+    return Slowing(
+        damping_rate=max(at[paths[0]], 0.0) / inertia,
+        deceleration=max(at[paths[1]], 0.0) / inertia,
+        rise=math.expm1(at.get(_RISE, 0.0)),
+        rise_velocity=at.get(_RISE_VELOCITY, 0.0),
+    )
+
+
+def _shown_motion(at: Values, decays: tuple[FreeDecay, ...], paths: tuple[str, str], inertia: float) -> Floats:
+    """Return the readings of angle [rad] and recorded velocity [rad/s] over all decays, for values of the unknowns."""
+    slowing, series = _slowing(at, paths, inertia * (1.0 + at[_INERTIA])), []
+    for number, decay in enumerate(decays, start=1):
+        _, swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
+        series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
+        if decay.velocity is not None:
+            series.append(decay.sign * speed)
+    return np.concatenate(series)
+
+
+def _unknowns(
+    decays: tuple[FreeDecay, ...], paths: tuple[str, str], inertia: float, rise: float
+) -> tuple[FitVariable, ...]:
+    """Return damping, friction, initial angle and speed of each decay, and the rise of the friction near standstill.
+
+    With w_0 the initial speed and s the swept angle, viscous damping alone has the rate w_0 / s, and Coulomb friction
+    alone the deceleration w_0^2 / (2 s); the search starts from half of each.
+    """
+    initial, rates = list[FitVariable](), []
+    for number, decay in enumerate(decays, start=1):
+        velocity, _ = smoothed_rates(decay.time, decay.angle)
+        speed = max(float(np.abs(velocity[:FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
+        swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
+        initial.append(sought(_START_ANGLE.format(number), float(decay.angle[0]), scale=swept))
+        # The sign of the decay has the direction, so that the speed is positive.
+        initial.append(sought(_START_SPEED.format(number), speed, 1e-9 * speed, 10.0 * speed))
+        rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
+    damping_rate, deceleration = (float(median) for median in np.median(rates, axis=0))
+    # The prior of ln(1 + q) is uniform up to ``rise``: its standard deviation is its width over sqrt(12).
+    most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
+    near_rest = (
+        FitVariable(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
+        FitVariable(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
+    )
+    return (
+        sought(paths[0], inertia * damping_rate, 0.0),
+        sought(paths[1], inertia * deceleration, 0.0),
+        *initial,
+        *(near_rest if most > 0.0 else ()),
     )
 
 
@@ -239,7 +255,7 @@ def _readings(sources: tuple[RecordingSource, ...], decays: tuple[FreeDecay, ...
             if values is not None:
                 series.append(values)
                 sensors += [sensor] * values.size
-                # A law that is wrong parts the fast from the slow.
+                # A wrong law gives different parameters for fast and for slow motion.
                 halves += ["the first half of the travel"] * half + ["the second half of the travel"] * (
                     values.size - half
                 )

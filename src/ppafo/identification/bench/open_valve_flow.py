@@ -20,7 +20,6 @@ from ppafo.identification.bench.flow import (
     GasAt,
     Law,
     Opening,
-    Paths,
     orifice_shape,
     reported_parts,
     solve_flow,
@@ -96,7 +95,11 @@ def open_valve_flow(
         )
     # In parallel with a laminar gap, b selects ISO 6358; the law ``iso6358`` estimates b.
     opening = Opening(gas, law, area or PRODUCT_ONLY, critical_ratio if law == "both" else None)
-    reported, paths = _reported(opening, area, path, readings)
+    _, alone = opening.rough_sizes(upstream, readings.downstream, flow)
+    reported, paths = reported_parts(opening, _size(opening, area, path), _GAP, alone)
+    if law == "iso6358":
+        reported.append(ReportedNumber(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358"))
+        paths = paths._replace(critical_ratio=reported[-1].path)
     # The nearer the pressures are to each other, the more their noise affects the computed flow.
     limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
     regimes = [_REGIMES[regime] for regime in np.digitize(ratio, limits).tolist()]
@@ -197,18 +200,6 @@ def _open_readings(sources: tuple[RecordingSource, ...], gas: GasAt, tolerances:
         labels=np.array(recordings_of(sources))[used].tolist(),
         remarks=(*remarks, *meter_remarks),
     )
-
-
-def _reported(
-    opening: Opening, area: float | None, path: str, readings: _OpenReadings
-) -> tuple[list[ReportedNumber], Paths]:
-    """Return the quantities to report, starting with the size of the opening, and their names in the fit."""
-    size = _size(opening, area, path)
-    if opening.law == "iso6358":
-        ratio = ReportedNumber(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358")
-        return [size, ratio], Paths(size.path, critical_ratio=ratio.path)
-    _, alone = opening.rough_sizes(readings.upstream, readings.downstream, readings.flow)
-    return reported_parts(opening, size, _GAP, alone)
 
 
 def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:

@@ -204,10 +204,9 @@ def _closed_leak(
     tolerances: Tolerances,
     confidence: float,
 ) -> BenchResult:
-    """Identify the leak from the pressures in closed chambers; ``volumes`` are those of chambers 1 and 2 [m^3]."""
-    fuller = decays[0].fuller
+    """Identify the leak from the pressures in closed chambers; ``volumes`` are V of chambers 1 and 2 [m^3]."""
     # The chamber whose pressure determines the leak empties, or fills from a room.
-    chamber = fuller if decays[0].changing == 0 else 3 - fuller
+    chamber = decays[0].fuller if decays[0].changing == 0 else 3 - decays[0].fuller
     volume, other_volume = volumes if chamber == 1 else volumes[::-1]
     gap = _GAP
     if volume is None:
@@ -231,10 +230,8 @@ def _closed_leak(
     time, models = np.concatenate(times), np.split(model, np.cumsum([values.size for values in times])[:-1])
     # The legend names the first curve only.
     names = [opening.law, *[""] * (len(times) - 1)]
-    marks = [
-        readings_mark("measured", time, readings.measured),
-        *(curve_mark(*curve) for curve in zip(names, times, models, strict=True)),
-    ]
+    marks = [readings_mark("measured", time, readings.measured)]
+    marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
     is_room = all(decay.room is not None for decay in decays)
     room = (f"the pressure in chamber {3 - chamber} is constant, so it is treated as a reservoir",) if is_room else ()
     longest = max(float(decay.time[-1]) for decay in decays)
@@ -266,20 +263,18 @@ def _rough_sizes(
 ) -> tuple[OpeningSizes, OpeningSizes]:
     """Return start sizes, and the sizes if each part of the leak alone caused the mean rate of the pressure change."""
     rate = opening.gas.specific_gas_constant * opening.gas.temperature / volume
-
-    def alone(unit: OpeningSizes) -> float:
+    orifice, gap_alone, alone = OpeningSizes(1.0), OpeningSizes(0.0, beside=1.0), []
+    for unit in (orifice, gap_alone) if opening.law == "both" else (orifice,):
         sizes = []
         for decay in decays:
             flow = float(np.mean(opening.flow(unit, decay.first, decay.second)))
             scatter = float(np.std(np.diff((decay.first, decay.second)[decay.changing])))
             change = max(decay.changes[decay.changing], _SCATTER_OF_CHANGE * scatter, _LEAST_CHANGE)
             sizes.append(change / (rate * flow * float(decay.time[-1])))
-        return float(np.mean(sizes))
-
-    size = alone(OpeningSizes(1.0))
+        alone.append(float(np.mean(sizes)))
     if opening.law != "both":
-        return OpeningSizes(size), OpeningSizes(size)
-    gap = alone(OpeningSizes(0.0, beside=1.0))
+        return OpeningSizes(*alone), OpeningSizes(*alone)
+    size, gap = alone
     # The search starts from equal contributions of orifice and gap.
     return OpeningSizes(0.5 * size, beside=0.5 * gap), OpeningSizes(size, beside=gap)
 
@@ -311,8 +306,7 @@ def _unknowns(
         for sensor, _ in decay.fitted:
             unknowns += within(_RELAXED_BY.format(sensor, decay.number), _MOST_RELAXED)
     # Only the order of magnitude of tau is known, so the variable is its logarithm.
-    highest = math.log(_RELAXED)
-    return [*unknowns, FitVariable(_RELAXATION, 0.0, low=-5.0, high=highest, scale=1.0, deviation=1.5)]
+    return [*unknowns, FitVariable(_RELAXATION, 0.0, low=-5.0, high=math.log(_RELAXED), scale=1.0, deviation=1.5)]
 
 
 def _shown_pressures(

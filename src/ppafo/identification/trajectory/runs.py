@@ -26,6 +26,7 @@ from ppafo.identification.trajectory.experiment import FittedExperiment, scenari
 from ppafo.identification.trajectory.numbers import GAIN_OF, TIME_OFFSET, ZERO_OF, FitNumber, with_numbers
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
+from ppafo.parameters.device import Device
 from ppafo.parameters.effects import switches_of
 from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.simulation.plan import plan_run
@@ -90,7 +91,7 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
     """
     recording, where = experiment.recording, f"experiment '{experiment.label}'"
     inside = recording.time >= experiment.start - _FITS
-    # A sample that rounding puts before the start is the one at the start.
+    # Rounding may put the first sample just before the start.
     time = np.maximum(recording.time[inside] - experiment.start, 0.0)
     if time.size < MINIMUM_SAMPLES:
         raise IdentificationError(
@@ -104,7 +105,7 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
     stops = actuator.angle_min, actuator.angle_max
     for channel in channels:
         clipped = max(plateaus(channel.values), key=lambda plateau: plateau.count)
-        # A vane that rests at its stop repeats one value on a coarse converter, and is at no limit of a sensor.
+        # With a coarse converter, a vane that rests at its stop repeats one value without saturation of the sensor.
         rests = channel.name == ANGLE and any(abs(clipped.value - stop) < _ZERO_OF_ANGLE for stop in stops)
         has_noise = channel.floor > 0.0 or noise_of(channel.values) > 0.0
         if is_at_limit(channel.values, clipped) and not (rests or has_noise):
@@ -188,16 +189,14 @@ def signals_of(
 
     A failed run is NaN throughout. Experiments run in parallel, one thread each.
     """
-
-    def signals(prepared: _PreparedExperiment) -> dict[str, Floats]:
-        return signals_at(prepared, columns_in(prepared.label, numbers, points), points.shape[1])
-
-    # Compiled runs release the interpreter.
+    columns = [columns_in(prepared.label, numbers, points) for prepared in experiments]
+    arguments = experiments, columns, [points.shape[1]] * len(experiments)
     workers = min(len(experiments), os.cpu_count() or 1)
     if workers == 1:
-        return [signals(prepared) for prepared in experiments]
+        return list(map(signals_at, *arguments))
+    # Threads run at the same time, because compiled runs release the lock of the interpreter.
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(signals, experiments))
+        return list(pool.map(signals_at, *arguments))
 
 
 def residuals_of(experiments: Sequence[_PreparedExperiment], numbers: Sequence[FitNumber], points: Floats) -> Floats:
@@ -222,7 +221,7 @@ def blocks_of(
     """
     blocks, first = [], 0
     coarse = signals_of(experiments, numbers, point[:, None])
-    # The error is about in proportion to what is allowed, so that half as long steps show most of it.
+    # The error is nearly proportional to the tolerance, so that finer runs show most of the error.
     halved = []
     for prepared in experiments:
         scenario = replace(prepared.scenario, run=replace(prepared.scenario.run, step=0.5 * prepared.run.step))
@@ -242,16 +241,8 @@ def blocks_of(
 
 
 _NUMBERS_OF_RUN = (
-    "plant",
-    "thermal",
-    "valve_orifice",
-    "leak_orifice",
-    "initial",
-    "valve",
-    "command_delay",
-    "lines",
-    "effects",
-    "leg",
+    *("plant", "thermal", "valve_orifice", "leak_orifice", "initial"),
+    *("valve", "command_delay", "lines", "effects", "leg"),
 )
 """Fields of a run that depend on the parameters of its scenario; program, clock and prescribed motion do not."""
 
@@ -262,42 +253,45 @@ def run_with(prepared: _PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     A parameter may be an array (runs,). Raises IdentificationError if a valve setting or an effect changes to or from
     0, which would need another program.
     """
-    base = prepared.run
-    scenario = with_numbers(prepared.scenario, numbers)
-    device = scenario.device
-    where, planned_settings = f"experiment '{prepared.label}'", prepared.scenario.device.valve.settings
+    base, scenario = prepared.run, with_numbers(prepared.scenario, numbers)
+    _check_same_program(prepared, scenario.device, numbers)
+    planned, _ = scenario.motion.motion_kind.plan(scenario)
+    # The tolerance is a fraction of the supply pressure: with a fitted pressure, the error in pascals must stay.
+    plant = planned.plant
+    supply_ranges = over_runs(
+        lambda first, second, atmosphere: supply_range(
+            plant._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
+        ),
+        *(plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure),
+    )
+    tolerance = base.tolerance * (supply_range(base.plant) / supply_ranges)
+    return replace(base, tolerance=tolerance, **{name: getattr(planned, name) for name in _NUMBERS_OF_RUN})
+
+
+def _check_same_program(prepared: _PreparedExperiment, device: Device, numbers: Mapping[str, Any]) -> None:
+    """Raise IdentificationError if a device with changed parameters needs another program than was prepared.
+
+    A setting of the valve, or a parameter of an effect, that changes to or from 0 selects another model. ``numbers``
+    are the changed parameters [SI] by path, each a number or an array (runs,).
+    """
+    program, planned_settings = prepared.run.program, prepared.scenario.device.valve.settings
     settings: Mapping[str, Any] = device.valve.settings
     fitted = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
     kind = VALVES[device.valve.kind]
     for run in range(max((value.size for value in settings.values() if isinstance(value, np.ndarray)), default=1)):
         values = {name: at(value, run) for name, value in settings.items()}
         of_run = kind.settings(**values)
-        valve = kind.choose(of_run)
-        if valve != base.program.valve or (valve.command_delay(of_run) > 0.0) != base.program.late_commands:
+        if kind.choose(of_run) != program.valve or (program.valve.command_delay(of_run) > 0.0) != program.late_commands:
             switched = [name for name in values if name in fitted and 0.0 in (values[name], planned_settings[name])]
-            moved = " or ".join(f"valve.{name}" for name in switched)
             raise IdentificationError(
-                f"{where}: the fit changed {moved} to or from 0, which changes the valve model; give a start and "
-                "a lower bound above 0"
+                f"experiment '{prepared.label}': the fit changed {' or '.join(f'valve.{name}' for name in switched)} "
+                "to or from 0, which changes the valve model; give a start and a lower bound above 0"
             )
-    if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
+    if any(np.any(is_on != (effect in program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(
-            f"{where}: the fit changed a parameter of an effect to or from 0, which changes the model; give this "
-            "parameter a start and a lower bound above 0"
+            f"experiment '{prepared.label}': the fit changed a parameter of an effect to or from 0, which changes the "
+            "model; give this parameter a start and a lower bound above 0"
         )
-    planned, _ = scenario.motion.motion_kind.plan(scenario)
-    # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
-    plant = planned.plant
-
-    def range_of_supply(first: float, second: float, atmosphere: float) -> float:
-        return supply_range(
-            plant._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
-        )
-
-    pressures = plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure
-    allowed = supply_range(base.plant) / over_runs(range_of_supply, *pressures)
-    changed = {name: getattr(planned, name) for name in _NUMBERS_OF_RUN}
-    return replace(base, tolerance=base.tolerance * allowed, **changed)
 
 
 def signals_at(prepared: _PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
@@ -314,7 +308,6 @@ def signals_at(prepared: _PreparedExperiment, columns: Mapping[str, Floats], cou
     }
     running = {path: column for path, column in columns.items() if path not in errors}
     table = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
-    # A zero or a gain of a compared sensor needs no run of its own.
     _, first, run_of = np.unique(table, axis=1, return_index=True, return_inverse=True)
     distinct = {path: np.broadcast_to(column, (count,))[first] for path, column in running.items()}
     signals = _with_inputs(prepared, distinct, len(first))
@@ -337,7 +330,7 @@ def _with_inputs(prepared: _PreparedExperiment, columns: Mapping[str, Floats], c
     for number, values_of_group in enumerate(distinct.T.tolist()):
         members = np.flatnonzero(group.ravel() == number)
         zero_of = {path.removeprefix(ZERO_OF): zero for path, zero in zip(zeros, values_of_group, strict=True)}
-        # What a run follows less the zeros [rad], [Pa] of the sensors that recorded it; both inlets may have one.
+        # Zero errors [rad], [Pa] are subtracted from recorded inputs; one sensor may measure both inlets.
         both = zero_of.get(SUPPLY, 0.0)
         offsets = {
             "path.level": zero_of.get(ANGLE, 0.0),
@@ -363,7 +356,7 @@ def _run_signals(prepared: _PreparedExperiment, columns: Mapping[str, Floats], c
     for members, batch in batches_of(run, count):
         outcome = run_batch(batch, threads=1) if prepared.inputs is None else replay(batch, prepared.inputs)
         ends = outcome.states
-        # A run that leaves what is possible, or is no number, tells the search nothing.
+        # A failed run, or one with states that are no numbers, has no residuals.
         failed[members] = (ends[rows["result.failure_time"]] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
         if records is None:
             records = np.empty((len(channel_rows), len(outcome.record), count))

@@ -128,9 +128,8 @@ class Tracking:
         if self.worst:
             worst, limit = (change_text(self.controlled, each) for each in (self.worst, self.allowed))
             number = "swing" if self.at_rest else "largest error"
-            return (
-                f"the {words} does not follow its reference: {number} {worst} ({limit} allowed){time_text(self.since)}"
-            )
+            allowed = f"({limit} allowed){time_text(self.since)}"
+            return f"the {words} does not follow its reference: {number} {worst} {allowed}"
         if self.rests and self.at_rest:
             missing = change_text(self.controlled, abs(self.missing))
             side = "below" if self.missing < 0.0 else "above"

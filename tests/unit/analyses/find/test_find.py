@@ -129,6 +129,7 @@ def test_a_neighbour_that_is_refused_is_said_beside_the_value_found() -> None:
     answer = find(task, vary=vary, such_that="follows", highest=True, grid=5, overrides=changes)
     static = ppafo.load_device("ppafo2011").friction.static_torque
     assert answer.found.value == pytest.approx(static, rel=1e-3)
+    assert " is the highest value that is not refused; it lets the run follow its reference" in answer.said[0]
     assert "the value is refused: " in answer.said[2]
     assert "must be at most friction.static_torque" in answer.said[2]
 
@@ -262,6 +263,7 @@ def test_a_run_that_follows_is_a_condition_of_its_own(tmp_path: Path) -> None:
     found = answer.found
     assert answer.said[0].startswith("supply.pressure = 57.1")
     assert "is the lowest value that lets the run follow its reference (bracketed to " in answer.said[0]
+    assert "refused" not in answer.said[0]
     for value, follows, line in ((found.value, True, answer.said[1]), (found.not_met_at, False, answer.said[2])):
         run = ppafo.simulate(TASK, [f"supply.pressure={value!r} Pa_a"])
         assert (run.tracking is None) == follows

@@ -55,9 +55,7 @@ def valve_power(valve: Part, command: Floats) -> Floats:
     # A command to vent is beyond 1 and no stroke.
     stroke = np.where(command > VENTS_ABOVE, 0.0, np.abs(command))
     idle, full = valve.values.get("idle_power", 0.0), valve.values.get("power", 0.0)
-    if valve.kind == "solenoid":
-        return np.where(stroke > 0.0, full, idle)
-    return idle + (full - idle) * stroke
+    return np.where(stroke > 0.0, full, idle) if valve.kind == "solenoid" else idle + (full - idle) * stroke
 
 
 def electrical_of(

@@ -55,9 +55,7 @@ def unit_of_label(path: str, label: str, angle: str) -> str:
         return "N m"
     if label.endswith("_force") or label.endswith(("_vx", "_vy", "_vz")):
         return "N"
-    if label.endswith(("_tx", "_ty", "_tz", "_px", "_py", "_pz")):
-        return "m"
-    return angle
+    return "m" if label.endswith(("_tx", "_ty", "_tz", "_px", "_py", "_pz")) else angle
 
 
 _WORD = re.compile(r"[a-z]+|\d+")
