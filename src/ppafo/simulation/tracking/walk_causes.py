@@ -16,6 +16,8 @@ from ppafo.simulation.tracking.rule import LEAST_PEAK_WALK
 
 _OFTEN = 0.1
 """Fraction of the samples with a request that counts as often [-]."""
+_DEMAND = "the joint speed of this gait"
+"""Demand for which the valve of a walk may be too small."""
 _LARGER_VALVES = (2.0, 4.0, 8.0)
 """Factors by which a valve is enlarged in a trial [-]."""
 _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
@@ -103,10 +105,8 @@ CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     ),
     _dead_band_of_walk,
     # An oscillating loop, and on/off valves, are fully open for other reasons.
-    lambda case: (
-        None
-        if case.oscillates or case.only_switches
-        else small_valve(case, _OFTEN, "the joint speed of this gait", _LARGER_VALVES, "use a larger valve")
+    lambda case: small_valve(
+        case, 1.0 if case.oscillates or case.only_switches else _OFTEN, _DEMAND, _LARGER_VALVES, "use a larger valve"
     ),
     gains_of_another_device,
     _speed_of_gait,
