@@ -52,7 +52,9 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
         if left is None:
             # A number that was tried is one of many; a kind is none.
             example = "for example, " * any(".kind=" not in text for text in remedy.overrides)
-            text = f"{example}with {remedy.text} it follows, as a further run shows"
+            # Pressures are computed for more torque than is requested.
+            margin = ", with a margin" * any(text.startswith("supply.") for text in remedy.overrides)
+            text = f"{example}with {remedy.text} it follows, as a further run shows{margin}"
             return replace(verdict, cause=cause, tried=text, mended=remedy.overrides if is_of_file else ())
     of_cause = [(remedy, left.error) for cause, remedy, left in judged if left and cause == verdict.cause]
     return replace(verdict, tried=_remainder_text(verdict, of_cause))

@@ -98,8 +98,10 @@ def deliver(answer: Any, as_json: bool, out: Path | None, command: str, *, has_w
         folder = str(out)
         # What other commands take, such as the gait of 'ppafo walk --gait'.
         usable_files = [f"file to use: {out / name}" for name in answer.files if name.endswith(".toml")]
+        from ppafo.walking.bottle.course import WALKED
+
         # A walk that ended before its bottle did.
-        if document.get("supply", {}).get("ending", {}).get("kind") == "walk's end":
+        if document.get("supply", {}).get("ending", {}).get("kind") == WALKED:
             usable_files.append(f"time until the bottle ends: ppafo bottle {shlex.quote(folder)}")
     if as_json:
         print_result("", document if folder is None else {**document, "folder": folder}, as_json)

@@ -4,12 +4,15 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import ppafo
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
 from ppafo.remedy_trials import tried
 from ppafo.running import simulate
+from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.scenario import Scenario
 
 SERVO = ("cylinder-servo", ("run.duration=1 s",))
@@ -72,3 +75,37 @@ def test_simulate_says_it_before_the_gains_and_a_check_ends_with_1(
     said = json.loads(capsys.readouterr().out)["tracking"]["sentence"]
     assert main(["simulate", "cylinder-servo", *given, *folder, "--check"]) == 1
     assert capsys.readouterr().out.splitlines()[1] == said
+
+
+HELD = ["motion.kind=free", "motion.angle=75 deg", "reference.level=4 N m"]
+"""Free joint that the torque task presses with 4 N m."""
+
+
+def test_a_free_joint_that_friction_holds_for_the_whole_run_is_said_to_stand_still() -> None:
+    held = simulate("torque-task-proportional", [*HELD, "friction.static_torque=20 N m"])
+    assert np.ptp(held.recording["angle"]) == 0.0
+    assert held.following.startswith("the torque follows its reference")
+    (said,) = held.warnings
+    assert "the joint does not move: static friction of 20 N m holds it, the actuator gives at most 4" in said
+    # As advised: a locked joint is meant to stand still, and one with less friction moves.
+    assert not simulate("torque-task-proportional", ["reference.level=4 N m"]).warnings
+    free = simulate("torque-task-proportional", [*HELD, "friction.static_torque=1 N m"])
+    assert np.ptp(free.recording["angle"]) > 0.01
+    assert "does not move" not in " ".join(free.warnings)
+
+
+def test_a_search_says_of_the_value_that_it_found_that_the_joint_stands_still_and_that_gains_follow_it() -> None:
+    base = load_scenario("torque-task-proportional", HELD)
+    found = ppafo.find(base, vary="friction.static_torque=10..20 N m", such_that="follows", highest=True, grid=3)
+    assert found.found.value == pytest.approx(20.0)
+    (at,) = [said for said in found.found.remarks if said.startswith("at 20 N m ")]
+    assert "; the joint does not move: static friction of 20 N m holds it" in at
+    # The law of the torque knows nothing of the friction; the cascade of an angle does.
+    assert "recomputed" not in str(found)
+    learns = ppafo.find(
+        servo(), vary="friction.static_torque=0.5..1 N m", such_that="peak_torque <= 100 N m", highest=True, grid=3
+    )
+    remark = remark_on_following_gains(servo(), ["friction.static_torque"])
+    assert "static_torque" in remark
+    assert remark in learns.found.remarks
+    assert remark in str(learns)

@@ -12,7 +12,9 @@ from ppafo.metrics import METRICS
 from ppafo.progress import Report
 from ppafo.running import simulate
 from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.remarks import standing_still
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
@@ -111,7 +113,8 @@ TRIED = np.dtype(
 class FindResult:
     """Search result: tried values, ascending, as a structured array of ``TRIED``, and the counted ``runs``.
 
-    ``verdicts`` are values [SI] with the verdict of a run of their own, for the condition that the run follows.
+    ``gains`` is a remark on gains that follow the varied number. ``verdicts`` are values [SI] with the verdict of a run
+    of their own, for the condition that the run follows.
     """
 
     scenario: str
@@ -121,6 +124,7 @@ class FindResult:
     noise_streams: int
     runs: Runs
     tried: NDArray[np.void]
+    gains: str = ""
     verdicts: tuple[tuple[float, str], ...] = ()
 
     @property
@@ -208,7 +212,16 @@ def outermost(
     seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
     counter = RunCounter(grid * max(1, seeds.size), progress)
     runs = scenario_runs(base, with_companions([condition.metric], base), counter, (), threads)
-    search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED))
+    search = FindResult(
+        base.name,
+        path,
+        condition,
+        highest,
+        seeds.size,
+        runs,
+        np.empty(0, TRIED),
+        remark_on_following_gains(base, [path.path]),
+    )
     search = search.with_values(base, np.linspace(low, high, grid), seeds, True)
     if not np.isfinite(search.tried["judged"]).any():
         ends = f"from {path.quote(low)} to {path.quote(high)}"
@@ -237,9 +250,10 @@ def outermost(
 
 
 def _verdict(base: Scenario, override: str) -> str:
-    """Return the verdict on a run with an override, or the refusal of its value."""
+    """Return the verdict on a run with an override, with a remark if it stands still, or the refusal of its value."""
     try:
         result = simulate(with_overrides(base, [override]))
     except (ParameterError, ScenarioError) as error:
         return f"{REFUSED} {error}"
-    return result.following if result.tracking is None else result.tracking.found
+    said = result.following if result.tracking is None else result.tracking.found
+    return "; ".join(filter(None, (said, standing_still(result))))

@@ -33,6 +33,16 @@ _NOISE_NEAR = 6.0
 _AT_ONCE = 2.0
 """Duration near the end of a swing, relative to the last half of the swing [-], below which the vane did not rest."""
 
+_SWING_SECTION = (
+    'parameters = [{path = "friction.viscous_damping"}, {path = "friction.dynamic_torque", start = "0.01 N m"}, '
+    '{path = "friction.static_torque", start = "0.02 N m"}] and an experiment with '
+    f'channels = ["{ANGLE}"], initial_state = "recording", scenario = "step-response" and '
+    'overrides = ["motion.kind=free", "effects.joint_load.stiffness=... N m/rad", '
+    '"effects.joint_load.rest_angle=... deg", "controller.command=0", "initial.pressure_1=atmosphere", '
+    '"initial.pressure_2=atmosphere", "actuator.dead_volume_1=10 L", "actuator.dead_volume_2=10 L"]'
+)
+"""Fit of a swing on a spring, with chambers open to the atmosphere; with little friction the first run swings too."""
+
 
 class FreeDecay(NamedTuple):
     """Free decay: times from the start [s], angle [rad], direction (1 or -1), velocity [rad/s] if recorded."""
@@ -81,13 +91,12 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
         )
     rows = slice(first, last)
     angle = part[ANGLE][rows]
-    before = skipped + first
     for plateau in plateaus(angle):
         if is_at_limit(angle, plateau):
             raise IdentificationError(
                 f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
-                f"{plateau.count} samples, from sample {before + plateau.first + 1}, although the vane still moved "
-                "before: the sensor is saturated or the vane is at a stop; give an end before this sample"
+                f"{plateau.count} samples, from sample {skipped + first + plateau.first + 1}, although the vane still "
+                "moved before: the sensor is saturated or the vane is at a stop; give an end before this sample"
             )
     time, velocity = part.time[rows], None
     if VELOCITY in part:
@@ -118,10 +127,8 @@ def _check_comes_to_rest(source: RecordingSource, time: Floats, angle: Floats, n
         if time[back[0]] - reached < _AT_ONCE * (reached - halfway):
             raise IdentificationError(
                 f"{source.name}: {PROCEDURE}: the vane turns back at {time[end]:.3g} s without coming to rest, so "
-                f"another torque acts, such as a spring or gravity; fit it in [trajectory], with channels = "
-                f'["{ANGLE}"] and a scenario whose overrides have motion.kind=free, the load (effects.joint_load) and '
-                "for open chambers actuator.dead_volume_1=10 L and actuator.dead_volume_2=10 L; if a stop or a hand "
-                "turned the vane, give an end before"
+                f"another torque acts, such as a spring or gravity; fit it in [trajectory] with {_SWING_SECTION} "
+                "(a load is known or a parameter); if a stop or a hand turned the vane, give an end before"
             )
 
 

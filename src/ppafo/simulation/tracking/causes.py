@@ -28,13 +28,12 @@ from ppafo.simulation.tracking.remedies import (
     Remedy,
     change_text,
     dead_band,
-    default_gain_remedy,
+    default_gain_remedies,
     default_integral_remedy,
-    larger_gains,
     level_text,
+    quicker_loops,
     remedy,
     sized_valves,
-    slower_loops,
     smaller_pair,
     speed_settings,
     stiffened,
@@ -61,9 +60,9 @@ _SLOWER = (0.7, 0.4, 0.2, 0.1, 0.05)
 """Frequencies of a reference in trials, divided by its own frequency [-]."""
 _SLOW, _FEW_DECISIONS = 0.01, 20.0
 """Period of a controller [s], and decisions in the settled part below which that period makes the loop fail [-]."""
-_SENSOR_FLAWS = tuple(
-    f"sensors.{name}" for name in ("delay", "angle_noise", "pressure_noise", "angle_resolution", "pressure_resolution")
-)
+_DELAY = "sensors.delay"
+"""Path of the delay of all sensors."""
+_SENSOR_FLAWS = (_DELAY, *(f"sensors.{of}_{flaw}" for flaw in ("noise", "resolution") for of in ("angle", "pressure")))
 """Paths of the imperfections of sensors that a remedy reduces."""
 _LESS = (10.0, 1000.0)
 """Factors by which an imperfection of a sensor is reduced in a trial; the second one for a unit mistaken [-]."""
@@ -107,7 +106,7 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     remedies = [remedy(scenario, {"controller.dead_band": band})] if known_band < band else []
     # A law that knows the band asks for more openings than it gets, and errs by what its gain lacks.
     gain_factor = band / typical if known_band < band else settled.rms_error / (LARGEST_SHARE * settled.wanted_change)
-    remedies += larger_gains(scenario, case.law, (1.5 * gain_factor, 3.0 * gain_factor))
+    remedies += quicker_loops(scenario, case.law, (1.5 * gain_factor, 3.0 * gain_factor))
     remedies += default_integral_remedy(scenario, case.law)
     if torque_asked(scenario, case.law, settled.rms_error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
@@ -187,7 +186,7 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
         )
         # Near a stop for a part of the time, a loop needs no gain for that angle throughout.
         factors = (rate, 2.0 * rate) if rate == rates[0][0] else (2.0, 4.0, rate)
-        return TrackingCause(text, slower_loops(scenario, law, factors))
+        return TrackingCause(text, quicker_loops(scenario, law, (1.0 / factor for factor in factors)))
     if sensors.angle_noise or sensors.pressure_noise:
         noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
         reason = f"sensor noise ({noise}) reverses the command"
@@ -198,7 +197,7 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
     else:
         reason = "the loop has delays that this gain does not include"
     text = f"`{gain}` is about the gain computed for this device: {reason}"
-    return TrackingCause(text, slower_loops(scenario, law, (2.0, 4.0)))
+    return TrackingCause(text, quicker_loops(scenario, law, (0.5, 0.25)))
 
 
 def _loop_rate(scenario: Scenario, angle: float) -> float:
@@ -236,11 +235,10 @@ def _static_friction(case: Case) -> TrackingCause | None:
         f"static friction holds the joint with {holding_text}{band_text}, but the controller requests only "
         f"{requested_text} at this error"
     )
-    remedies = []
-    if "static_torque" in settings and known_friction < holding:
-        remedies.append(remedy(scenario, {"controller.static_torque": holding}))
-    advice = "increase `controller.angle_stiffness`"
-    return TrackingCause(text, (*remedies, *stiffer_laws(scenario, holding, settled)), advice)
+    is_too_low = "static_torque" in settings and known_friction < holding
+    remedies = [remedy(scenario, {"controller.static_torque": holding})] if is_too_low else []
+    remedies += stiffer_laws(scenario, holding, settled)
+    return TrackingCause(text, tuple(remedies), "increase `controller.angle_stiffness`")
 
 
 def small_valve(
@@ -296,7 +294,7 @@ def _lag(case: Case) -> TrackingCause | None:
     text = "the reference changes faster than the loop can follow"
     if delay > 0.0 and delay**2 * squares >= _EXPLAINED * case.settled.rms_error**2:
         text = f"it lags its reference by {1.0e3 * delay:.3g} ms"
-    remedies = [*stiffened(scenario, (2.0, 4.0)), *larger_gains(scenario, case.law, (2.0, 4.0))]
+    remedies = [*stiffened(scenario, (2.0, 4.0)), *quicker_loops(scenario, case.law, (2.0, 4.0))]
     frequency = float(scenario.reference.settings.get("frequency", 0.0))
     for share in _SLOWER if frequency else ():
         slower = {"reference.frequency": share * frequency}
@@ -309,12 +307,12 @@ def _lag(case: Case) -> TrackingCause | None:
 
 def gains_of_another_device(case: Case) -> TrackingCause | None:
     """Cause: a gain differs from the default gain of the device."""
-    default_gain = default_gain_remedy(case.scenario, case.law)
-    if default_gain is None:
+    default_gains = default_gain_remedies(case.scenario, case.law)
+    if not default_gains:
         return None
     # Without its integral a loop rests beside its reference with any gain.
     others = () if case.oscillates else default_integral_remedy(case.scenario, case.law)
-    return TrackingCause("the gains do not suit this device", (default_gain, *others))
+    return TrackingCause("the gains do not suit this device", (*default_gains, *others))
 
 
 def _poor_sensors(case: Case) -> TrackingCause | None:
@@ -325,16 +323,17 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
     if not found:
         return None
     remedies = [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
-    told = ", ".join(f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in found.items())
-    return TrackingCause(f"the sensors are not accurate enough for the controlled quantity ({told})", tuple(remedies))
+    told = [f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in found.items()]
+    late = f"the measured {CONTROLLED[scenario.controlled].words} comes late ({told.pop(0)})" if _DELAY in found else ""
+    others = f"the sensors are not accurate enough for the controlled quantity ({', '.join(told)})" if told else ""
+    return TrackingCause(", and ".join(filter(None, (late, others))), tuple(remedies))
 
 
 def _law_without_torque_loop(case: Case) -> TrackingCause | None:
     """Cause: an angle controller without inner torque loop, slow because the gas spring swings the joint."""
-    law = case.law
-    if case.scenario.controlled != ANGLE or law is None or law.only_switches:
-        return None
-    if torque_asked(case.scenario, law, case.settled.rms_error) is not None:
+    scenario, law, error = case.scenario, case.law, case.settled.rms_error
+    is_other = scenario.controlled != ANGLE or torque_asked(scenario, law, error) is not None
+    if is_other or law is None or law.only_switches:
         return None
     text = f"`{law.name}` controls the angle without an inner torque loop and is slow against load and friction"
     return TrackingCause(text, (CASCADE,))
@@ -356,9 +355,10 @@ def _not_settled(case: Case) -> TrackingCause:
         return TrackingCause(f"the joint lies on its {stop} stop", (), "check the load that moves it there")
     if _is_settling(case):
         longer = [remedy(case.scenario, {"run.duration": times * case.scenario.run.duration}) for times in (2.0, 4.0)]
-        quicker = larger_gains(case.scenario, case.law, (2.0, 4.0))
         text = f"it has not settled by {case.settled.start:.3g} s"
-        return TrackingCause(text, (*longer, *quicker), "increase `run.duration`")
+        return TrackingCause(
+            text, (*longer, *quicker_loops(case.scenario, case.law, (2.0, 4.0))), "increase `run.duration`"
+        )
     integral = next((name for name in settings if "integral" in name and settings[name] == 0.0), "")
     if integral:
         remedies = tuple(default_integral_remedy(case.scenario, case.law))

@@ -36,6 +36,8 @@ _NEARLY_ALL, _OFTEN = 0.97, 0.03
 """Torque divided by the reach at which the actuator counts as at its limit, and fraction of the time that is often."""
 _MORE_TORQUE = (1.1, 1.3, 1.6, 2.5)
 """Torques of trials, divided by the largest present torque [-]."""
+_NEGATIVE = " in the negative direction"
+"""Direction of a torque whose sign a text omits."""
 _SAMPLES = 400
 """Largest number of samples at which the reach is compared with the torque."""
 _WITHIN = 0.95
@@ -72,6 +74,14 @@ class TorqueReach(NamedTuple):
         return self.wanted - self.reach if self.upwards else self.reach - self.wanted
 
 
+def reach_text(reach: float, upwards: bool) -> str:
+    """Torque limit [N m] of the actuator in the positive or negative direction, as text with the size and direction."""
+    if upwards:
+        return f"at most {level_text('N m', reach)}"
+    # Of an actuator that always pushes, the smallest torque is positive.
+    return f"{'at least' if reach > 0.0 else 'at most'} {level_text('N m', abs(reach))}{_NEGATIVE * (reach <= 0.0)}"
+
+
 def reach_at_samples(case: Case) -> tuple[NDArray[np.intp], Floats]:
     """Up to 400 settled samples of a recording, and the lowest and highest static torque at their angles [N m].
 
@@ -90,11 +100,8 @@ def _supplies_for(
     A torque is the path of its supply, an angle [rad] and the torque [N m] there, which the factor multiplies.
     """
     trials = [{path: supply_for(device, at, factor * torque) for path, at, torque in torques} for factor in factors]
-    return [
-        {path: pressure for path, pressure in each.items() if pressure is not None}
-        for each in trials
-        if None not in each.values()
-    ]
+    found = [{path: pressure for path, pressure in each.items() if pressure is not None} for each in trials]
+    return [each for each, trial in zip(found, trials, strict=True) if len(each) == len(trial)]
 
 
 def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
@@ -128,12 +135,13 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     if worst.lacking <= 0.0:
         return None
     supply = supply_that_moves(device, worst.upwards)
-    is_free = isinstance(scenario.motion, FreeMotion)
-    stop = stop_of(scenario, case.recording["angle"][settled.samples]) if is_free else ""
+    stop = (
+        stop_of(scenario, case.recording["angle"][settled.samples]) if isinstance(scenario.motion, FreeMotion) else ""
+    )
     lies = f"only the {stop} stop, on which the joint lies, resists the torque: " if stop else ""
     text = (
         f"{lies}at {level_text('rad', worst.angle)} and {level_text('Pa', number_at(scenario, supply))} the "
-        f"actuator gives at most {level_text('N m', worst.reach)}"
+        f"actuator gives {reach_text(worst.reach, worst.upwards)}"
     )
     if lies:
         return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or add a load", is_beyond_reach=True)
@@ -168,11 +176,10 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
     if lowest <= needed_torque <= highest:
         return None
     reach, supply = highest if is_high else lowest, supply_that_moves(device, is_high)
-    stop = stop_of(scenario, angle)
-    rests = f"the joint lies on its {stop} stop: " if stop else ""
-    works, gives = (level_text("N m", torque) for torque in (needed_torque, reach))
+    rests = f"the joint lies on its {stop} stop: " if (stop := stop_of(scenario, angle)) else ""
+    works, gives = level_text("N m", needed_torque), reach_text(reach, is_high)
     against = "" if not is_within else f" to break its static friction of {level_text('N m', holding)}"
-    text = f"{rests}the load needs {works} at {level_text('rad', wanted)}{against}, the actuator gives at most {gives}"
+    text = f"{rests}the load needs {works} at {level_text('rad', wanted)}{against}, the actuator gives {gives}"
     needed = supply_for(device, wanted, 1.3 * needed_torque)
     changes: list[dict[str, float]] = [] if needed is None else [{supply: needed}]
     advice = ""
@@ -246,8 +253,7 @@ def flung_at_start(case: Case) -> TrackingCause | None:
     deviation = float(np.max((reference - angle) * np.sign(lacking)))
     if abs(lacking) <= float(device.friction.static_torque) or deviation <= _FLUNG * case.settled.wanted_change:
         return None
-    atmosphere = float(device.supply.atmospheric_pressure)
-    needed = supply_for(device, start, load)
+    atmosphere, needed = float(device.supply.atmospheric_pressure), supply_for(device, start, load)
     text = (
         f"at the start the chambers give {level_text('N m', load - lacking)} for a load of "
         f"{level_text('N m', load)}: the joint moves away by {change_text(ANGLE, deviation)} "

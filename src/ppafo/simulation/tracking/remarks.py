@@ -9,7 +9,7 @@ from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.reach import torque_reach
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.simulation.tracking.load_causes import LOCKED, ON_STOP
+from ppafo.simulation.tracking.load_causes import LOCKED, ON_STOP, stop_of
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.simulation.tracking.remedies import level_text
 
@@ -18,12 +18,13 @@ if TYPE_CHECKING:
 
 
 def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
-    """Yield remarks on stops, switching frequency, sensor values without effect, and replaced values of the set.
+    """Yield remarks on a joint at rest, stops, switching, sensor values without effect, and replaced values of the set.
 
     ``follows``: True if the run follows its reference; a stop may then bear the torque that the reference asks for.
     """
     scenario, recording = result.scenario, result.recording
     motion, actuator, reached = scenario.motion, scenario.device.actuator, []
+    yield standing_still(result)
     if isinstance(motion, FreeMotion):
         for side, stop in (("lower", actuator.angle_min), ("upper", actuator.angle_max)):
             rests = np.abs(recording["angle"] - stop) <= ON_STOP
@@ -37,6 +38,17 @@ def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
     yield unlimited_switching(result)
     yield _without_effect(scenario)
     yield scenario.origin.replaced
+
+
+def standing_still(result: "RecordedResult") -> str:
+    """Remark on a free joint that friction holds for the whole run while no angle is controlled; "" for other runs."""
+    scenario, angle, torque = result.scenario, result.recording["angle"], result.recording["torque"]
+    is_free = isinstance(scenario.motion, FreeMotion) and scenario.controlled != ANGLE and result.status.is_completed
+    if not is_free or np.ptp(angle) > 0.0 or stop_of(scenario, angle):
+        return ""
+    holding, most = (level_text("N m", each) for each in (scenario.device.friction.static_torque, np.abs(torque).max()))
+    text = f"the joint does not move: static friction of {holding} holds it, the actuator gives at most {most}"
+    return f"{text}; not tried: reduce `friction.static_torque`, or lock the joint ({LOCKED.text})"
 
 
 def _without_effect(scenario: Scenario) -> str:

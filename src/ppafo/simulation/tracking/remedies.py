@@ -9,9 +9,10 @@ from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import SonicOrifice
+from ppafo.parameters.graph import LinkedDefault
 from ppafo.report.display_units import metric_change, metric_level
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import SLOPE_GAINS
+from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS
 from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
@@ -98,18 +99,25 @@ def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, 
     return {term: items[term] for term in FASTEST_FIRST if term in items}
 
 
-def default_gain_remedy(scenario: Scenario, law: ControllerKind | None) -> Remedy | None:
-    """Remedy that sets the first gain that differs from the device's default to that default; None if none differs."""
+def default_gain_remedies(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
+    """Remedies with the device's default of the first gain that differs from it, then of all overridden gains."""
     if law is None:
-        return None
-    terms, settings = terms_of(scenario, law), scenario.controller.settings
-    for term, quantity in speed_settings(scenario, law).items():
-        default = float(terms[term].number(lambda path: number_at(scenario, path)))
-        if abs(float(settings[quantity.name]) - default) <= _SAME_GAIN * default:
-            continue
-        slopes = {f"controller.{name}": 0.0 for name in SLOPE_GAINS if settings.get(name, 0.0) > 0.0}
-        return remedy(scenario, {f"controller.{quantity.name}": default, **slopes})
-    return None
+        return []
+    terms, settings, defaults = terms_of(scenario, law), scenario.controller.settings, dict[str, float]()
+    for item in law_settings(law, scenario.controlled):
+        path = f"controller.{item.name}"
+        if GAIN_TERMS.intersection(item.follows) and path not in scenario.links and terms.keys() >= set(item.follows):
+            link = LinkedDefault(tuple(terms[name] for name in item.follows), item.default or 0.0)
+            # A default may follow one of this list before it.
+            defaults[path] = float(link.number(lambda at: defaults[at] if at in defaults else number_at(scenario, at)))
+    for quantity in speed_settings(scenario, law).values():
+        path, present = f"controller.{quantity.name}", float(settings[quantity.name])
+        if abs(present - defaults.get(path, present)) > _SAME_GAIN * defaults.get(path, present):
+            slopes = {f"controller.{name}": 0.0 for name in SLOPE_GAINS if settings.get(name, 0.0) > 0.0}
+            given = {each: defaults[each] for each in defaults if f"{each}=" in " ".join(scenario.origin.overrides)}
+            changes = ({path: defaults[path], **slopes}, {**slopes, **given})
+            return [remedy(scenario, numbers) for numbers in changes[: max(1, len(given))]]
+    return []
 
 
 def default_integral_remedy(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
@@ -122,39 +130,21 @@ def default_integral_remedy(scenario: Scenario, law: ControllerKind | None) -> l
     return [remedy(scenario, {f"controller.{name}": default}) for name in names if settings.get(name) == 0.0 < default]
 
 
-def slower_loops(scenario: Scenario, law: ControllerKind, factors: Iterable[float]) -> tuple[Remedy, ...]:
-    """Remedies that slow down the innermost loop by each of some factors; empty if its speed cannot be set."""
-    speeds = speed_settings(scenario, law)
-    if not speeds:
-        return ()
-    term, quantity = next(iter(speeds.items()))
-    path, value = f"controller.{quantity.name}", float(scenario.controller.settings[quantity.name])
-    return tuple(
-        remedy(scenario, {path: value * factor if term in SLOWER_ABOVE else value / factor}) for factor in factors
-    )
-
-
-def larger_gains(scenario: Scenario, law: ControllerKind | None, factors: Iterable[float]) -> list[Remedy]:
-    """Remedies that speed up the innermost loop by each of some factors."""
-    innermost = list(speed_settings(scenario, law).values())[:1]
-    return [
-        remedy(scenario, {f"controller.{item.name}": float(scenario.controller.settings[item.name]) * factor})
-        for item in innermost
-        for factor in factors
-    ]
+def quicker_loops(scenario: Scenario, law: ControllerKind | None, factors: Iterable[float]) -> tuple[Remedy, ...]:
+    """Remedies that change the speed of the innermost loop by each of some factors; empty if it cannot be set."""
+    innermost, settings = list(speed_settings(scenario, law).items())[:1], scenario.controller.settings
+    powers = [(f"controller.{item.name}", item.name, -1.0 if term in SLOWER_ABOVE else 1.0) for term, item in innermost]
+    changes = [{path: settings[name] * factor**power} for path, name, power in powers for factor in factors]
+    return tuple(remedy(scenario, numbers) for numbers in changes)
 
 
 def sized_valves(scenario: Scenario, factors: Iterable[float]) -> tuple[Remedy, ...]:
     """Remedies that multiply the valve's orifice by each of some factors, in the form in which it is given."""
     orifice = scenario.device.valve.orifice
-    if isinstance(orifice, SonicOrifice):
-        size, unchanged = "sonic_conductance", "critical_ratio"
-    else:
-        size, unchanged = "area", "discharge_coefficient"
-    number, other = float(getattr(orifice, size)), float(getattr(orifice, unchanged))
-    return tuple(
-        remedy(scenario, {f"valve.{size}": number * factor, f"valve.{unchanged}": other}) for factor in factors
-    )
+    is_sonic = isinstance(orifice, SonicOrifice)
+    size, other = ("sonic_conductance", "critical_ratio") if is_sonic else ("area", "discharge_coefficient")
+    kept, number = {f"valve.{other}": float(getattr(orifice, other))}, float(getattr(orifice, size))
+    return tuple(remedy(scenario, {f"valve.{size}": number * factor, **kept}) for factor in factors)
 
 
 def smaller_pair(scenario: Scenario, step: float) -> tuple[Remedy, ...]:
@@ -164,9 +154,8 @@ def smaller_pair(scenario: Scenario, step: float) -> tuple[Remedy, ...]:
 
 def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -> float | None:
     """Torque [N m] requested at an angle error [rad] by a controller with a stiffness; None for another controller."""
-    if scenario.controlled != ANGLE or law is None:
-        return None
-    if not any(angle_loop.ANGLE_STIFFNESS in quantity.follows for quantity in law_settings(law, scenario.controlled)):
+    items = () if law is None else law_settings(law, scenario.controlled)
+    if scenario.controlled != ANGLE or not any(angle_loop.ANGLE_STIFFNESS in item.follows for item in items):
         return None
     settings = scenario.controller.settings
     return float(settings["angle_stiffness"]) * min(float(settings["error_limit"]), error)
@@ -200,13 +189,10 @@ def stiffer_laws(
 
 def stiffened(scenario: Scenario, factors: Iterable[float]) -> list[Remedy]:
     """Remedies with the angle stiffness times each of some factors, and matching damping; none without stiffness."""
-    settings = scenario.controller.settings
-    names = [(name, power) for name, power in (("angle_stiffness", 1.0), ("angle_damping", 0.5)) if name in settings]
-    return [
-        remedy(scenario, {f"controller.{name}": float(settings[name]) * factor**power for name, power in names})
-        for factor in factors
-        if names
-    ]
+    settings, powers = scenario.controller.settings, {"angle_stiffness": 1.0, "angle_damping": 0.5}
+    known = {name: power for name, power in powers.items() if name in settings}
+    changes = [{f"controller.{name}": settings[name] * factor ** known[name] for name in known} for factor in factors]
+    return [remedy(scenario, numbers) for numbers in changes if numbers]
 
 
 def dead_band(scenario: Scenario) -> float:

@@ -19,6 +19,7 @@ from ppafo.simulation.tracking.rule import (
     LARGEST_MEAN_SWITCHED,
     LARGEST_SHARE,
     LARGEST_SHARE_OF_WAVE,
+    LEAST_PEAK_WALK,
     REVERSALS,
     Failure,
     deviation_limit,
@@ -58,9 +59,8 @@ class Tracking:
     ``tried`` is the result of tried remedies, and ``mended`` the overrides with which the run follows. ``accepted`` is
     the scenario's reason for a reference beyond reach, else "". ``at_rest`` is true if reference and joint stand still.
     ``since`` [s] is the start of the settled part, 0 for a walk. ``span`` is the range of the error of an angle that
-    swings slowly, or of on/off valves whose RMS error alone is within its limit, else 0. ``worst`` is the largest error
-    beside a moving reference, or the range of the error beside a reference at rest, and ``allowed`` its limit, if RMS
-    and mean error are within theirs, else 0.
+    swings slowly, or of on/off valves whose RMS error alone is within its limit, else 0. ``criterion`` names the number
+    ``worst`` of the settled part that is above its limit ``allowed``; other kinds of failure leave all three empty.
     """
 
     kind: Failure
@@ -81,14 +81,10 @@ class Tracking:
     at_rest: bool = True
     since: float = 0.0
     span: float = 0.0
+    criterion: str = ""
     worst: float = 0.0
     allowed: float = 0.0
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
-
-    @property
-    def rests(self) -> bool:
-        """True if the error is nearly constant over the settled part."""
-        return abs(self.missing) > 0.9 * self.error
 
     @property
     def is_useless(self) -> bool:
@@ -100,41 +96,32 @@ class Tracking:
     def sentence(self) -> str:
         """Verdict in one line."""
         remedies = " or ".join(remedy.text for remedy in self.remedies[:2])
-        if self.accepted:
-            last = f"; intended: {self.accepted}"
-        elif self.tried or not remedies:
-            last = f"; {self.tried or self.advice}" if self.tried or self.advice else ""
-        else:
-            last = f"; not tried: {remedies}"
-        return f"{self.found}; {self.cause}{last}"
+        untried = f"not tried: {remedies}" if remedies else self.advice
+        last = f"intended: {self.accepted}" if self.accepted else self.tried or untried
+        return "; ".join(filter(None, (self.found, self.cause, last)))
 
     @property
     @in_units(lambda tracking: tracking.units)
     def found(self) -> str:
         """Failure with the number that decided, without cause and remedy."""
-        words = CONTROLLED[self.controlled].words
-        error, wanted, moved = (change_text(self.controlled, each) for each in (self.error, self.wanted, self.moved))
-        plain_moved, rms = moved.partition(" ")[0], f"RMS error {error} (requested {wanted}){time_text(self.since)}"
+        words, since = CONTROLLED[self.controlled].words, time_text(self.since)
+        numbers = (self.error, self.wanted, self.moved, abs(self.missing), self.span, self.worst, self.allowed)
+        error, wanted, moved, missing, swing, worst, allowed = (change_text(self.controlled, each) for each in numbers)
+        plain_moved = moved.partition(" ")[0]
         if self.kind == "does not move":
             return f"the {words} loop does not move: {plain_moved} of the requested {wanted}"
         if self.kind == "oscillates":
             if self.span:
-                swing = change_text(self.controlled, self.span)
-                return f"the {words} swings by {swing} (requested change {wanted}){time_text(self.since)}"
+                return f"the {words} swings by {swing} (requested change {wanted}){since}"
             often = f"{without_exponent(self.reversals, '.3g')} reversals a {self.per}"
-            return f"the {words} loop oscillates: {often}, {rms}"
+            return f"the {words} loop oscillates: {often}, RMS error {error} (requested {wanted}){since}"
         if self.kind == "overshoots":
             return f"the {words} overshoots: {plain_moved} instead of at most {wanted}"
-        if self.worst:
-            worst, limit = (change_text(self.controlled, each) for each in (self.worst, self.allowed))
-            number = "swing" if self.at_rest else "largest error"
-            allowed = f"({limit} allowed){time_text(self.since)}"
-            return f"the {words} does not follow its reference: {number} {worst} {allowed}"
-        if self.rests and self.at_rest:
-            missing = change_text(self.controlled, abs(self.missing))
+        is_constant = abs(self.missing) > max(0.9 * self.error, self.allowed)
+        if is_constant and self.at_rest and self.criterion.endswith("error"):
             side = "below" if self.missing < 0.0 else "above"
-            return f"the {words} stays {missing} {side} its reference (requested change {wanted})"
-        return f"the {words} does not follow its reference: {rms}"
+            return f"the {words} stays {missing} {side} its reference ({allowed} allowed)"
+        return f"the {words} does not follow its reference: {self.criterion} {worst} ({allowed} allowed){since}"
 
 
 @in_units(lambda result: result.scenario.device.shown)
@@ -154,15 +141,12 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
     # A loop that is quiet at the end reversed before the part whose error is stated.
     is_over = turning > 1.0 and settled.command_reversal_rate < _QUIET * per_second
     interval = "second of the whole run" if is_over else "second"
-    switches = only_switches(scenario, scenario.law)
-    largest = float(deviation_limit(settled, switches))
-    is_within = is_task and settled.rms_error <= float(rms_error_limit(settled, switches))
-    deviation = settled.error_range if settled.rests else settled.largest_error
-    allowed_mean = LARGEST_MEAN_SWITCHED * settled.wanted_change if switches and settled.rests else math.inf
-    is_centred = abs(settled.mean_error) <= allowed_mean
-    is_worst = is_within and is_centred and deviation > largest
+    criteria = _criteria(case)
+    is_within = is_task and not criteria[0][1] > criteria[0][2]
+    decided = next((each for each in criteria if each[1] > each[2]), criteria[-1])
+    criterion, worst, allowed = decided if failure == "does not follow" else ("", 0.0, 0.0)
     is_slow_swing = settled.reference_range > 0.0 and not settled.error_reversals
-    is_swing = is_slow_swing or (is_within and switches and settled.error_range > largest)
+    is_swing = is_slow_swing or (is_within and case.only_switches and settled.error_range > criteria[2][2])
     return Tracking(
         kind=failure,
         controlled=scenario.controlled,
@@ -179,8 +163,9 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
         at_rest=settled.rests,
         since=settled.start,
-        worst=deviation if is_worst else 0.0,
-        allowed=largest if is_worst else 0.0,
+        criterion=criterion,
+        worst=worst,
+        allowed=allowed,
         span=settled.error_range if failure == "oscillates" and turning <= 1.0 and is_swing else 0.0,
     )
 
@@ -197,8 +182,11 @@ def following_text(result: "RecordedResult") -> str:
     judged = _judged(result)
     # A walk without a requested torque has nothing to follow.
     if judged is None:
-        few = f"{len(result.recording)} samples are too few"
-        return _undecided_text(scenario, few) if scenario.follows_reference else ""
+        return (
+            _undecided_text(scenario, f"{len(result.recording)} samples are too few")
+            if scenario.follows_reference
+            else ""
+        )
     case, settled = judged[0], judged[0].settled
     if case.failure is not None:
         return ""
@@ -210,24 +198,38 @@ def following_text(result: "RecordedResult") -> str:
         longer = override_text([f"run.duration={2.0 * scenario.run.duration / settled.reference_periods:.3g} s"])
         return f"no verdict on the {controlled.words}: {short}, {left}; not tried: {longer} should give one"
 
-    def judged_text(name: str, number: float, limit: float | None, why: str = "") -> str:
-        allowed = "" if limit is None else f" ({change_text(controlled.name, limit)} allowed{why})"
+    def judged_text(name: str, number: float, limit: float, why: str = "") -> str:
+        allowed = "" if math.isinf(limit) else f" ({change_text(controlled.name, limit)} allowed{why})"
         return f"{name} {change_text(controlled.name, number)}{allowed}"
 
     # The interval stands before the errors: metrics of the same names cover the whole run.
     begin = f"the {controlled.words} follows its reference;{time_text(settled.start)}: "
-    rms = ("RMS error", settled.rms_error)
+    rms, *further = _criteria(case)
     if not scenario.follows_reference:
-        return begin + judged_text(*rms, LARGEST_SHARE_OF_WAVE * settled.wanted_change)
+        return begin + judged_text(*rms)
     # The limit of on/off valves is several times wider, so the swing is reported beside the error.
     why = ", because the valves are either open or shut" if case.only_switches else ""
-    largest = float(deviation_limit(settled, case.only_switches))
-    limit = None if math.isinf(largest) else largest
-    deviation = ("swing", settled.error_range) if settled.rests else ("largest error", settled.largest_error)
-    texts = judged_text(*rms, float(rms_error_limit(settled, case.only_switches)), why), judged_text(*deviation, limit)
     # A reference just beyond reach is missed by no more than is allowed.
     beyond = torque_beyond_reach(case)
-    return f"{begin}{', '.join(texts)}{'' if beyond is None else f'; {beyond.text}'}"
+    return f"{begin}{judged_text(*rms, why)}, {judged_text(*further[1])}{'' if beyond is None else f'; {beyond.text}'}"
+
+
+def _criteria(case: Case) -> tuple[tuple[str, float, float], ...]:
+    """Errors of the settled part that may be above their limits: name, number and limit [SI], most telling first."""
+    scenario, settled, switches = case.scenario, case.settled, case.only_switches
+    mean, wanted, asked = abs(settled.mean_error), settled.wanted_change, settled.requested_peak
+    if not scenario.follows_reference:
+        short = ("missing peak torque", asked - settled.peak, (1.0 - LEAST_PEAK_WALK) * asked)
+        return ("RMS error", settled.rms_error, LARGEST_SHARE_OF_WAVE * wanted), short
+    deviation = ("swing", settled.error_range) if settled.rests else ("largest error", settled.largest_error)
+    beyond, where = float(np.max(shortfall(scenario))), " at every angle" * (scenario.motion.locked_angle is None)
+    lack = (f"the reference is beyond reach{where}, by", beyond) if beyond > mean else ("mean error", mean)
+    return (
+        ("RMS error", settled.rms_error, float(rms_error_limit(settled, switches))),
+        ("mean error", mean, LARGEST_MEAN_SWITCHED * wanted if switches and settled.rests else math.inf),
+        (*deviation, float(deviation_limit(settled, switches))),
+        (*(("mean error", mean) if settled.rests else lack), LARGEST_SHARE * wanted),
+    )
 
 
 def is_undecided(result: "RecordedResult") -> bool:
@@ -270,11 +272,8 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     """
     scenario, law, recording = result.scenario, result.scenario.law, result.recording
     is_task = scenario.follows_reference
-    if (
-        len(recording) < _FEWEST_SAMPLES
-        or scenario.controller.is_open_loop
-        or (is_task and controlled_in(recording) is None)
-    ):
+    is_unknown = is_task and controlled_in(recording) is None
+    if len(recording) < _FEWEST_SAMPLES or scenario.controller.is_open_loop or is_unknown:
         return None
     limit = 0.0 if is_task else float(scenario.controller.settings.get("largest_torque", 0.0))
     settled = settled_task(scenario, recording) if is_task else settled_walk(recording, limit)

@@ -10,8 +10,8 @@ from ppafo.parameters.reach import supply_for
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation, small_valve
-from ppafo.simulation.tracking.load_causes import ONE_WAY, reach_at_samples
-from ppafo.simulation.tracking.remedies import dead_band, larger_gains, level_text, remedy, sized_valves
+from ppafo.simulation.tracking.load_causes import ONE_WAY, reach_at_samples, reach_text
+from ppafo.simulation.tracking.remedies import dead_band, level_text, quicker_loops, remedy, sized_valves
 from ppafo.simulation.tracking.rule import LEAST_PEAK_WALK
 
 _OFTEN = 0.1
@@ -40,20 +40,19 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         # Dorsiflexion torque requested from an actuator that pushes in plantarflexion only.
         asked, lowest = float(reference[places].min()), float(reaches[:, 0].min())
         text = (
-            f"the controller requests {level_text('N m', asked)}, but the actuator gives at most "
-            f"{level_text('N m', lowest)}: it acts in one direction only"
+            f"the controller requests {level_text('N m', asked)}, but the actuator gives {reach_text(lowest, False)}: "
+            "it acts in one direction only"
         )
         settings = scenario.controller.settings
         unasked = {f"controller.{name}": 0.0 for name in _DORSIFLEXION if settings.get(name, 0.0) > 0.0}
         omission = (remedy(scenario, unasked),) if unasked else ()
         advice = "request no dorsiflexion torque, or add a spring that lifts the foot"
         return TrackingCause(text, omission, advice, is_beyond_reach=True)
-    lacks_most = int(np.argmax(np.maximum(above, below)))
-    given = float(reaches[lacks_most, 1 if above[lacks_most] > 0.0 else 0])
+    at = int(np.argmax(np.maximum(above, below)))
+    asked, given = float(reference[places][at]), float(reaches[at, 1 if above[at] > 0.0 else 0])
     text = (
         f"for {100.0 * share:.0f} % of the time the controller requests more torque than the actuator gives, such as "
-        f"{level_text('N m', float(reference[places][lacks_most]))} where the actuator gives "
-        f"{level_text('N m', given)}"
+        f"{level_text('N m', asked)} where the actuator gives {level_text('N m', given)}"
     )
     numbers: dict[str, float] = {}
     for path, lacking in (("supply.pressure", above), ("supply.dorsiflexion_pressure", below)):
@@ -62,12 +61,10 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         if needed is not None and lacking.max() > 0.0:
             numbers[path] = needed
     remedies = [remedy(scenario, numbers)] if numbers else []
-    if scenario.controller.settings.get("largest_torque", 0.0) > 0.0:
-        least = float(np.quantile(np.where(reference[places] > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
-        if least > 0.0:
-            remedies.append(remedy(scenario, {"controller.largest_torque": least}))
-    advice = "increase `supply.pressure` or request less torque"
-    return TrackingCause(text, tuple(remedies), advice, is_beyond_reach=True)
+    least = float(np.quantile(np.where(reference[places] > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
+    if min(least, scenario.controller.settings.get("largest_torque", 0.0)) > 0.0:
+        remedies.append(remedy(scenario, {"controller.largest_torque": least}))
+    return TrackingCause(text, tuple(remedies), "increase `supply.pressure` or request less torque", True)
 
 
 def _speed_of_gait(case: Case) -> TrackingCause:
@@ -75,11 +72,9 @@ def _speed_of_gait(case: Case) -> TrackingCause:
     scenario = case.scenario
     volumes = {path: number_at(scenario, path) for path in ("actuator.dead_volume_1", "actuator.dead_volume_2")}
     remedies = [] if case.law is None else [*sized_valves(scenario, (0.5, 2.0))]
-    remedies += [
-        remedy(scenario, {path: factor * number for path, number in volumes.items()})
-        for factor in (2.0, 4.0)
-        if min(volumes.values()) > 0.0
-    ]
+    if min(volumes.values()) > 0.0:
+        larger = [{path: factor * number for path, number in volumes.items()} for factor in (2.0, 4.0)]
+        remedies += [remedy(scenario, numbers) for numbers in larger]
     text = "the gait moves the joint faster than the torque loop can follow"
     return TrackingCause(text, tuple(remedies), "use larger dead volumes or a faster valve")
 
@@ -94,7 +89,7 @@ def _dead_band_of_walk(case: Case) -> TrackingCause | None:
         return None
     text = f"the command stays within `valve.dead_band = {band:.2g}` for {100.0 * share:.0f} % of the time"
     advice = "use a valve without dead band, or a controller that compensates the dead band"
-    return TrackingCause(text, tuple(larger_gains(scenario, case.law, (2.0, 4.0, 8.0))), advice)
+    return TrackingCause(text, quicker_loops(scenario, case.law, (2.0, 4.0, 8.0)), advice)
 
 
 CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (

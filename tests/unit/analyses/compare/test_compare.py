@@ -181,7 +181,7 @@ def test_a_remedy_that_is_said_was_tried() -> None:
     remarks = compare({"beyond": beyond, "paper": ppafo.load_scenario("torque-task-proportional")}).found.remarks
     said = next(text for text in remarks if text.startswith("beyond"))
     assert "with overrides=['beyond:supply.pressure=94.5 psi_g'] it follows" in said
-    assert "it follows, as a further run shows; not counted among the best" in said
+    assert "it follows, as a further run shows, with a margin; not counted among the best" in said
 
 
 UNKNOWN_GAINS = {

@@ -1,11 +1,15 @@
 """Free decay: the course of equation (1), planted damping and friction, and an inertia that may be unknown."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from ppafo.analyses.identify.answer import Identification
+from ppafo.analyses.identify.question import identify
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import Tolerances, free_decay
 from ppafo.identification.bench.free_decay import Slowing, course
@@ -114,6 +118,35 @@ def swing_on_a_spring(stiffness: float, duration: float) -> RecordingSource:
 def test_a_swing_on_a_spring_is_no_decay_and_the_fit_of_its_motion_is_named(stiffness: float, duration: float) -> None:
     with pytest.raises(IdentificationError, match=r"turns back at 0\.\d+ s without coming to rest.*\[trajectory\]"):
         free_decay((swing_on_a_spring(stiffness, duration),), inertia=8.4e-3)
+
+
+def test_the_fit_that_a_refused_swing_names_finds_its_friction(tmp_path: Path) -> None:
+    swing = swing_on_a_spring(2.0, 3.0)
+    with pytest.raises(IdentificationError) as refused:
+        free_decay((swing,), inertia=8.4e-3)
+    (parameters,) = re.findall(r"parameters = (\[.*?\]) and", str(refused.value))
+    keys = re.findall(r'(?:channels|initial_state|scenario|overrides) = (?:\[[^]]*\]|"\w[^"]*")', str(refused.value))
+    assert len(keys) == 4
+    given = "\n".join(keys).replace("stiffness=...", "stiffness=2").replace("rest_angle=...", "rest_angle=90")
+    rows = np.column_stack((swing.recording.time, np.degrees(swing.recording["angle"])))
+    np.savetxt(tmp_path / "swing.csv", rows, "%.4f", ",", header="time [s],angle [deg]", comments="")
+
+    def identified(parameters: str) -> Identification:
+        (tmp_path / "swing.toml").write_text(
+            f'schema_version = 1\nname = "swing"\ndevice.set = "ppafo2011"\n[trajectory]\nparameters = {parameters}\n'
+            f'[[trajectory.experiments]]\nlabel = "swing"\nrecording = "swing.csv"\n{given}\n',
+            encoding="utf-8",
+        )
+        return identify(tmp_path / "swing.toml")
+
+    # Static friction, which a swing hardly shows, was fitted below dynamic friction; the bound that is said mends it.
+    above = str(identified(parameters))
+    (low,) = set(re.findall(r"friction\.static_torque with low = '(.*?)'", above))
+    found = identified(parameters.replace('start = "0.02 N m"', f'start = "{low}", low = "{low}"'))
+    assert found.passed
+    for number in ("friction.viscous_damping  20", "friction.dynamic_torque   0.03"):
+        assert number in above
+        assert number in str(found)
 
 
 def test_a_vane_that_a_hand_turns_back_after_a_rest_is_a_decay() -> None:
