@@ -54,6 +54,10 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
         for tried in sorted(sizing.tried, key=lambda tried: -tried.torque)
     ]
     remarks = ["toes below 0 would drag"] if any(tried.toes < 0.0 for tried in sizing.tried) else []
+    if device is None and not any(requirements.is_reached_by(tried.torque) for tried in sizing.tried):
+        remarks.append(
+            "only vanes are sized; a cylinder walks with: ppafo walk proportional --set device.set=cylinder-lever"
+        )
     table = finding.Section(
         "Parts that were tried in a walk",
         columns_of((*_HEAD, ("gas", flow), ("mass of both", MASS)), rows),
