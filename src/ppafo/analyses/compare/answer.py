@@ -57,6 +57,11 @@ class ConfigurationResult:
     renoised: Rows | None = field(compare=False, repr=False)
 
     @property
+    def word(self) -> str:
+        """End of the nominal run in words; not recommended if the run does not follow its reference."""
+        return self.tracking.kind if self.tracking is not None and not self.follows else self.status.kind
+
+    @property
     def follows(self) -> bool:
         """True if the nominal run follows its reference, or misses it only as announced by its scenario."""
         return self.tracking is None or not self.tracking.is_useless
@@ -187,13 +192,7 @@ def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
             [
                 Column("configuration", [case.configuration for case in task.cases]),
                 *(Column(kind.words, [case.value(name) for case in task.cases], kind) for name, kind in kinds),
-                Column(
-                    "status",
-                    [
-                        case.tracking.kind if case.tracking and not case.follows else case.status.kind
-                        for case in task.cases
-                    ],
-                ),
+                Column("status", [case.word for case in task.cases]),
             ],
         ),
         *(

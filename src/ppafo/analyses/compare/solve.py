@@ -96,7 +96,14 @@ def compared(
         raise StudyError(f"baseline: there is no configuration '{baseline}'{known_names(baseline, names)}")
     baseline = baseline or names[0]
     named_tasks = list(tasks) or [(AS_WRITTEN, ())]
-    scenarios = _scenarios_of_tasks(named_tasks, configurations)
+    repeated = first_twice([name for name, _ in named_tasks])
+    if repeated is not None:
+        raise StudyError(f"two tasks are named '{repeated}'; give every task a different name")
+    scenarios = {
+        (task, configuration.name): configuration.scenario
+        for task, overrides in named_tasks
+        for configuration in configurations_with(configurations, overrides)
+    }
     # Metrics that all scenarios can have: without a reference there is no error.
     metrics = [
         name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())
@@ -133,20 +140,6 @@ def compared(
             f"{draws.count:,} draws, which {argument_text('draws')} changes"
         )
     return replace(comparison, remarks=remarks)
-
-
-def _scenarios_of_tasks(
-    tasks: Sequence[tuple[str, Sequence[str]]], configurations: Sequence[Configuration]
-) -> Scenarios:
-    """Return the scenario of every configuration on every task; StudyError for two tasks with the same name."""
-    repeated = first_twice([name for name, _ in tasks])
-    if repeated is not None:
-        raise StudyError(f"two tasks are named '{repeated}'; give every task a different name")
-    return {
-        (task, configuration.name): configuration.scenario
-        for task, overrides in tasks
-        for configuration in configurations_with(configurations, overrides)
-    }
 
 
 def _uncertainty_of_comparison(scenarios: Scenarios, study: Study | None, draws: DrawSettings) -> Uncertainty:

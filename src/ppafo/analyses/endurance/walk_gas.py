@@ -84,9 +84,8 @@ def read_walk_gas(folder: Path) -> WalkGas:
             f"{path}: the walk {status}, so its gas demand cannot be repeated; give a walk that ran to its end"
         )
     configuration = _table(path, document, "configuration")
-    sequence = (
-        None if configuration.get("task_sequence") is None else _table(path, document, "configuration.task_sequence")
-    )
+    has_sequence = configuration.get("task_sequence") is not None
+    sequence = _table(path, document, "configuration.task_sequence") if has_sequence else None
     metric = "gas" if sequence is None else "task_sequence_gas"
     time = "configuration.gait.stride_time" if sequence is None else "metrics.task_sequence_time.value"
     # A walk without help has no gas among its metrics.

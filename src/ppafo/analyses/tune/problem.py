@@ -362,7 +362,7 @@ def _metric_limit(constraint: Constraint, atmosphere: float | None) -> MetricLim
 
 
 def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> SearchedParameter:
-    """Return a searched parameter with bounds in SI; StudyError if it has no value or cannot be searched within them."""
+    """Return a searched parameter with bounds in SI; StudyError for a path or bounds that cannot be searched."""
     with refused_as(StudyError, f"search '{gain.path}'", UnitError, ScenarioError):
         varied = varied_path(gain.path, scenario)
         ends = (gain.minimum, gain.maximum)

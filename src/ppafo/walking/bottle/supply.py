@@ -156,10 +156,8 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
     wrong: list[PpafoError] = []
     if not is_of_bottle(device.gas.molar_mass, bottle):
         species, fed = bottle.fluid.name, device.gas.species
-        problem = (
-            f"contains {species}, but the device uses {fed}: set gas.species={species}, or choose a bottle of {fed}"
-        )
-        wrong.append(reading.refusal(BOTTLE_NAME, problem))
+        choice = f"set gas.species={species}, or choose a bottle of {fed}"
+        wrong.append(reading.refusal(BOTTLE_NAME, f"contains {species}, but the device uses {fed}: {choice}"))
     if own_pressure is not None:
         room = device.supply.atmospheric_pressure
         own_text = shown_text(own_pressure, "Pa_a", atmosphere=room, unit=bottle.entries[_SET_PRESSURE].unit)
@@ -247,8 +245,6 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
         )
     pressure = supply.offers_first().content.pressure
     if pressure < regulator.set_pressure + regulator.pressure_margin:
-        has, needs = (
-            shown_text(each, "Pa_a", atmosphere=device.supply.atmospheric_pressure)
-            for each in (pressure, regulator.set_pressure + regulator.pressure_margin)
-        )
+        atmosphere, needed = device.supply.atmospheric_pressure, regulator.set_pressure + regulator.pressure_margin
+        has, needs = (shown_text(each, "Pa_a", atmosphere=atmosphere) for each in (pressure, needed))
         raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, but its regulator needs {needs}")
