@@ -17,8 +17,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate_many
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.studies.declaration import DEFAULT_SEED
-from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, uncertainty_of
-from ppafo.studies.limits import CONFIDENCE, check_fraction
+from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, configurations_with
 from ppafo.studies.varying import value_at, varied_path
@@ -51,13 +50,6 @@ class DrawSettings:
     maximum_failed: float
     threads: int | None
     progress: Report | None
-
-    def check(self) -> None:
-        """Raise StudyError for numbers of draws, confidence or failed runs outside their ranges."""
-        if not FEWEST_DRAWS <= self.count <= MAXIMUM_DRAWS:
-            raise StudyError(f"draws = {self.count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
-        check_fraction(self.confidence, *CONFIDENCE)
-        check_fraction(self.maximum_failed, "maximum_failed")
 
 
 Scenarios = Mapping[tuple[str, str], Scenario]
