@@ -535,6 +535,7 @@ BOTH_SIGNS = (
     .replace('"0.4 N m"', '"0.8 N m"')
 )
 """Torque between 8 N m and -8 N m, whose crests last too briefly for the valve."""
+MORE = "in the simulated run: for more, lower limits.rms_error below '"
 
 
 def test_a_suggested_run_that_stays_below_a_peak_of_either_sign_says_so(tmp_path: Path, sizing: Sizing) -> None:
@@ -544,16 +545,16 @@ def test_a_suggested_run_that_stays_below_a_peak_of_either_sign_says_so(tmp_path
     torques = recorded_torques(both)
     assert 0.0 < max(torques) < 0.95 * 8.0
     assert -0.95 * 8.0 < min(torques) < 0.0
-    reaches = f"; reaches {max(torques):.3g} of 8 N m and {min(torques):.3g} of -8 N m in the simulated run: for more, lower limits.rms_error below '"
+    reaches = f"; reaches {max(torques):.3g} of 8 N m and {min(torques):.3g} of -8 N m {MORE}"
     assert reaches in suggestion_sentence(both)
     assert reaches in str(finding_of(both))
     # 1 in lbf = 4.44822 N x 0.0254 m.
     with shown_in({"N m": "in lbf"}):
         most, least = max(torques) / 0.112985, min(torques) / 0.112985
-        said = f"; reaches {most:.3g} of 70.8 in lbf and {least:.3g} of -70.8 in lbf in the simulated run: for more, lower limits.rms_error below '"
+        said = f"; reaches {most:.3g} of 70.8 in lbf and {least:.3g} of -70.8 in lbf {MORE}"
         assert said in suggestion_sentence(both)
     # Torques of one sign: the other has no peak.
-    said = f"; reaches {max(recorded_torques(sizing)):.3g} of 4 N m in the simulated run: for more, lower limits.rms_error below '"
+    said = f"; reaches {max(recorded_torques(sizing)):.3g} of 4 N m {MORE}"
     assert said in suggestion_sentence(sizing)
 
 
