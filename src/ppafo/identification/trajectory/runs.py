@@ -276,7 +276,7 @@ def _check_same_program(prepared: _PreparedExperiment, device: Device, numbers: 
     """
     program, planned_settings = prepared.run.program, prepared.scenario.device.valve.settings
     settings: Mapping[str, Any] = device.valve.settings
-    fitted = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
+    fitted = {path.rpartition(".")[2] for path in numbers if path.startswith(("valve.", "valves."))}
     kind = VALVES[device.valve.kind]
     for run in range(max((value.size for value in settings.values() if isinstance(value, np.ndarray)), default=1)):
         values = {name: at(value, run) for name, value in settings.items()}
