@@ -76,7 +76,8 @@ KINDS: dict[str, _NewFile] = {
 }
 """Kinds of file written by ``ppafo new``, each with a template in ``templates``."""
 
-
+_WITH_SOURCES = ("set", "bottle", "parts")
+"""Kinds of file whose values have a source each."""
 EXAMPLE = "example"
 
 
@@ -132,7 +133,8 @@ def new(
             path.unlink(missing_ok=True)
     command = chosen.command.replace("FILE", shlex.quote(str(path))).replace("NAME", name)
     document = {"kind": kind, "name": name, "file": str(path), "next": command}
-    return CommandOutput(f"written: {path}; next: {command}", document)
+    copied = f", still with values, notes and sources of {source}" if source and kind in _WITH_SOURCES else ""
+    return CommandOutput(f"written: {path}{copied}; next: {command}", document)
 
 
 def _bottle_text(part: str, name: str) -> str:

@@ -40,8 +40,5 @@ PROFILES: Kinds[ProfileKind] = Kinds(
 
 def switching_remedy(name: str) -> str:
     """Return the remedy for a user's own on/off law that does not declare to be one; empty for laws of this package."""
-    return (
-        ""
-        if CONTROLLERS.is_own(name)
-        else " (only_switches=True in its ControllerKind, if it commands only 1, 0 and -1)"
-    )
+    declaration = " (only_switches=True in its ControllerKind, if it commands only 1, 0 and -1)"
+    return "" if CONTROLLERS.is_own(name) else declaration

@@ -87,7 +87,7 @@ _LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
 """Letters of a title per inch, fewest letters per line, and width of the mark "simulated" [inches]."""
 _ENTRY, _ENTRY_LETTERS = 0.53, 14.5
 """Width of a legend entry without its label [inches], and letters of a label per inch."""
-_ROW, _ABOVE = 13.0, 6.0
+_ROW, _ABOVE = 11.0, 6.0
 """Height of a legend row, and distance from the axes to a title [points]."""
 _HIGHEST = 9.4
 """Largest height of a figure [inches]: the height of the text on a page."""
@@ -103,6 +103,8 @@ _MARKUP = re.compile(r"\\[a-z]+|[${}_^]")
 """Pattern of the markup in a title, which takes no space on the page."""
 _SMALLEST_PLAIN, _LARGEST_PLAIN = 1.0e-4, 1.0e7
 """Limits of a logarithmic axis whose tick labels are written without an exponent."""
+_FEW_DECADES = 100.0
+"""Ratio of the ends of a logarithmic axis below which 2 and 5 of every decade have a label too."""
 _TITLE_LINE = 0.2
 """Line height of the title [inches]."""
 _OF_LEGEND: Mapping[str, Any] = {
@@ -286,10 +288,10 @@ def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
     title_width = len(title) / _LETTERS if title else 0.0
     if sum(widths) + title_width <= width:
         return len(widths), 0
-    for rows in range(1, len(widths)):
+    for columns in range(len(widths) - 1, 1, -1):
         # A legend is filled column by column.
-        if sum(max(widths[first : first + rows]) for first in range(0, len(widths), rows)) <= width:
-            return -(-len(widths) // rows), rows
+        if sum(map(max, np.array_split(widths, columns))) <= width:
+            return columns, -(-len(widths) // columns)
     return 1, len(widths)
 
 
@@ -298,7 +300,7 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
 
     ``title_size`` is the font size of the title [points].
     """
-    from matplotlib.ticker import NullFormatter
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     if not panel.marks:
         axes.set_axis_off()
@@ -320,12 +322,13 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
             # Above the axes, out of the way of the data; where there is no room beside the title, below that.
             across, rows = _legend_rows(panel, title, size[0] - _AXIS_ROOM)
             pad += _ROW * rows + (_ABOVE if rows else 0.0)
+            # The title, which is higher, keeps the room; a legend that is wider than the axes makes them no narrower.
             axes.legend(
                 loc="lower right" if rows == 0 else "lower left",
                 bbox_to_anchor=(1.0, 1.0) if rows == 0 else (0.0, 1.0),
                 ncols=across,
                 **_OF_LEGEND,
-            )
+            ).set_in_layout(not title)
         elif panel.legend == "inside":
             legend = axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=2.2)
             for entry in legend.get_texts():
@@ -340,6 +343,9 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
         panel.then(axes)
     for axis in (axes.xaxis, axes.yaxis):
         if axis.get_scale() == "log":
+            low, high = sorted(axis.get_view_interval())
+            if high < _FEW_DECADES * low:
+                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axis.set_major_formatter(_logarithmic_ticks(axis))
             axis.set_minor_formatter(NullFormatter())
     return mapped

@@ -59,11 +59,7 @@ class _Quantity(NamedTuple):
 
 
 _QUANTITIES = (
-    _Quantity(
-        kind=_ANGLE,
-        lines={"angle": ("ankle", ACTUAL), "reference_angle": ("reference", REFERENCE)},
-        smallest_span=math.radians(10.0),
-    ),
+    _Quantity(_ANGLE, {"angle": ("ankle", ACTUAL), "reference_angle": ("reference", REFERENCE)}, math.radians(10.0)),
     _Quantity(
         kind=Kind("Pressure", "Pa_a", "pressure"),
         lines={
@@ -103,11 +99,13 @@ def recording_figure(
     """Return the figure of a recording, with a panel for every quantity in it.
 
     A constant ankle angle of a simulation is written in the title instead, unless nothing else can be drawn. ``remark``
-    is printed below the panels, for example the reason for an early stop. ``valve`` is the kind of valve, which
-    determines the colour of the device, and ``joint`` holds the names of the joint. Gauge pressure is relative to the
-    active atmosphere (``units/shown.py``).
+    is printed below the panels, for example the reason for an early stop. ``valve`` is the kind of valve, which is in
+    the title and determines the colour of the device, and ``joint`` holds the names of the joint. Gauge pressure is
+    relative to the active atmosphere (``units/shown.py``).
     """
     title = title or recording.label
+    if valve and valve not in title:
+        title = f"{title}, {valve.replace('_', ' ')} valve"
     drawn = [quantity for quantity in _QUANTITIES if not quantity.lines.keys().isdisjoint(recording.names)]
     others = [quantity for quantity in drawn if quantity.kind is not _ANGLE]
     may_be_locked = recording.kind == "simulated" and "angle" in recording and "reference_angle" not in recording

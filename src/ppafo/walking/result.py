@@ -16,6 +16,7 @@ from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking, following_text, tracking_in
+from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.storage.opensim import write_opensim
 from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
@@ -120,7 +121,8 @@ class WalkResult:
         head = [f"{self.scenario.name}: {self.status.kind}", self.scenario.origin.replaced]
         head.append(changed_text(changes_in(self.scenario)))
         if self.status.is_completed:
-            head += [self.torque_sentence(self.tracking), "" if self.is_helped else self.help_text]
+            head += [self.torque_sentence(self.tracking), unlimited_switching(self)]
+            head.append("" if self.is_helped else self.help_text)
             toes = self.metrics.get("lowest_toes")
             if toes is not None and toes.value < 0.0:
                 head.append("the toes would drag in mid-swing: the ankle is not lifted enough")

@@ -95,6 +95,19 @@ def test_figure_8_shows_torque_and_reference_of_both_valves_on_one_scale(reprodu
         assert list(drawn["reference"]) == list(recording["reference"])
 
 
+def test_figure_8_states_where_the_gas_is_in_numbers_that_add_up(reproduction: Reproduction) -> None:
+    recordings = reproduction.solenoid.recording, reproduction.proportional.recording
+    with drawn_at("84 mm"):
+        figure = torque_task_figure(*recordings, 5.0, (1.1, 0.4), recordings)
+    stated = [text.get_text() for text in figure.axes[-1].texts]
+    for text, recording in zip(stated, recordings, strict=True):
+        inside, vented = map(float, text.removesuffix(" g").split("+"))
+        assert inside + vented == pytest.approx(1e3 * recording["supplied_mass"][-1], abs=0.011)
+    legends = [legend for axes in figure.axes if (legend := axes.get_legend()) is not None]
+    named = {text for legend in legends for text in legend.get_texts()} | set(figure.axes[-1].texts)
+    assert max(text.get_window_extent().x1 for text in texts_of(figure) if text in named) <= figure.bbox.x1
+
+
 def test_figure_8_shows_when_each_solenoid_valve_is_on(reproduction: Reproduction) -> None:
     solenoid = reproduction.solenoid.recording
     figure = torque_task_figure(solenoid, reproduction.proportional.recording, 5.0, (1.1, 0.4))
@@ -222,7 +235,7 @@ def test_figure_8_shows_the_synthetic_experiment_with_both_valves(reproduction: 
     runs = (reproduction.solenoid.recording, reproduction.proportional.recording)
     figure = torque_task_figure(*runs, 5.0, (1.1, 0.4), (evidence.solenoid, evidence.proportional))
     for axes in (figure.axes[0], figure.axes[2]):
-        assert "synthetic experiment" in {line.get_label() for line in axes.lines}
+        assert "synthetic" in {line.get_label() for line in axes.lines}
 
 
 @pytest.mark.parametrize("width", [None, "84 mm", "145 mm"])

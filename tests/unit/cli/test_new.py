@@ -53,6 +53,7 @@ def test_what_a_copy_of_a_set_accepts_lapses_where_it_changes_a_value_of_the_fin
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     main(["new", "set", "own", "--from", "ppafo2011"])
+    assert "written: own.toml, still with values, notes and sources of ppafo2011; next: " in capsys.readouterr().out
     same = {finding.id: finding.accepted for finding in findings_of(load_parameter_set("own.toml"))}
     assert same["flow-of-solenoid"].startswith("As for the proportional valve")
     text = Path("own.toml").read_text(encoding="utf-8")

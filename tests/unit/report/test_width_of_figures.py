@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -66,6 +67,31 @@ def tick_labels_that_touch(figure: Figure) -> list[tuple[str, str]]:
                 if a.overlaps(b)
             ]
     return pairs
+
+
+def test_a_legend_of_several_rows_stands_close_below_its_title_and_makes_the_axes_no_narrower() -> None:
+    def axes_of(*labels: str) -> Axes:
+        marks = [Mark("line", [0.0, 1.0], [0.0, 1.0], label=label) for label in labels]
+        figure = draw_panels([Panel(Kind("Time"), Kind("Torque"), marks, "Torque over time")])
+        figure.draw_without_rendering()
+        return figure.axes[0]
+
+    with drawn_at("84 mm"):
+        narrow, wide = axes_of("a", "b"), axes_of("reference", "maximum: 5.0 N m", "synthetic experiment", "simulated")
+    legend = wide.get_legend()
+    assert legend is not None
+    assert wide.get_window_extent().width == pytest.approx(narrow.get_window_extent().width, rel=0.02)
+    title = next(text for text in texts_of(wide.get_figure()) if text.get_text() == "Torque over time")
+    gap = title.get_window_extent().y0 - legend.get_window_extent().y1
+    # Less than the height of a row, 11 pt at full width, in points of 1/72 inch.
+    assert 0.0 <= 72.0 * gap / wide.get_figure().dpi < 11.0
+
+
+def test_a_logarithmic_axis_of_less_than_two_decades_has_more_labels_than_its_powers_of_ten() -> None:
+    panel = Panel(Kind("Frequency"), Kind("Gain"), [Mark("line", [1.0, 2.0], [1.5, 14.0])])
+    figure = draw_panels([replace(panel, then=lambda axes: axes.set_yscale("log"))])
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert {"2", "5", "10"} <= set(labels)
 
 
 @pytest.mark.long

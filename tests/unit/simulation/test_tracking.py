@@ -147,6 +147,36 @@ def test_a_walk_with_an_actuator_that_pushes_one_way_is_told_to_ask_for_no_dorsi
     assert simulate("proportional", [*changes, *verdict.mended]).tracking is None
 
 
+def test_a_walk_that_gives_half_of_the_requested_peak_does_not_follow_and_is_told_the_reach() -> None:
+    """A cylinder of 40 mm bore at 6 bar has pi/4 (0.04 m)^2 6e5 Pa = 754 N on its lever."""
+    wearer = ["device.set=cylinder-lever", "wearer.body_mass=35 kg", "wearer.stature=1.4 m", "run.duration=6 s"]
+    changes = [*wearer, "supply.pressure=6 bar_g", "actuator.bore=40 mm", "controller.peak_torque=34 N m"]
+    scenario = load_scenario("proportional", [*changes, "controller.largest_torque=40 N m"])
+    result = simulate(scenario)
+    reach = 754.0 * scenario.device.actuator.settings["lever_length"]
+    assert max(result["torque"]) < reach < 0.7 * max(result["reference"])
+    verdict = tried(scenario, result.tracking)
+    assert verdict is not None
+    assert verdict.found.startswith("the torque does not follow its reference: missing peak torque ")
+    assert "the controller requests more torque than the actuator gives" in verdict.sentence
+    (limit,) = verdict.mended
+    assert simulate("proportional", [*changes, limit]).tracking is None
+    # A study judges by the settings, for any limit of its runs.
+    columns = {"controller.largest_torque": np.array([13.0, 40.0])}
+    metered = run_ensemble(scenario, columns, with_companions([], scenario)).metrics
+    assert excess(metered, scenario, columns).follows.tolist() == [1.0, 0.0]
+
+
+def test_a_walk_whose_law_only_switches_is_told_how_often_the_valves_are_reversed() -> None:
+    told = simulate("proportional", ["controller.kind=on_off", "run.duration=6 s"])
+    command = told["command"]
+    turns = np.count_nonzero(np.diff(np.sign(command[np.abs(command) == 1.0])))
+    (often,) = re.findall(r"\n(the valves are reversed (\d+) times a second, and no value)", str(told))
+    # Where a task ends, the count begins anew.
+    assert int(often[1]) == pytest.approx(turns / 6.0, rel=0.02)
+    assert "the valves are reversed" not in str(simulate("proportional", ["run.duration=6 s"]))
+
+
 def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
     assert simulate(TASK, ["run.duration=0.3 s"]).tracking is None
     assert simulate(TASK, ["reference.level=4 N m"]).tracking is None
@@ -187,16 +217,76 @@ def test_a_loop_that_keeps_only_the_mean_of_a_sine_does_not_follow_it() -> None:
     )
 
 
-def test_a_valve_that_opens_away_from_the_reference_is_not_called_too_small() -> None:
+class Switching:
+    """Relay with hysteresis: full opening towards the reference times ``sign`` beyond ``band`` [N m]."""
+
+    def __init__(self, band: float, sign: float = 1.0) -> None:
+        self.band, self.sign, self.command = band, sign, 0.0
+
+    def reset(self) -> None:
+        self.command = 0.0
+
+    def update(self, time: float, reference: float, measurement: Any) -> float:
+        error = reference - measurement.torque
+        if abs(error) > self.band:
+            self.command = math.copysign(self.sign, error * self.sign)
+        return self.command
+
+
+@pytest.mark.parametrize("command", [1.0, -1.0])
+def test_a_valve_that_is_never_reversed_is_neither_called_too_small_nor_of_the_wrong_sign(command: float) -> None:
     class Opens:
         def reset(self) -> None: ...
 
         def update(self, time: float, reference: float, measurement: object) -> float:
-            return 1.0
+            return command
 
     told = simulate(load_scenario(TASK, ["reference.level=2 N m"]).controlled_by(Opens())).tracking
     assert told is not None
-    assert "drives away from the reference for 100 % of this time; reverse the sign" in told.sentence
+    # The paper's actuator reaches 5 N m in either direction.
+    error = 3 if command > 0.0 else 7
+    assert f"fully open away from the reference and is not reversed, {error} N m off" in told.sentence
+
+
+@pytest.mark.parametrize("rate", ["1 kHz", "20 Hz"])
+@pytest.mark.parametrize("band", [0.3, 1.0, 2.0])
+def test_the_wrong_sign_is_named_for_one_of_two_opposite_laws(band: float, rate: str) -> None:
+    scenario = load_scenario(TASK, ["reference.level=4 N m", f"controller.rate={rate}"])
+    right, wrong = (simulate(scenario.controlled_by(Switching(band, sign))).tracking for sign in (1.0, -1.0))
+    assert right is not None
+    assert wrong is not None
+    assert "reverse the sign" not in right.sentence
+    assert "reverse the sign" in wrong.sentence
+    # 2 N m above the reference is beyond the 5 N m of the actuator, so that the relay is never reversed.
+    assert ("is not reversed, 1 N m off" in right.cause) == (band == 2.0)
+
+
+def test_a_law_that_only_switches_without_a_declaration_is_told_a_dead_zone_and_the_declaration(tmp_path: Path) -> None:
+    """Both remedies work, and the law as a Python object has as many reversals as in a module."""
+    example = Path(ppafo.__file__).parent / "examples" / "add-a-controller" / "my_laws" / "hysteresis.py"
+    text = example.read_text(encoding="utf-8")
+    undeclared = text.replace("only_switches=True", "only_switches=False")
+    resting = undeclared.replace("else state.command", "else 0.0")
+    assert len({text, undeclared, resting}) == 3
+    said = {}
+    for name, law in {"declared": text, "undeclared": undeclared, "resting": resting}.items():
+        (tmp_path / f"{name}.py").write_text(law, encoding="utf-8")
+        band = "0.15" if name == "resting" else "0.3"
+        sets = [f"controller.kind={name}:KIND", f"controller.band={band} N m", "reference.level=4 N m"]
+        words = [word for change in sets for word in ("--set", change)]
+        command = [sys.executable, "-m", "ppafo", "simulate", TASK, "--plugin", f"{name}.py", *words]
+        ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        said[name] = ran.stdout.splitlines()[1]
+    assert said["declared"].startswith("the torque follows its reference")
+    assert said["resting"].startswith("the torque follows its reference")
+    assert said["undeclared"].endswith(
+        "`hysteresis` commands only full openings, and reverses them without pause; let it command 0 within a dead "
+        "zone below 0.2 N m about its reference, or give it hysteresis and only_switches=True in its ControllerKind"
+    )
+    scenario = load_scenario(TASK, ["controller.rate=1 kHz", "reference.level=4 N m"])
+    alone = simulate(scenario.controlled_by(Switching(0.3))).tracking
+    assert alone is not None
+    assert said["undeclared"].partition(",")[0] == alone.found.partition(",")[0]
 
 
 KNEE = [

@@ -73,7 +73,7 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
     # In the unit of the range that was given.
     kind = of_path(path.path, path.quantity.unit, given=path.given)
     met, (index, neighbour) = outcome.met_intervals, outcome.found
-    limit = "" if condition.text == FOLLOWS else "dashed: the limit; "
+    drawn = "tracking error, divided by its limit," if condition.text == FOLLOWS else "metric"
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
     remarks = list(_remarks(outcome, kind))
     # In more digits than are shown, so that the value that is pasted meets the condition.
@@ -92,7 +92,7 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
                 "Metric over the value",
                 panels=(_panel(outcome, kind),),
                 name="find",
-                caption=f"The metric over the value; {limit}shaded: where the condition is met.",
+                caption=f"The {drawn} over the value; dashed: the limit; shaded: where the condition is met.",
             ),
         ),
         found=Threshold(
@@ -156,6 +156,7 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
     """Yield remarks on runs, further intervals, noise, oscillation and failures."""
     condition, is_met, tried, runs = outcome.condition, outcome.is_met, outcome.tried, outcome.runs
     index, _ = outcome.found
+    missed = 0 if condition.text == FOLLOWS else _not_followed(outcome)
     yield from (f"at {kind.text(value, '.9g')} {said}" for value, said in outcome.verdicts if said)
     yield from filter(None, [outcome.gains])
     evenly = np.count_nonzero(tried["is_of_grid"])
@@ -168,6 +169,8 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
     if (changes := np.count_nonzero(np.diff(is_met))) > 1:
         side = "below" if outcome.highest else "above"
         yield f"the condition changes {changes} times over the range, so it is not met everywhere {side} this value"
+    if missed or condition.text == FOLLOWS:
+        yield "a run that follows may have the allowed error, so the actuator may reach less than the reference"
     if streams := outcome.noise_streams:
         spread = ""
         if index is not None:
@@ -181,7 +184,7 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
         )
     if oscillating := int(tried["oscillating"].sum()):
         yield f"in {oscillating} of {runs.count} runs the loop oscillates: they count as not met"
-    if (missed := _not_followed(outcome)) and condition.text != FOLLOWS:
+    if missed:
         yield f"at {missed} values the condition is met, but the reference is not followed: they count as not met"
     if runs.failures:
         yield f"{runs.failures} of {runs.count} runs failed and count as not met; the first: {runs.reason}"
@@ -190,18 +193,21 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
 def _panel(outcome: FindResult, kind: Kind) -> Panel:
     """Return a panel of the metric over the value, with the limit, the values that meet it, and the result."""
     tried, condition = outcome.tried, outcome.condition
-    values, metrics, judged = tried["value"], tried["metric"], tried["judged"]
+    # What decides whether a run follows is the excess, which has no larger number beside it.
+    drawn, of_drawn, limit = ("metric", "judged"), of_metric(condition.metric), condition.limit
+    if condition.text == FOLLOWS:
+        drawn, of_drawn, limit = ("excess", "excess"), Kind("Tracking error over its limit"), 1.0
+    values, metrics, judged = tried["value"], *(tried[name] for name in drawn)
     dots, dashes = {"linestyle": "", "marker": "o", "markersize": 3}, {"linestyle": "--", "linewidth": 1.0}
     grid_samples = tried[tried["is_of_grid"]]
-    marks = [Mark("line", values, metrics), Mark("line", grid_samples["value"], grid_samples["metric"], style=dots)]
+    marks = [Mark("line", values, metrics), Mark("line", grid_samples["value"], grid_samples[drawn[0]], style=dots)]
     # The RMS error where that is larger, and what the condition is asked of.
     larger = np.where(judged > metrics, judged, np.nan)
     if np.isfinite(larger).any():
         crosses = {"linestyle": "", "marker": "x", "markersize": 4}
         label = "RMS error in the second half of the hold, if oscillating"
         marks.append(Mark("line", values, larger, label=label, colour=GREY, style=crosses))
-    if condition.text != FOLLOWS:
-        marks.append(Mark("level", (), condition.limit, label="limit", colour=BLACK, style=dashes))
+    marks.append(Mark("level", (), limit, label="limit", colour=BLACK, style=dashes))
     marks += [
         Mark("span", ends, label="" if row else "condition met", colour=GREEN)
         for row, ends in enumerate(outcome.met_intervals)
@@ -211,4 +217,4 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
         value = float(values[index])
         text = f"found: {kind.number(value, '.4g')} {kind.axis_unit}".rstrip()
         marks.append(Mark("at", value, label=text, colour=VERMILION))
-    return Panel(kind, of_metric(condition.metric), tuple(marks))
+    return Panel(kind, of_drawn, tuple(marks))

@@ -94,7 +94,7 @@ def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
 
 TRIED = np.dtype(
     [
-        *((name, np.float64) for name in ("value", "metric", "judged", "spread")),
+        *((name, np.float64) for name in ("value", "metric", "judged", "spread", "excess")),
         *((name, np.bool_) for name in ("follows", "is_of_grid")),
         *((name, np.intp) for name in ("unsettled", "oscillating")),
     ]
@@ -103,6 +103,7 @@ TRIED = np.dtype(
 
 ``judged``: number compared with the limit: the metric, or the RMS error in the second half of the hold if that is
     larger and the value swings there; nan if the loop oscillates throughout
+``excess``: tracking error divided by its limit [-], the largest over the streams; up to 1 the reference is followed
 ``follows``: True if the reference is followed in all streams
 ``is_of_grid``: True for values of the initial grid, False for values of a bracket
 ``unsettled``, ``oscillating``: number of runs that swing in the second half of the hold, and oscillate throughout
@@ -181,6 +182,7 @@ class FindResult:
         tried["spread"] = rows[metric].reshape(shape).std(axis=0, ddof=min(1, shape[0] - 1))
         tried["unsettled"] = (judged > rows[metric]).reshape(shape).sum(axis=0)
         tried["oscillating"] = oscillates.reshape(shape).sum(axis=0)
+        tried["excess"] = verdicts.largest.reshape(shape).max(axis=0)
         tried["follows"] = ~fails.reshape(shape).any(axis=0)
         merged = np.concatenate([self.tried, tried])
         return replace(self, tried=merged[np.argsort(merged["value"], kind="stable")])

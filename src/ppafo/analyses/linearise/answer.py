@@ -15,7 +15,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
-from ppafo.report.finding import Column, Finding, Section, columns_of, facts
+from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
@@ -179,12 +179,9 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         ("C", model.c, model.outputs, model.states),
         ("D", model.d, model.outputs, model.inputs),
     ):
-        numbers = [
-            Column(variable.name, column, Kind(form=".5g"))
-            for variable, column in zip(columns, values.T.tolist(), strict=True)
-        ]
-        table = [Column("", [variable.name for variable in rows]), *numbers]
-        matrices.append(Section(f"Matrix {name} (SI)", table))
+        titles = ("", *((variable.name, Kind(form=".5g")) for variable in columns))
+        cells = [(variable.name, *row) for variable, row in zip(rows, values.tolist(), strict=True)]
+        matrices.append(Section(f"Matrix {name} (SI)", columns_of(titles, cells)))
     return Finding(
         name="linearise",
         kicker="Linear model",
@@ -262,10 +259,9 @@ def _loop(model: LinearModel) -> Section:
     """Return the table of the margins of the loop with the scenario's PID, or the reason why there is none."""
     margins, controller = model.margins, model.scenario.controller
     if margins is None:
-        is_pid = controller.kind in PID_LAWS
-        reason = (
-            "the command is clipped, or has no effect" if is_pid else f"controller '{controller.kind}' is not a PID"
-        )
+        reason = "the command is clipped, or has no effect"
+        if controller.kind not in PID_LAWS:
+            reason = f"controller '{controller.kind}' is not a PID"
         return Section(remarks=[f"no stability margins: {reason}"])
     frequency, angle = Kind(quantity="frequency", form=".3g"), Kind(quantity="angle", form=".3g")
     gain = margins.gain_margin or 1.0
@@ -308,26 +304,15 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
         axes.set(**scales, ylim=(max(-360.0, float(np.min(phase)) - 90.0), float(np.max(phase)) + 20.0))
         axes.yaxis.set_major_locator(MultipleLocator(45.0))
 
+    panel = partial(Panel, _FREQUENCY, shares_x=True)
+    gains = [Mark("line", frequencies, np.abs(response))]
+    late = Mark("line", frequencies, phase - 360.0 * frequencies * delay, (), delayed, VERMILION, _DASHED)
+    phases = [Mark("line", frequencies, phase, label="plant"), late]
+    set_gain = methodcaller("set", **scales, yscale="log")
     return [
         *_open_loop_panels(model, scales),
-        Panel(
-            _FREQUENCY,
-            Kind("Torque per command", "N m"),
-            [Mark("line", frequencies, np.abs(response))],
-            then=lambda axes: axes.set(**scales, yscale="log"),
-            shares_x=True,
-        ),
-        Panel(
-            _FREQUENCY,
-            Kind("Phase", "deg"),
-            [
-                Mark("line", frequencies, phase, label="plant"),
-                Mark("line", frequencies, phase - 360.0 * frequencies * delay, (), delayed, VERMILION, _DASHED),
-            ],
-            legend="inside",
-            then=set_phase,
-            shares_x=True,
-        ),
+        panel(Kind("Torque per command", "N m"), gains, then=set_gain),
+        panel(Kind("Phase", "deg"), phases, legend="inside", then=set_phase),
     ]
 
 
@@ -376,13 +361,9 @@ def steps_panels(model: LinearModel) -> list[Panel]:
     linear = Mark("line", steps.times, steps.linear[-1] / steps.amplitudes[-1], (), "linear", BLACK, _DASHED)
     square = steps.errors[0] * (steps.sizes / steps.sizes[0]) ** 2
     dots = {"linestyle": "", "marker": "o", "markersize": 4}
+    per_command = Kind("Change of torque per command", "N m")
     return [
-        Panel(
-            replace(TIME, words="Time after the step"),
-            Kind("Change of torque per command", "N m"),
-            [*over_time, linear],
-            legend="above",
-        ),
+        Panel(replace(TIME, words="Time after the step"), per_command, [*over_time, linear]),
         Panel(
             Kind("Largest change of torque in a step", "N m"),
             Kind("Runs less linear model", "N m"),
@@ -390,8 +371,6 @@ def steps_panels(model: LinearModel) -> list[Panel]:
                 Mark("line", steps.sizes, steps.errors, label="largest difference", style=dots),
                 Mark("line", steps.sizes, square, (), "square of the amplitude", GREY, _DASHED),
             ],
-            # Inside it would hide the largest steps.
-            legend="above",
             then=lambda axes: axes.set(xscale="log", yscale="log"),
         ),
     ]

@@ -208,10 +208,9 @@ def torque_task_figure(
     simulated bench with both valves.
     """
     experiments = synthetic or (None, None)
-    valves = ("solenoid", SOLENOID, solenoid), ("proportional", PROPORTIONAL, proportional)
     runs = [
-        _TaskRun(valve=valve, style=style, recording=recording, experiment=experiment, gas_in_paper=gas)
-        for (valve, style, recording), experiment, gas in zip(valves, experiments, gas_in_paper, strict=True)
+        _TaskRun("solenoid", SOLENOID, solenoid, experiments[0], gas_in_paper[0]),
+        _TaskRun("proportional", PROPORTIONAL, proportional, experiments[1], gas_in_paper[1]),
     ]
     torques = [_torque_marks(run, ceiling) for run in runs]
     opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)
@@ -251,17 +250,15 @@ def _torque_limits(panels: Sequence[Sequence[Mark]]) -> tuple[float, float]:
 def _torque_marks(run: _TaskRun, ceiling: float) -> list[Mark]:
     """Return marks of reference, torque and largest torque [N m], and the broad line of the synthetic experiment."""
     recording, dashed = run.recording, {"linestyle": REFERENCE.line, "linewidth": 1.3}
-    ceiling_label = f"maximum at this pressure: {ceiling:.1f} N m"
     marks = [
         Mark("line", recording.time, recording["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
-        Mark("level", y=ceiling, label=ceiling_label, colour=GREY, style=_LEVEL),
+        Mark("level", y=ceiling, label=f"maximum: {ceiling:.1f} N m", colour=GREY, style=_LEVEL),
     ]
     if run.experiment is not None:
-        time, torque = run.experiment.time, run.experiment["torque"]
         # Broader than the simulated torque and darker than the grid, so that it is visible where both agree.
         broad = {"linestyle": "-", "linewidth": 4.5, "alpha": 0.75}
-        named: dict[str, Any] = {"label": "synthetic experiment", "colour": EXPERIMENT.colour}
-        marks.append(Mark("line", time, torque, style=broad, **named))
+        readings = run.experiment.time, run.experiment["torque"]
+        marks.append(Mark("line", *readings, (), "synthetic", EXPERIMENT.colour, broad))
     return [*marks, Mark("line", recording.time, recording["torque"], label="simulated", colour=run.style.colour)]
 
 
@@ -292,26 +289,31 @@ def _filling_marks(recording: Recording) -> list[Mark]:
 def _gas_panel(runs: Sequence[_TaskRun], most: float) -> Panel:
     """Return the panel of the supplied gas at the end [kg]: bars in the chambers and vented, and below them leaked.
 
-    The first of two runs is above and has the labels for the legend; ``most`` is the larger supplied gas [g].
+    Gas that leaks past the vane is vented from the other chamber. ``most`` is the larger supplied gas [g].
     """
-    marks: list[Mark] = []
-    rows = (1.0, ("in the chambers", "vented", "leaked past the vane")), (0.0, ("", "", ""))
-    for run, (height, (inside_label, vented_label, leaked_label)) in zip(runs, rows, strict=True):
+    # Grey in the legend, as the bars have the colours of the valves.
+    names = ("in chambers", GREY, 1.0), ("vented", GREY, 0.35), ("of it leaked", BLACK, 1.0)
+    none = (0.0, 0.0)
+    marks = [
+        Mark("band", none, (none, none), label=label, colour=colour, style={"alpha": alpha})
+        for label, colour, alpha in names
+    ]
+    for run, height in zip(runs, (1.0, 0.0), strict=True):
         supplied, vented, leaked = (
             float(run.recording[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass")
         )
         inside, colour = supplied - vented, run.style.colour
-        amounts = ", ".join(f"{GRAMS_PER_KILOGRAM * mass:.2f}" for mass in (inside, vented, leaked))
+        kept, lost = (f"{GRAMS_PER_KILOGRAM * mass:.2f}" for mass in (inside, vented))
         broad = (height - 0.25,) * 2, (height + 0.25,) * 2
         thin = (height - 0.36 - 0.05,) * 2, (height - 0.36 + 0.05,) * 2
         past_vane = supplied - leaked, supplied
         marks += [
-            Mark("text", supplied, height, label=f"  {amounts} g", colour=BLACK, style=_WORDS),
-            Mark("band", (0.0, inside), broad, label=inside_label, colour=colour, style={"alpha": 1.0}),
-            Mark("band", (inside, supplied), broad, label=vented_label, colour=colour, style={"alpha": 0.35}),
-            Mark("band", past_vane, thin, label=leaked_label, colour=GREY, style={"alpha": 1.0}),
+            Mark("text", supplied, height, label=f"   {kept} + {lost} g", colour=BLACK, style=_WORDS),
+            Mark("band", (0.0, inside), broad, colour=colour, style={"alpha": 1.0}),
+            Mark("band", (inside, supplied), broad, colour=colour, style={"alpha": 0.35}),
+            Mark("band", past_vane, thin, colour=BLACK, style={"alpha": 1.0}),
         ]
     # To the right of the longer bar there is space for the amounts.
-    limits = {"xlim": (0.0, 1.8 * most), "yticks": (1.0, 0.0), "yticklabels": [run.valve for run in runs]}
-    set_limits = methodcaller("set", **limits)
+    valves = [run.valve for run in runs]
+    set_limits = methodcaller("set", xlim=(0.0, 1.8 * most), yticks=(1.0, 0.0), yticklabels=valves)
     return Panel(_GAS, Kind(), marks, "Location of this gas at the end", then=set_limits, tall=0.75)

@@ -62,10 +62,11 @@ def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
 
 def _traces(channel: str, before: GainResult, after: GainResult) -> list[Mark]:
     """Return the curves of a channel over time, with the gains before and after tuning."""
-    style = {"linewidth": 1.3, "drawstyle": "steps-post" if channel == "command" else "default"}
     marks = []
-    for setting, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):
+    # Broad below, so that both show where they agree.
+    for setting, colour, label, width in ((before, VERMILION, "before", 2.8), (after, BLUE, "after", 1.1)):
         recording = setting.result.recording
+        style = {"linewidth": width, "drawstyle": "steps-post" if channel == "command" else "default"}
         marks.append(Mark("line", recording.time, recording[channel], label=label, colour=colour, style=style))
     return marks
 
@@ -119,7 +120,10 @@ def search_panels(
 
 _DIFFERENT = 0.1
 """Difference as a fraction of the range above which two starts count as ended at different gains."""
-_SEARCH_CAPTION = "Above: the best objective so far in each start. Below: where the gains lie between their bounds."
+_SEARCH_CAPTION = (
+    "Above: the best objective so far in each start. Below: where the gains lie between their bounds; a gain "
+    "before that is beyond a bound is drawn beside it."
+)
 
 
 @in_units(lambda tuned: tuned.problem.scenario.device.shown)

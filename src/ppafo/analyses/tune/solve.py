@@ -5,7 +5,7 @@ violation is better; a candidate with a failed run is worse than all others (Deb
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
 from ppafo.parameters.overrides import over
-from ppafo.progress import Report
+from ppafo.progress import Report, report_nothing
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import absolute
@@ -60,9 +60,9 @@ Costs = Callable[[Floats], Floats]
 
 def solve_tuning(problem: Problem, threads: int | None, progress: Report | None) -> Tuned:
     """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
-    spread = problem.spread
+    spread, report = problem.spread, progress or report_nothing
     metrics = with_companions(problem.metrics, problem.scenario)
-    counter = RunCounter(_largest_runs(problem), progress)
+    counter = RunCounter(_largest_runs(problem), lambda now: report(replace(now, activity="tuning, at most")))
     runs = scenario_runs(problem.scenario, metrics, counter, problem.gauge, threads)
     draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
     gains_before = {path: [value] for path, value in problem.before.items()}

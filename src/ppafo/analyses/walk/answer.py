@@ -26,6 +26,7 @@ from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.simulation.tracking import Tracking
+from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
@@ -66,7 +67,7 @@ _NUMBERS = (
     ShownNumber(name="net_push_off_work", title="Net work on the wearer in push-off", quantity="energy", digits=2),
     ShownNumber(name="torque_error", title="RMS torque error while torque is requested", quantity="torque", digits=2),
     ShownNumber(name="requested_torque", title="... RMS of the requested torque", quantity="torque", digits=2),
-    ShownNumber(name="peak_torque", title="Peak torque", quantity="torque", digits=1),
+    ShownNumber(name="peak_torque", title="Largest torque in either direction", quantity="torque", digits=1),
     ShownNumber(name=LARGEST_TORQUE, title="... limit of the controller", quantity="torque", digits=1),
     ShownNumber(name=REVERSALS_PER_STRIDE, title="Command reversals per stride", quantity="", digits=1),
     ShownNumber(
@@ -117,8 +118,9 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
     ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}"
     verdict, gains = tried(scenario, worn.tracking), gains_of(scenario, law)
-    torque, gains_text = worn.torque_sentence(verdict), "" if gains is None else gains.sentence
-    said = (ended, benefit_sentence(comparison), torque, scenario.origin.replaced, gains_text)
+    torque, switching = worn.torque_sentence(verdict), unlimited_switching(worn)
+    gains_text = "" if gains is None else gains.sentence
+    said = (ended, benefit_sentence(comparison), torque, switching, scenario.origin.replaced, gains_text)
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
     mended = usage_text(reloaded(scenario, verdict.mended)) if verdict is not None and verdict.mended else ""

@@ -67,7 +67,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     # The third stride is the first in which the controller knows the stride time.
     if peaks.size > 3:
         third, last = _TORQUE.text(float(peaks[2])), _TORQUE.text(float(peaks[-1]))
-        rows.append(("peak torque of a stride", f"{third} in the third, {last} in the last"))
+        rows.append(("push-off peak by stride", f"{third} in the third, {last} in the last"))
     return rows
 
 

@@ -22,6 +22,7 @@ def versions() -> dict[str, str]:
 def walk_document(scenario: Scenario) -> dict[str, Any]:
     """Return a walk as data in SI units; a bottle is described by its values, without the gas property tables."""
     motion, control, origin = walk_of(scenario), scenario.controller, scenario.origin
+    seed = scenario.sensors.seed
     return {
         "name": scenario.name,
         "description": scenario.description,
@@ -35,11 +36,7 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "settings": plain(control.settings),
         "period": control.period,
         "step": scenario.run.step,
-        "sensors": {
-            "numbers": plain(sensor_numbers(scenario)),
-            "faults": plain(motion.faults),
-            "seed": scenario.sensors.seed,
-        },
+        "sensors": {"numbers": plain(sensor_numbers(scenario)), "faults": plain(motion.faults), "seed": seed},
         "supply_line": plain(scenario.supply_line),
         "gas_model": plain(scenario.gas_model),
         "bottle": None if motion.bottle is None else motion.bottle.to_dict(),

@@ -157,12 +157,9 @@ class HardwareRun:
     def plot_signals(self) -> "Figure":
         """Figure of the signals of the run, with the reason of venting below."""
         traffic, status = self.traffic, self.result.status
-        vented = (
-            ""
-            if traffic.vented_at is None
-            else f"vented (command 2) from {traffic.vented_at:.6g} s on: {traffic.vent_reason}"
-        )
-        remark = vented if status.is_completed else status.message
+        remark = "" if status.is_completed else status.message
+        if status.is_completed and traffic.vented_at is not None:
+            remark = f"vented (command 2) from {traffic.vented_at:.6g} s on: {traffic.vent_reason}"
         with shown_in(self.plant.scenario.device.shown):
             return recording_figure(self.result.recording, f"{self.plant.scenario.name}, hardware in the loop", remark)
 

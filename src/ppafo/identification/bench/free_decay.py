@@ -281,7 +281,8 @@ def _panels(decays: tuple[FreeDecay, ...], model: Floats, slowing: Slowing) -> t
     speeds = np.linspace(0.0, fastest, 200)
     straight = slowing._replace(rise=0.0)
     rates.append(curve_mark("$-\\beta\\omega/I - T_c/I$", speeds, -straight.at(speeds)))
-    if slowing.rise > 0.0 and slowing.rise_velocity > 0.0:
+    # A rise within 2 % of the velocities would be drawn as an upright line on the axis.
+    if slowing.rise > 0.0 and slowing.rise_velocity > speeds[4]:
         # The formula of the legend is a straight line; what was fitted near rest bends, and has a name of its own.
         bent = Mark("line", speeds, -slowing.at(speeds), label="fit near rest")
         rates.append(replace(bent, colour=GREY, style={"linestyle": "--", "linewidth": 1.2}))

@@ -113,7 +113,12 @@ def open_valve_flow(
     )
     scatter = float(np.std(flow - model) / flow.max())
     measured_ordinate, fitted_ordinate = (_GRAMS_PER_BAR * values / upstream for values in (flow, model))
-    marks = readings_mark("measured", ratio, measured_ordinate), curve_mark(law, ratio, fitted_ordinate)
+    # Densely, so that the curve has no kinks at the readings; between them the upstream pressure is interpolated.
+    dense, order = np.linspace(ratio.min(), ratio.max(), 200), np.argsort(ratio)
+    first = np.interp(dense, ratio[order], upstream[order])
+    law_flow = opening.flow(paths.sizes({"": 0.0, **fitted.by_name}), first, dense * first)
+    curve = curve_mark(law, dense, _GRAMS_PER_BAR * law_flow / first)
+    marks = readings_mark("measured", ratio, measured_ordinate), curve
     axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")
     result = result_of(
         PROCEDURE,

@@ -217,7 +217,7 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
         return
     density, used = density_change(gas, supply - evidence.atmosphere()), evidence.number(path) or 0.0
     filled = density * volume
-    agrees = _LEAST <= filled / used <= _MOST
+    agrees, least = _LEAST <= filled / used <= _MOST, f"a volume of {1e6 * _LEAST * used / density:.3g} cm^3 or more"
     yield AuditFinding(
         id="gas-of-one-filling",
         severity="note" if agrees else "warning",
@@ -233,12 +233,7 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
             f"{evidence.in_set_unit(path, filled)} of gas from atmospheric to supply pressure; measured are "
             f"{evidence.in_set_unit(path, used)}, which include leakage across the vane. The division "
             "into swept and dead volume does not affect this check."
-            + (
-                ""
-                if agrees
-                else f" Consistent would be a volume of {1e6 * _LEAST * used / density:.3g} cm^3 or more, or a task "
-                "with several fillings."
-            )
+            f"{'' if agrees else f' Consistent would be {least}, or a task with several fillings.'}"
         ),
     )
 

@@ -42,10 +42,14 @@ class Case(NamedTuple):
 
     @property
     def is_fully_open(self) -> NDArray[np.bool_]:
-        """True for each sample of the settled part with a fully open valve."""
-        command = np.abs(self.recording["command"][self.settled.samples])
-        mask: NDArray[np.bool_] = (command >= _FULLY_OPEN) & (command <= 1.0 + SHUT)
-        return mask
+        """True for each sample of the recording with a fully open valve."""
+        command = np.abs(self.recording["command"])
+        return np.asarray((command >= _FULLY_OPEN) & (command <= 1.0 + SHUT))
+
+    @property
+    def only_opens_fully(self) -> bool:
+        """True if every recorded command is a full opening or 0, whatever the controller declares."""
+        return bool(np.all(self.is_fully_open | (np.abs(self.recording["command"]) <= SHUT)))
 
 
 class TrackingCause(NamedTuple):

@@ -117,18 +117,22 @@ def _shut_valve(case: Case) -> TrackingCause | None:
 
 def oscillation(case: Case) -> TrackingCause | None:
     """Cause: valves, gains or small chambers make the loop oscillate."""
-    law = case.law
+    law, scenario = case.law, case.scenario
     if not (case.oscillates or case.only_switches):
         return None
-    if law is None:
-        return TrackingCause("the controller is user-defined", (), "reduce its gains")
-    if case.only_switches:
+    if law is not None and case.only_switches:
         return _step_of_valves(case, law)
-    names = [quantity.name for quantity in speed_settings(case.scenario, law).values()]
-    if not names:
-        text = "the controller is too fast for the delays of the loop"
-        return TrackingCause(text, (), "reduce its gains or use a slower controller")
-    return gains_of_another_device(case) or _fast_loop(case, law, names[0])
+    names = [quantity.name for quantity in speed_settings(scenario, law).values()]
+    if law is not None and names:
+        return gains_of_another_device(case) or _fast_loop(case, law, names[0])
+    name = "the user-defined controller" if law is None else f"`{law.name}`"
+    if not case.only_opens_fully:
+        return TrackingCause(f"{name} is too fast for the delays of the loop", (), "reduce its gains, or slow it down")
+    rate = "increase `controller.rate`, " * (scenario.controller.period >= _SLOW)
+    zone = change_text(scenario.controlled, LARGEST_SHARE * case.settled.wanted_change)
+    declaration = ", or give it hysteresis and only_switches=True in its ControllerKind" * (law is not None)
+    advice = f"{rate}let it command 0 within a dead zone below {zone} about its reference{declaration}"
+    return TrackingCause(f"{name} commands only full openings, and reverses them without pause", (), advice)
 
 
 def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
@@ -141,7 +145,8 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
         return None
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
     if law.only_switches and step < _SMALL_STEP * case.settled.error_range and controlled == scenario.controlled:
-        return _wide_zone(case, law, step)
+        step_text = f"the valves cause a step of only {change_text(scenario.controlled, step)} in their dead time"
+        return _wide_zone(case, f"`{law.name}` itself lets it swing", f": {step_text}")
     declare = switching_remedy(scenario.controller.kind)
     asks = f"`{law.name}` requests partial openings, which on/off valves do not have{declare}: "
     text = (
@@ -153,19 +158,16 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
     return TrackingCause(text, (*gradual, *smaller_pair(scenario, ratio)), "take faster or smaller valves")
 
 
-def _wide_zone(case: Case, law: ControllerKind, step: float) -> TrackingCause:
-    """Cause: the dead zone or hysteresis of an on/off law lets the value swing more than the ``step`` of its valves."""
+def _wide_zone(case: Case, begin: str, end: str = "") -> TrackingCause:
+    """Cause: dead zone or hysteresis of an on/off law is too wide; the text names the settings, between two parts."""
     scenario, unit = case.scenario, CONTROLLED[case.scenario.controlled].difference
     widths = {
         item.name: float(scenario.controller.settings[item.name])
-        for item in law_settings(law, scenario.controlled)
+        for item in (law_settings(case.law, scenario.controlled) if case.law is not None else ())
         if item.unit == unit and scenario.controller.settings[item.name] > 0.0
     }
     own = ", ".join(f"`{name} = {change_text(scenario.controlled, width)}`" for name, width in widths.items())
-    text = (
-        f"`{law.name}` itself lets it swing, by {own or 'its rule'}: the valves cause a step of only "
-        f"{change_text(scenario.controlled, step)} in their dead time"
-    )
+    text = f"{begin}, by {own or 'its rule'}{end}"
     narrower = [{f"controller.{name}": width / factor for name, width in widths.items()} for factor in _NARROWER]
     smaller = [remedy(scenario, numbers) for numbers in narrower if numbers]
     return TrackingCause(text, tuple(smaller), "change the settings or the rule of the controller")
@@ -246,7 +248,7 @@ def small_valve(
 
     ``factors`` [-] enlarge the valve in trials.
     """
-    share = float(np.mean(case.is_fully_open))
+    share = float(np.mean(case.is_fully_open[case.settled.samples]))
     if share <= least_share:
         return None
     text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for {demand}"
@@ -256,20 +258,28 @@ def small_valve(
 def _opened_away(case: Case) -> TrackingCause | None:
     """Cause: the valve is fully open for most of the settled part, away from the reference."""
     scenario, samples, is_open = case.scenario, case.settled.samples, case.is_fully_open
-    if np.mean(is_open) <= _MOSTLY:
+    share = np.mean(is_open[samples])
+    if share <= _MOSTLY:
         return None
-    reference, value = (series[samples] for series in followed(case.recording))
+    reference, value = followed(case.recording)
     # Sign of the command that reduces a positive error.
     upwards = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(1.0)
-    is_away = np.asarray(upwards * case.recording["command"][samples] * (reference - value) < 0.0)[is_open]
-    # An on/off loop that swings about its reference is late for half of the time.
-    if np.mean(is_away) <= (_ALWAYS if case.only_switches else _MOSTLY):
+    command = upwards * case.recording["command"]
+    is_away = np.asarray(command * (reference - value) < 0.0)
+    away = np.mean(is_away[samples][is_open[samples]])
+    # With the right sign a valve is opened fully towards the reference, however late the loop is then.
+    ways = np.where(is_open, np.sign(command), 0.0)
+    begins = is_open & (np.diff(ways, prepend=0.0) != 0.0)
+    if away > _MOSTLY and np.mean(is_away[begins]) > _ALWAYS:
+        text = (
+            f"the valve is fully open for {100.0 * share:.0f} % of the time, and drives away from the reference for "
+            f"{100.0 * away:.0f} % of this time"
+        )
+        return TrackingCause(text, (), "reverse the sign of the command or of the measurement")
+    if away <= _ALWAYS or begins[samples].any() or not case.only_opens_fully:
         return None
-    text = (
-        f"the valve is fully open for {100.0 * np.mean(is_open):.0f} % of the time, and drives away from the reference "
-        f"for {100.0 * np.mean(is_away):.0f} % of this time"
-    )
-    return TrackingCause(text, (), "reverse the sign of the command or of the measurement")
+    worst = change_text(scenario.controlled, case.settled.largest_error)
+    return _wide_zone(case, f"the valve stays fully open away from the reference and is not reversed, {worst} off")
 
 
 def _lag(case: Case) -> TrackingCause | None:

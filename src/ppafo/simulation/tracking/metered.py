@@ -16,7 +16,6 @@ from ppafo.simulation.tracking.rule import (
     excess_of_walk,
     is_noisy,
     only_switches,
-    torque_limit,
 )
 from ppafo.simulation.tracking.settled import SettledPart, settled_tasks
 from ppafo.simulation.tracking.shortfall import shortfall
@@ -81,13 +80,15 @@ def tracking_excess(
     with np.errstate(divide="ignore", invalid="ignore"):
         if not scenario.follows_reference:
             error, requested, peak = (numbers[name] for name in _OF_WALK)
+            settings = scenario.controller.settings
+            limit = np.asarray(settings.get("largest_torque", 0.0))
             of_walk: dict[str, Any] = {
                 "wanted_change": np.nan_to_num(requested, nan=np.inf),
                 "rms_error": np.nan_to_num(error),
                 "peak": peak,
+                "requested_peak": np.minimum(settings.get("peak_torque", 0.0), np.where(limit > 0.0, limit, np.inf)),
             }
             settled = SettledPart(samples=slice(None), **of_walk)
-            limit = torque_limit(scenario.controller.settings)
             # A law that requests no torque is judged by the peak alone.
             excess = excess_of_walk(settled, turning, limit)
             known = (np.isfinite(error) & (requested > 0.0)) | (np.isnan(error) & np.isfinite(peak) & (limit > 0.0))

@@ -17,7 +17,6 @@ from ppafo.simulation.tracking.rule import (
     REVERSALS,
     is_pair,
     only_switches,
-    torque_limit,
 )
 from ppafo.simulation.tracking.settled import smallest_change
 from ppafo.units import without_exponent
@@ -61,7 +60,9 @@ def unlimited_switching(result: "RecordedResult") -> str:
     Without data the limit is the switching frequency that the paper reports of its solenoid valves.
     """
     scenario = result.scenario
-    if not (scenario.follows_reference and only_switches(scenario, scenario.law)) or REVERSALS not in result.metrics:
+    # A Python object that controls a walk may switch, too: its reversals are not judged otherwise.
+    may_switch = only_switches(scenario, scenario.law) or (scenario.law is None and not scenario.follows_reference)
+    if not may_switch or REVERSALS not in result.metrics:
         return ""
     often = result.metrics[REVERSALS].value / max(result.recording.duration, 1.0)
     valve = scenario.device.valve.settings
@@ -109,7 +110,7 @@ def coarse_pair(scenario: Scenario, varied: Collection[str] = ()) -> str:
         wanted = max(extent, smallest_change(scenario))
     else:
         # A walking controller such as event_on_off holds one state of the pair for each phase, and tracks no torque.
-        wanted = torque_limit(scenario.controller.settings) if law.name in CONTROLLERS else 0.0
+        wanted = scenario.controller.settings.get("largest_torque", 0.0) if law.name in CONTROLLERS else 0.0
     if wanted == 0.0:
         return ""
     step, dead_time = pair_step(scenario, law)

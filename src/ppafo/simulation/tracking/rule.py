@@ -4,8 +4,7 @@
 """
 
 import math
-from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -46,6 +45,8 @@ LARGEST_PEAK = 1.5
 """Peak of the value divided by the wanted change [-]."""
 LARGEST_PEAK_WALK = 1.5
 """Peak torque of a walk divided by the torque limit of its controller [-]."""
+LEAST_PEAK_WALK = 0.7
+"""Peak torque of a walk divided by the largest requested torque, below which a walk does not follow [-]."""
 MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
 """Command reversals per stride and per second above which a loop oscillates."""
 PER_TURN = 2.0
@@ -99,14 +100,16 @@ def is_noisy(scenario: Scenario) -> bool:
     return scenario.follows_reference and bool(sensors.angle_noise or sensors.pressure_noise)
 
 
-def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: float) -> Floats | float:
+def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: Floats | float) -> Any:
     """Worst ratio of a walk's tracking numbers to their limits [-]: up to 1 the walk follows its reference.
 
     ``turning`` is the number of command reversals divided by its limit; ``limit`` [N m] is the controller's torque
     limit, 0 for none. The numbers of ``settled`` may be arrays (runs,).
     """
-    peak = settled.peak / (LARGEST_PEAK_WALK * limit) if limit > 0.0 else 0.0
-    return np.maximum(np.maximum(turning, peak), settled.rms_error / settled.wanted_change / LARGEST_SHARE_OF_WAVE)
+    peak = settled.peak / np.where(np.asarray(limit) > 0.0, LARGEST_PEAK_WALK * limit, np.inf)
+    lacking = LEAST_PEAK_WALK * settled.requested_peak / np.maximum(settled.peak, 1.0e-9)
+    error = settled.rms_error / settled.wanted_change / LARGEST_SHARE_OF_WAVE
+    return np.maximum(np.maximum(turning, peak), np.maximum(error, lacking))
 
 
 def failure_of_walk(settled: SettledPart, turning: float, limit: float) -> Failure | None:
@@ -207,8 +210,3 @@ def failure_of_task(settled: SettledPart, turning: float, is_switched: bool) -> 
     if turning > 1.0 or excess.oscillation > 1.0:
         return "oscillates"
     return "does not follow" if excess.error > 1.0 else "overshoots" if excess.overshoot > 1.0 else None
-
-
-def torque_limit(settings: Mapping[str, float]) -> float:
-    """Largest torque [N m] that the controller of a walk requests; 0 for no limit."""
-    return float(settings.get("largest_torque", 0.0))

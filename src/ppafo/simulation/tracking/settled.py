@@ -62,6 +62,8 @@ class SettledPart(NamedTuple):
 
     In a walk: largest absolute torque [N m].
     """
+    requested_peak: float = 0.0
+    """Largest torque in plantarflexion that a walk requests [N m]; 0 for a task."""
     rests: bool = False
     """True if reference and joint stand still."""
     ends_on_ramp: bool = False
@@ -112,6 +114,7 @@ def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
         error_deviation=rms,
         value_range=float(np.ptp(value)),
         peak=peak,
+        requested_peak=max(float(np.max(reference)), 0.0),
         duration=float(np.ptp(recording.time[[0, -1]])),
     )
 

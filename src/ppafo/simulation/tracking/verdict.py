@@ -19,6 +19,7 @@ from ppafo.simulation.tracking.rule import (
     LARGEST_MEAN_SWITCHED,
     LARGEST_SHARE,
     LARGEST_SHARE_OF_WAVE,
+    LEAST_PEAK_WALK,
     REVERSALS,
     Failure,
     deviation_limit,
@@ -28,7 +29,6 @@ from ppafo.simulation.tracking.rule import (
     most_reversals,
     only_switches,
     rms_error_limit,
-    torque_limit,
 )
 from ppafo.simulation.tracking.settled import settled_task, settled_walk
 from ppafo.simulation.tracking.shortfall import shortfall
@@ -142,8 +142,8 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
     settled, is_task = case.settled, scenario.follows_reference
     found = (find(case) for find in (CAUSES_OF_TASK if is_task else CAUSES_OF_WALK))
     cause, *others = (each for each in found if each is not None)
-    # Reversals of the value where these fail, else of the command.
-    if settled.error_reversals and turning <= 1.0:
+    # Reversals of the value where these fail, else of the command, as also of a controller that declares nothing.
+    if settled.error_reversals and turning <= 1.0 and (case.law is not None or per_second == 0.0):
         per_second = settled.error_reversals / settled.duration
     overshoots, is_of_walk = failure == "overshoots", stride_time > 0.0
     # A loop that is quiet at the end reversed before the part whose error is stated.
@@ -159,7 +159,7 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         kind=failure,
         controlled=scenario.controlled,
         error=settled.rms_error,
-        wanted=torque_limit(scenario.controller.settings) if overshoots and not is_task else settled.wanted_change,
+        wanted=scenario.controller.settings["largest_torque"] if overshoots and not is_task else settled.wanted_change,
         missing=settled.mean_error,
         moved=settled.peak if overshoots else settled.value_range,
         reversals=per_second * (stride_time if is_of_walk else 1.0),
@@ -220,9 +220,10 @@ def following_text(result: "RecordedResult") -> str:
 def _criteria(case: Case) -> tuple[tuple[str, float, float], ...]:
     """Errors of the settled part that may be above their limits: name, number and limit [SI], most telling first."""
     scenario, settled, switches = case.scenario, case.settled, case.only_switches
-    mean, wanted = abs(settled.mean_error), settled.wanted_change
+    mean, wanted, asked = abs(settled.mean_error), settled.wanted_change, settled.requested_peak
     if not scenario.follows_reference:
-        return (("RMS error", settled.rms_error, LARGEST_SHARE_OF_WAVE * wanted),)
+        short = ("missing peak torque", asked - settled.peak, (1.0 - LEAST_PEAK_WALK) * asked)
+        return ("RMS error", settled.rms_error, LARGEST_SHARE_OF_WAVE * wanted), short
     deviation = ("swing", settled.error_range) if settled.rests else ("largest error", settled.largest_error)
     beyond, where = float(np.max(shortfall(scenario))), " at every angle" * (scenario.motion.locked_angle is None)
     lack = (f"the reference is beyond reach{where}, by", beyond) if beyond > mean else ("mean error", mean)
@@ -277,7 +278,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     is_unknown = is_task and controlled_in(recording) is None
     if len(recording) < _FEWEST_SAMPLES or scenario.controller.is_open_loop or is_unknown:
         return None
-    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
+    limit = 0.0 if is_task else float(scenario.controller.settings.get("largest_torque", 0.0))
     settled = settled_task(scenario, recording) if is_task else settled_walk(recording, limit)
     if settled is None:
         return None

@@ -12,9 +12,12 @@ from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation, small_valve
 from ppafo.simulation.tracking.load_causes import ONE_WAY, reach_at_samples, reach_text
 from ppafo.simulation.tracking.remedies import dead_band, level_text, quicker_loops, remedy, sized_valves
+from ppafo.simulation.tracking.rule import LEAST_PEAK_WALK
 
 _OFTEN = 0.1
 """Fraction of the samples with a request that counts as often [-]."""
+_DEMAND = "the joint speed of this gait"
+"""Demand for which the valve of a walk may be too small."""
 _LARGER_VALVES = (2.0, 4.0, 8.0)
 """Factors by which a valve is enlarged in a trial [-]."""
 _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
@@ -30,7 +33,8 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     places, reaches = reach_at_samples(case)
     above, below = reference[places] - reaches[:, 1], reaches[:, 0] - reference[places]
     share = float(np.mean((above > 0.0) | (below > 0.0)))
-    if share <= _OFTEN:
+    lacks_peak = case.settled.peak < LEAST_PEAK_WALK * case.settled.requested_peak
+    if share <= (0.0 if lacks_peak else _OFTEN):
         return None
     if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():
         # Dorsiflexion torque requested from an actuator that pushes in plantarflexion only.
@@ -96,10 +100,8 @@ CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     ),
     _dead_band_of_walk,
     # An oscillating loop, and on/off valves, are fully open for other reasons.
-    lambda case: (
-        None
-        if case.oscillates or case.only_switches
-        else small_valve(case, _OFTEN, "the joint speed of this gait", _LARGER_VALVES, "use a larger valve")
+    lambda case: small_valve(
+        case, 1.0 if case.oscillates or case.only_switches else _OFTEN, _DEMAND, _LARGER_VALVES, "use a larger valve"
     ),
     gains_of_another_device,
     _speed_of_gait,

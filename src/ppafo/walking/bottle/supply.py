@@ -156,10 +156,8 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
     wrong: list[PpafoError] = []
     if not is_of_bottle(device.gas.molar_mass, bottle):
         species, fed = bottle.fluid.name, device.gas.species
-        problem = (
-            f"contains {species}, but the device uses {fed}: set gas.species={species}, or choose a bottle of {fed}"
-        )
-        wrong.append(reading.refusal(BOTTLE_NAME, problem))
+        choice = f"set gas.species={species}, or choose a bottle of {fed}"
+        wrong.append(reading.refusal(BOTTLE_NAME, f"contains {species}, but the device uses {fed}: {choice}"))
     if own_pressure is not None:
         room = device.supply.atmospheric_pressure
         own_text = shown_text(own_pressure, "Pa_a", atmosphere=room, unit=bottle.entries[_SET_PRESSURE].unit)

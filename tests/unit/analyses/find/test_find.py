@@ -274,6 +274,13 @@ def test_a_run_that_follows_is_a_condition_of_its_own(tmp_path: Path) -> None:
         assert f"{missing:.3g} N m" in line.replace("0.30 N m", "0.3 N m")
     answer.save(tmp_path / "out")
     assert json.loads((tmp_path / "out" / "find.json").read_text())["condition"] == "follows"
+    # The figure has the number that decided: it passes 1 at the value found.
+    axes = answer.plot("find").axes[0]
+    pressures, errors = axes.lines[0].get_data()
+    at_limit = float(np.interp(1.0, np.asarray(errors)[::-1], np.asarray(pressures)[::-1]))
+    assert at_limit == pytest.approx((found.value - 101325.0) / 6894.757, abs=0.01)
+    assert axes.get_ylabel().replace("\n", " ") == "Tracking error over its limit"
+    assert any("may have the allowed error" in line for line in answer.said)
     with pytest.raises(
         StudyError, match="'follows' needs a reference, which scenario 'step-response' lacks; give a condition"
     ):

@@ -65,6 +65,11 @@ def test_flow_of_the_standard_gives_back_its_two_numbers_and_an_orifice_law_hold
     flow = 7.0e-9 * planted.CO2.flow_per_sonic_conductance * iso6358_shape(*pressures, 0.2)
     noisy = changed(source, "mass_flow", flow * (1.0 + np.random.default_rng(1).normal(0.0, 0.003, flow.size)))
     result = open_valve_flow((noisy,), planted.CO2, law="iso6358", path="valves.main", tolerances=EXACT)
+    curve = next(mark for mark in result.panels[0].marks if mark.label == "iso6358")
+    # ISO 6358: sqrt(1 - ((r - b) / (1 - b))^2) above b, 1 below it, at more ratios than were measured.
+    shape = np.sqrt(1.0 - np.clip((curve.x - 0.2) / 0.8, 0.0, 1.0) ** 2)
+    assert curve.x.size > 2 * noisy.recording.time.size
+    assert np.allclose(curve.y / curve.y[0], shape, atol=0.02)
     assert result["valves.main.sonic_conductance"].value == pytest.approx(7.0e-9, rel=0.01)
     assert result["valves.main.critical_ratio"].value == pytest.approx(0.2, abs=0.03)
     assert result.conflict == ""

@@ -34,7 +34,7 @@ LIMITS: dict[Limit, str] = {
     "torque": "the torque ceiling: torque constant times pressure",
     "flow": "the flow: a larger opening would suffice",
     "control": "the torque loop: no gains were found with which it follows",
-    "pressure": "nothing: the lowest requested pressure suffices",
+    "pressure": "pressure.lowest: no lower pressure was tried",
 }
 """Quantities that limit a valve, each with its description in words."""
 ERROR, GAS = "rms_error", "gas_supplied"

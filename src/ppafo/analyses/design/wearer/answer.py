@@ -27,7 +27,7 @@ from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import who_walks
 from ppafo.wording import argument_text
 
-_HEAD = ("valve", "actuator", ("peak torque", TORQUE), ("lowest toes", CLEARANCE))
+_HEAD = ("valve", "actuator", ("push-off peak", TORQUE), ("lowest toes", CLEARANCE))
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _NONE = (
     "No device in the catalogue meets these requirements. Alternatives (examples), on the largest bottle (a design "
@@ -54,6 +54,10 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
         for tried in sorted(sizing.tried, key=lambda tried: -tried.torque)
     ]
     remarks = ["toes below 0 would drag"] if any(tried.toes < 0.0 for tried in sizing.tried) else []
+    if device is None and not any(requirements.is_reached_by(tried.torque) for tried in sizing.tried):
+        remarks.append(
+            "only vanes are sized; a cylinder walks with: ppafo walk proportional --set device.set=cylinder-lever"
+        )
     table = finding.Section(
         "Parts that were tried in a walk",
         columns_of((*_HEAD, ("gas", flow), ("mass of both", MASS)), rows),
@@ -101,7 +105,7 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
         ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
         ("lasts", f"{lasts}, of {duration}"),
         ("then", device.life.discharge.ending.message),
-        ("peak torque", f"{TORQUE.text(device.torque)} in the mean stride{short}, {last} in the last"),
+        ("push-off", f"{TORQUE.text(device.torque)} at the peak of the mean stride{short}, {last} in the last"),
         ("lowest toes", f"{CLEARANCE.text(device.toes)} over the ground in mid-swing"),
         ("gas", f"{Kind('', 'kg', 'gas mass', '.3g').text(walked.metrics['gas'].value)} a stride"),
         ("mass", f"{MASS.text(sum(device.masses.values()), '.0f')}, without shell, straps and hoses"),

@@ -3,6 +3,7 @@
 import dataclasses
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -101,8 +102,13 @@ def test_a_sizing_is_drawn_and_told_as_data_like_any_answer(sizing: Sizing) -> N
     panels = finding_of(sizing).plot().axes
     assert [axes.get_xlabel() for axes in panels] == ["Supply pressure (psig)"] * 2
     (legend,) = finding_of(sizing).plot().legends  # above both panels
-    assert [text.get_text() for text in legend.get_texts()] == ["Enfield Technologies LS-V05s"]
+    assert [text.get_text() for text in legend.get_texts()] == ["Enfield Technologies LS-V05s", "chosen pressure"]
     assert finding_of(sizing).to_dict()["suggested"] == "enfield-ls-v05s"
+    # A run that the error limit accepts with half the peak: the message names the setting that keeps more of it.
+    half = replace(sizing, recording={"torque": np.array([0.0, 2.0])})  # type: ignore[arg-type]
+    assert "reaches 2 of 4 N m in the simulated run: for more, also lower limits.rms_error below '0." in (
+        suggestion_sentence(half)
+    )
     assert "\nMargins\n" in str(finding_of(sizing))
 
 

@@ -87,9 +87,7 @@ def test_what_is_suggested_is_the_walk_that_is_shown_and_its_toes_clear_the_grou
     # The printed command walks the same walk, with the same torque.
     words = shlex.split(device.command)[1:]
     assert main([*words, "--out", str(tmp_path / "again")]) == 0
-    shown, again = (
-        re.search(r"peak torque .*, (\S+) N m in the last", text) for text in (said, capsys.readouterr().out)
-    )
+    shown, again = (re.search(r"push-off .*, (\S+) N m in the last", text) for text in (said, capsys.readouterr().out))
     assert shown is not None
     assert again is not None
     assert again[1] == shown[1]
