@@ -159,10 +159,8 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
     least = "a second of a task sequence" if has_task_sequence else f"{SHORTEST_STRIDES} strides"
 
     def line(run: int) -> str:
-        return (
-            f"a walk of {at(seconds, run) / 60.0:.6g} min: must be at least {shortest / 60.0:.2g} min ({least}) and "
-            f"at most {LONGEST_MINUTES:g} min"
-        )
+        limits = f"at least {shortest / 60.0:.2g} min ({least}) and at most {LONGEST_MINUTES:g} min"
+        return f"a walk of {at(seconds, run) / 60.0:.6g} min: must be {limits}"
 
     return ((np.logical_not(fits), line),)
 

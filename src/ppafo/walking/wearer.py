@@ -281,8 +281,6 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     )
     low, high = (fraction * gait.body_mass for fraction in SCALED_MASS)
     if not low <= wearer.body_mass <= high:
-        line += (
-            f", extrapolated outside {low:.0f} to {high:.0f} kg; better import a gait recorded of such a person "
-            "with 'ppafo gait import'"
-        )
+        better = "better import a gait recorded of such a person with 'ppafo gait import'"
+        line += f", extrapolated outside {low:.0f} to {high:.0f} kg; {better}"
     return line

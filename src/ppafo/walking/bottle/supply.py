@@ -245,8 +245,6 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
         )
     pressure = supply.offers_first().content.pressure
     if pressure < regulator.set_pressure + regulator.pressure_margin:
-        has, needs = (
-            shown_text(each, "Pa_a", atmosphere=device.supply.atmospheric_pressure)
-            for each in (pressure, regulator.set_pressure + regulator.pressure_margin)
-        )
+        atmosphere, needed = device.supply.atmospheric_pressure, regulator.set_pressure + regulator.pressure_margin
+        has, needs = (shown_text(each, "Pa_a", atmosphere=atmosphere) for each in (pressure, needed))
         raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, but its regulator needs {needs}")

@@ -67,9 +67,8 @@ def legs_of(result: WalkResult, turns: Floats) -> LegPostures:
     path = ankle_path(gait, timing, walk_of(configuration).wearer)
     # All strides have the stride time of the gait.
     times = turns * gait.stride_time
-    shank, angle, healthy = (
-        np.interp(times, recording.time, recording[name]) for name in ("shank_angle", "angle", "healthy_angle")
-    )
+    names = ("shank_angle", "angle", "healthy_angle")
+    shank, angle, healthy = (np.interp(times, recording.time, recording[name]) for name in names)
     worn, phases = path.posture(turns, shank, angle), turns % 1.0
     must_clear = (phases >= timing.clearance_from) & (phases < timing.clearance_to)
     drags = (must_clear & (worn.toe[:, 1] < 0.0)).tolist()
