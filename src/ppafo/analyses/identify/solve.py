@@ -52,7 +52,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     before = _set_of_device(device, folder)
     with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
         valve = chosen_valve(before, device.valve)
-        reader = _RecordingReader(problem, folder, file, before)
+        reader = _RecordingReader(problem=problem, folder=folder, file=file, parameter_set=before)
         tasks = _tasks_in_order(reader)
         used = _used_recordings(tasks, before, valve, file)
         tolerances = tolerances_of(problem.bench, file)
