@@ -1,5 +1,6 @@
 """Result of a walk: recording, strides, averages, metrics, verdict and safety events."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.control.walking.assistance import PEAKS
 from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
@@ -17,6 +19,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking, following_text, tracking_in
 from ppafo.simulation.tracking.pair_step import unlimited_switching
+from ppafo.simulation.tracking.remedies import level_text
 from ppafo.storage.opensim import write_opensim
 from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
@@ -24,7 +27,7 @@ from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.motion import walk_of
 from ppafo.walking.safety_events import SafetyEvent
 from ppafo.walking.strides import Curves, SegmentResult
-from ppafo.wording import changed_text
+from ppafo.wording import changed_text, override_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -121,7 +124,7 @@ class WalkResult:
         head = [f"{self.scenario.name}: {self.status.kind}", self.scenario.origin.replaced]
         head.append(changed_text(changes_in(self.scenario)))
         if self.status.is_completed:
-            head += [self.torque_sentence(self.tracking), unlimited_switching(self)]
+            head += [self.torque_sentence(self.tracking), limited_request(self.scenario), unlimited_switching(self)]
             head.append("" if self.is_helped else self.help_text)
             toes = self.metrics.get("lowest_toes")
             if toes is not None and toes.value < 0.0:
@@ -151,3 +154,18 @@ class WalkResult:
         """Write the recording as a ``.sto`` file with OpenSim's names, zeros and signs (right leg); return the path."""
         named, _ = opensim_recording(self.recording, body_mass=walk_of(self.scenario).wearer.body_mass)
         return write_opensim(path, named)
+
+
+def limited_request(scenario: Scenario) -> str:
+    """Remark on peaks of the desired torque that ``largest_torque`` of the controller cuts; "" without any."""
+    settings, path = scenario.controller.settings, "controller.largest_torque"
+    limit = settings.get("largest_torque", math.inf)
+    peaks = {name: settings[name] for name in PEAKS if settings.get(name, 0.0) > limit}
+    if not peaks:
+        return ""
+    # The default limit is the largest torque of the device.
+    advice = "the actuator cannot give more at this supply pressure"
+    if path not in scenario.links:
+        advice = "not tried: " + override_text([f"{path}={level_text('N m', max(peaks.values()))}"])
+    cut = ", ".join(f"controller.{name} = {level_text('N m', peak)}" for name, peak in peaks.items())
+    return f"{cut}: the request is limited by {path} = {level_text('N m', limit)}; {advice}"

@@ -179,7 +179,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         ("C", model.c, model.outputs, model.states),
         ("D", model.d, model.outputs, model.inputs),
     ):
-        titles = ("", *((variable.name, Kind(form=".5g")) for variable in columns))
+        titles: list[str | tuple[str, Kind]] = ["", *((variable.name, Kind(form=".5g")) for variable in columns)]
         cells = [(variable.name, *row) for variable, row in zip(rows, values.tolist(), strict=True)]
         matrices.append(Section(f"Matrix {name} (SI)", columns_of(titles, cells)))
     return Finding(

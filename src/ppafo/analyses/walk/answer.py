@@ -1,6 +1,5 @@
 """Report of a walk of one wearer with and without the device: text, tables and figures."""
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
@@ -12,7 +11,6 @@ from ppafo.analyses.walk.benefit import benefit_sentence
 from ppafo.analyses.walk.bottle import bottle_data, bottle_parts
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes, versions, walk_document
 from ppafo.analyses.walk.task_sequence import segments_csv, task_sequence_parts, task_sequence_pictures, trust_remark
-from ppafo.control.walking.assistance import PEAKS
 from ppafo.documents.json_text import plain
 from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
@@ -39,7 +37,7 @@ from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.whole_walk import whole_walk_figure
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.planning import law_of
-from ppafo.walking.result import WALK_FORMAT, WalkResult
+from ppafo.walking.result import WALK_FORMAT, WalkResult, limited_request
 from ppafo.walking.safety_events import event_lines, failure_times
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison
@@ -49,7 +47,7 @@ _OVER_TIME = (
     "Gas, toe height and gait phase over the whole walk. The strip at the bottom shows when the controller helps, only "
     "lifts the foot, pauses or has stopped. A solid line marks less help, a dashed line a fault."
 )
-_TORQUE, _PRESSURE = Kind("", "N m", "torque", ".3g"), Kind(quantity="pressure", form=".3g")
+_PRESSURE = Kind(quantity="pressure", form=".3g")
 _FAR_ABOVE = 2.0
 """Ratio of absolute chamber pressure to supply pressure for a remark; healthy wearers stay below."""
 
@@ -118,9 +116,8 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
     ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}"
     verdict, gains = tried(scenario, worn.tracking), gains_of(scenario, law)
-    torque, switching = worn.torque_sentence(verdict), unlimited_switching(worn)
-    gains_text = "" if gains is None else gains.sentence
-    said = (ended, benefit_sentence(comparison), torque, switching, scenario.origin.replaced, gains_text)
+    said = [ended, benefit_sentence(comparison), worn.torque_sentence(verdict), limited_request(scenario)]
+    said += [unlimited_switching(worn), scenario.origin.replaced, "" if gains is None else gains.sentence]
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
     mended = usage_text(reloaded(scenario, verdict.mended)) if verdict is not None and verdict.mended else ""
@@ -231,8 +228,8 @@ def _bottle_remark(worn: WalkResult) -> str:
 
 @in_units(lambda worn: worn.scenario.device.shown)
 def safety_remarks(worn: WalkResult) -> list[str]:
-    """Return remarks on the shut-off valve, excessive torques or pressures, and reductions of assistance."""
-    remarks = [_shut_off_remark(worn.scenario), _limit_remark(worn.scenario), *_pressure_remarks(worn)]
+    """Return remarks on the shut-off valve, excessive pressures, and reductions of assistance."""
+    remarks = [_shut_off_remark(worn.scenario), *_pressure_remarks(worn)]
     remarks += event_lines(worn.events)
     if worn.events and worn.helped.size:
         remarks.append(worn.help_text)
@@ -246,20 +243,6 @@ def _shut_off_remark(scenario: Scenario) -> str:
         return ""
     grams, power = 1.0e3 * float(fitted["mass"]), float(fitted["power"])
     return f"shut-off valve: {grams:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"
-
-
-def _limit_remark(scenario: Scenario) -> str:
-    """Return a remark on peaks of the desired torque above the limit of the controller; "" without any."""
-    settings = scenario.controller.settings
-    limit = settings.get(LARGEST_TORQUE, math.inf)
-    cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
-    if not cut:
-        return ""
-    # The default limit is the largest torque of the device.
-    is_default = f"controller.{LARGEST_TORQUE}" in scenario.links
-    advice = "the actuator cannot give more at this supply pressure" if is_default else "raise this limit too"
-    limited = f"the request is limited by controller.{LARGEST_TORQUE} = {_TORQUE.text(limit)}"
-    return f"{', '.join(cut)}: {limited}; {advice}"
 
 
 def _pressure_remarks(worn: WalkResult) -> Iterator[str]:

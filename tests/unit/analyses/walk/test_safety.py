@@ -1,5 +1,6 @@
 """What the result of a walk says of help and pressures that are out of the ordinary."""
 
+import ast
 from dataclasses import replace
 
 import numpy as np
@@ -9,17 +10,21 @@ from ppafo.analyses.walk.answer import safety_remarks
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.signals import Channel
 from ppafo.walking import compare_walks, load_walk, walk
+from ppafo.walking.result import limited_request
+from ppafo.wording import read_by
 
 
-def test_a_peak_torque_above_the_limit_of_the_controller_is_said() -> None:
+def test_a_peak_torque_above_the_limit_of_the_controller_is_said_in_the_first_lines() -> None:
     peak = "controller.peak_torque=9 N m"
-    (said,) = safety_remarks(walk(load_walk("proportional", [peak]), minutes=0.1))
-    assert said.startswith(
-        "controller.peak_torque = 9 N m: the request is limited by controller.largest_torque = 5 N m"
-    )
-    assert safety_remarks(walk(load_walk("proportional", [peak, "controller.largest_torque=9 N m"]), minutes=0.1)) == []
+    worn = walk(load_walk("proportional", [peak]), minutes=0.1)
+    cut = "controller.peak_torque = 9 N m: the request is limited by controller.largest_torque = 5 N m; not tried: "
+    (said,) = [line for line in str(worn).partition("\n\n")[0].splitlines() if line.startswith(cut)]
+    mended = ast.literal_eval(said.removeprefix(f"{cut}overrides="))
+    assert limited_request(load_walk("proportional", [peak, *mended])) == ""
+    with read_by("command line"):
+        assert limited_request(worn.scenario) == f"{cut}--set 'controller.largest_torque=9 N m'"
     law = ["device.valve=proportional", "controller.kind=event_proportional", "controller.vent_time=0.15 s"]
-    (said,) = safety_remarks(walk(load_walk("off", [*law, peak]), minutes=0.1))
+    said = limited_request(load_walk("off", [*law, peak]))
     assert said.endswith("largest_torque = 5 N m; the actuator cannot give more at this supply pressure")
 
 
