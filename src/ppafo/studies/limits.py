@@ -58,7 +58,8 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
     atmospheres = (0.0, STANDARD_ATMOSPHERE) if atmosphere is None else (atmosphere,)
     # The same under two atmospheres: an absolute pressure, or no pressure at all.
     unit = METRICS[metric].unit
-    levels = {_number(text, _OUTCOME_LEVELS.get(unit, unit), what, atmosphere) for atmosphere in atmospheres}
+    with refused_as(StudyError, what, UnitError):
+        levels = {parse_quantity(text, _OUTCOME_LEVELS.get(unit, unit), atmosphere) for atmosphere in atmospheres}
     level = levels.pop() if len(levels) == 1 else None
     if level is None:
         raise StudyError(
@@ -71,12 +72,8 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
 def difference_of(text: str, metric: str, what: str) -> float:
     """Convert a difference of two metric values from text to SI; StudyError, prefixed with ``what``, if it fails."""
     unit = METRICS[metric].unit
-    return _number(text, _DIFFERENCES.get(unit, unit), what, 0.0)
-
-
-def _number(text: str, unit: str, what: str, atmosphere: float) -> float:
     with refused_as(StudyError, what, UnitError):
-        return parse_quantity(text, unit, atmosphere)
+        return parse_quantity(text, _DIFFERENCES.get(unit, unit), 0.0)
 
 
 @dataclass(frozen=True, slots=True)

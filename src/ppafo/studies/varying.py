@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -187,10 +186,6 @@ def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def _bounded(made: Callable[[float, float], Distribution], entry: Any, varied: VariedPath) -> Distribution:
-    return made(*_bounds(entry, varied))
-
-
 def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: VariedPath) -> Distribution:
     """Return a log-uniform or log-normal distribution; UnitError if its lower bound or median is not above 0."""
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
@@ -246,14 +241,14 @@ def _choice(entry: declared.Choice, varied: VariedPath) -> Distribution:
 
 
 _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
-    "uniform": partial(_bounded, UniformBetween),
+    "uniform": lambda entry, varied: UniformBetween(*_bounds(entry, varied)),
     "log_uniform": _logarithmic,
     "normal": _normal,
     "truncated_normal": _normal,
     "log_normal": _logarithmic,
     "triangular": _triangular,
     "choice": _choice,
-    "whole_numbers": partial(_bounded, WholeNumbersBetween),
+    "whole_numbers": lambda entry, varied: WholeNumbersBetween(*_bounds(entry, varied)),
 }
 """Builders of distributions by kind; a new kind needs a table in ``declaration`` and a class in ``distributions``."""
 

@@ -81,17 +81,23 @@ def compare(
     from dataclasses import replace
 
     from ppafo.analyses.compare.answer import finding_of
-    from ppafo.analyses.compare.solve import DrawSettings, compared
+    from ppafo.analyses.compare.solve import DEFAULT_DRAWS, DrawSettings, compared
     from ppafo.arguments.conversion import taken_tasks
-    from ppafo.studies.draws import study_of
+    from ppafo.errors import StudyError
+    from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, study_of
+    from ppafo.studies.limits import CONFIDENCE, check_fraction
     from ppafo.studies.study import changes_of, choose_configurations
     from ppafo.units.shown import shown_in
 
-    requested = DrawSettings(draws, seed, confidence, maximum_failed, threads, progress)
-    requested.check()
+    count = DEFAULT_DRAWS if draws is None else draws
+    if not FEWEST_DRAWS <= count <= MAXIMUM_DRAWS:
+        raise StudyError(f"draws = {count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
+    check_fraction(confidence, *CONFIDENCE)
+    check_fraction(maximum_failed, "maximum_failed")
+    settings = DrawSettings(count, draws is None, seed, confidence, maximum_failed, threads, progress)
     loaded = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, loaded, overrides)
-    comparison = compared(chosen, baseline, taken_tasks(tasks), loaded, requested)
+    comparison = compared(chosen, baseline, taken_tasks(tasks), loaded, settings)
     device, of_study = comparison.tasks[0].cases[0].scenario, None if configurations else loaded
     with shown_in(device.device.shown if loaded is None else loaded.shown_for(device)):
         finding = replace(finding_of(comparison), overrides=changes_of(chosen, of_study, overrides))

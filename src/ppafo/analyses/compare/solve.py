@@ -14,11 +14,10 @@ from ppafo.remedy_trials import tried
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate_many
+from ppafo.simulation.simulate import Result, simulate_many
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.studies.declaration import DEFAULT_SEED
-from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, uncertainty_of
-from ppafo.studies.limits import CONFIDENCE, check_fraction
+from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, configurations_with
 from ppafo.studies.varying import value_at, varied_path
@@ -37,30 +36,20 @@ _SAME = 1.0e-9
 class DrawSettings:
     """Number of draws of the uncertain values, and acceptance rules for their runs.
 
-    ``requested``: number of draws; None for the default
+    ``count``: number of draws
+    ``is_default``: True if the number of draws is not requested by the caller
     ``seed``: random seed; None for the seed of the study
     ``confidence``: confidence level of the intervals
     ``maximum_failed``: fraction of failed runs above which the comparison is refused
     """
 
-    requested: int | None
+    count: int
+    is_default: bool
     seed: int | None
     confidence: float
     maximum_failed: float
     threads: int | None
     progress: Report | None
-
-    @property
-    def count(self) -> int:
-        """Number of draws of the uncertain values; ``DEFAULT_DRAWS`` if not requested."""
-        return DEFAULT_DRAWS if self.requested is None else self.requested
-
-    def check(self) -> None:
-        """Raise StudyError for numbers of draws, confidence or failed runs outside their ranges."""
-        if not FEWEST_DRAWS <= self.count <= MAXIMUM_DRAWS:
-            raise StudyError(f"draws = {self.count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
-        check_fraction(self.confidence, *CONFIDENCE)
-        check_fraction(self.maximum_failed, "maximum_failed")
 
 
 Scenarios = Mapping[tuple[str, str], Scenario]
@@ -111,42 +100,15 @@ def compared(
     metrics = [
         name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())
     ]
-    distributions = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
-    uncertainty = distributions.with_noise_of(scenarios.values())
-    if not uncertainty.drawn and draws.requested is not None:
-        raise StudyError(
-            f"draws = {draws.requested}: nothing in this comparison is random; omit draws, or give a study or "
-            "sensors with noise"
-        )
+    uncertainty = _uncertainty_of_comparison(scenarios, study, draws)
     seed = draws.seed if draws.seed is not None else DEFAULT_SEED if study is None else study.sample.seed
-    drawn: dict[tuple[str, str], _DrawnRuns] = {}
-    if uncertainty.drawn:
-        if study is not None:
-            _check_different_values(study, scenarios)
-        drawn = _runs_over_draws(scenarios, metrics, study, uncertainty, draws, seed)
+    drawn = _runs_over_draws(scenarios, metrics, study, uncertainty, draws, seed) if uncertainty.drawn else {}
     # Nominal runs use the seed of each scenario: with noise, a nominal run is one realisation of the noise.
-    results = simulate_many(list(scenarios.values()), draws.threads)
-    cases: dict[str, list[ConfigurationResult]] = {task: [] for task, _ in named_tasks}
-    remarks: list[str] = []
-    for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
-        runs = drawn.get((task, name), _DrawnRuns())
-        with said_of_configuration(name):
-            tracking = tried(scenario, result.tracking)
-        if switching := unlimited_switching(result):
-            remarks.append(f"{name}, {task}: {switching}")
-        cases[task].append(
-            ConfigurationResult(
-                configuration=name,
-                status=result.status,
-                metrics={metric: value for metric, value in result.metrics.items() if metric in COMPARED},
-                tracking=tracking,
-                failed_draws=0 if runs.rows is None else int(runs.rows[FAILED].sum()),
-                reason=runs.failure,
-                scenario=scenario,
-                rows=runs.rows,
-                renoised=runs.renoised,
-            )
-        )
+    nominal = dict(zip(scenarios, simulate_many(list(scenarios.values()), draws.threads), strict=True))
+    cases = {
+        (task, name): _configuration_result(name, result, drawn.get((task, name), _DrawnRuns()))
+        for (task, name), result in nominal.items()
+    }
     comparison = ComparisonResult(
         units="SI: N m, kg, J; fractions from 0 to 1",
         configurations=names,
@@ -157,18 +119,37 @@ def compared(
         varied=[path for path in uncertainty.paths if path != NOISE],
         confidence=draws.confidence,
         tasks=[
-            _task_result(task, overrides, cases[task], baseline, metrics, draws.confidence)
+            _task_result(task, overrides, [cases[task, name] for name in names], baseline, metrics, draws.confidence)
             for task, overrides in named_tasks
         ],
         metrics=tuple(metrics),
     )
-    remarks += remarks_of(comparison)
-    if study is not None and study.drawn and draws.requested is None and study.sample.runs != draws.count:
+    switching = ((task, name, unlimited_switching(result)) for (task, name), result in nominal.items())
+    remarks = [*(f"{name}, {task}: {text}" for task, name, text in switching if text), *remarks_of(comparison)]
+    if study is not None and study.drawn and draws.is_default and study.sample.runs != draws.count:
         remarks.append(
             f"study '{study.name}': sample.runs = {study.sample.runs} applies to 'ppafo sweep' only; 'compare' used "
             f"{draws.count:,} draws, which {argument_text('draws')} changes"
         )
     return replace(comparison, remarks=remarks)
+
+
+def _uncertainty_of_comparison(scenarios: Scenarios, study: Study | None, draws: DrawSettings) -> Uncertainty:
+    """Return the distributions of a study and of the sensor noise.
+
+    Raises StudyError if draws are requested but nothing is random, and if the study draws a value in which the
+    scenarios differ.
+    """
+    distributions = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
+    uncertainty = distributions.with_noise_of(scenarios.values())
+    if not uncertainty.drawn and not draws.is_default:
+        raise StudyError(
+            f"draws = {draws.count}: nothing in this comparison is random; omit draws, or give a study or "
+            "sensors with noise"
+        )
+    if study is not None:
+        _check_different_values(study, scenarios)
+    return uncertainty
 
 
 def _check_different_values(study: Study, scenarios: Scenarios) -> None:
@@ -214,6 +195,23 @@ def _runs_over_draws(
         renoised = runs.run({path: renoised_columns[path] for path in paths}) if renoised_columns else None
         drawn[task, name] = _DrawnRuns(rows, renoised, failure)
     return drawn
+
+
+def _configuration_result(name: str, nominal: Result, drawn: _DrawnRuns) -> ConfigurationResult:
+    """Return the result of a configuration on a task, with a tried remedy if it does not follow its reference."""
+    with said_of_configuration(name):
+        tracking = tried(nominal.scenario, nominal.tracking)
+    return ConfigurationResult(
+        configuration=name,
+        status=nominal.status,
+        metrics={metric: value for metric, value in nominal.metrics.items() if metric in COMPARED},
+        tracking=tracking,
+        failed_draws=0 if drawn.rows is None else int(drawn.rows[FAILED].sum()),
+        reason=drawn.failure,
+        scenario=nominal.scenario,
+        rows=drawn.rows,
+        renoised=drawn.renoised,
+    )
 
 
 def _task_result(

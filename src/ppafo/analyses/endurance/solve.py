@@ -72,6 +72,26 @@ def endurance_of_gas_use(
     ``stride_time`` is the time of a stride in a recording [s]; by default the whole recording is repeated. For a walk,
     it raises ParameterError, in which the walk is called ``name``.
     """
+    _check_no_gas_override(name, overrides)
+    if isinstance(use, WalkResult):
+        gas = walk_gas(use)
+    elif isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
+        gas = read_walk_gas(Path(use))
+    else:
+        full = load_bottle(PAPER_BOTTLE if bottle is None else bottle, overrides)
+        return _endurance_of_recording(use, stride_time, full, schedule)
+    if stride_time is not None:
+        stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"
+        argument = argument_text("stride_time")
+        raise ParameterError(f"{argument} applies to recordings only: {name} repeats {stride}; omit {argument}")
+    return endurance_of_walk_gas(gas, bottle, schedule, overrides)
+
+
+def _check_no_gas_override(name: str, overrides: Iterable[str]) -> None:
+    """Raise ParameterError for an override of the gas, which no bottle has as a parameter.
+
+    The message explains how to repeat the run of the walk or recording ``name`` with another gas.
+    """
     for override in read_overrides(overrides):
         if "gas" in override.typed.split("."):
             species = override.text if override.text in SPECIES else "NAME"
@@ -81,23 +101,22 @@ def endurance_of_gas_use(
                 f"the bottle file, the gas of the device in the scenario: to change it, repeat the run of {name} with "
                 f"{again} and give the new result folder"
             )
-    gas = walk_gas(use) if isinstance(use, WalkResult) else None
-    if isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
-        gas = read_walk_gas(Path(use))
-    if gas is not None:
-        if stride_time is not None:
-            stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"
-            argument = argument_text("stride_time")
-            raise ParameterError(f"{argument} applies to recordings only: {name} repeats {stride}; omit {argument}")
-        return endurance_of_walk_gas(gas, bottle, schedule, overrides)
-    full = load_bottle(PAPER_BOTTLE if bottle is None else bottle, overrides)
+
+
+def _endurance_of_recording(
+    use: str | Path | Recording, stride_time: float | None, full: Bottle, schedule: Schedule
+) -> Endurance:
+    """Return the duration of a full bottle for a recording, its file or its result folder, which is repeated.
+
+    ``stride_time`` is the time of a stride [s]; by default the whole recording is repeated. Raises DataError for the
+    result folder of a device with another gas than the bottle contains.
+    """
     if isinstance(use, Recording):
         recording, units = use, {}
     else:
-        recording, run = read_recording(Path(str(use))), Path(str(use)) / RUN_FILE
+        recording, run = read_recording(Path(use)), Path(use) / RUN_FILE
         document = read_json(run) if run.is_file() else {}
         units = dict(stated_units(run, document)) if document else {}
-        # The gas demand of a device with another gas does not apply to this bottle.
         molar_mass: Any = document
         for key in ("scenario", "device", "gas", "molar_mass"):
             molar_mass = molar_mass.get(key) if isinstance(molar_mass, dict) else None

@@ -78,20 +78,20 @@ def read_walk_gas(folder: Path) -> WalkGas:
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
         raise DataError(f"{path}: is not a result of 'ppafo walk' (its 'format' is not '{WALK_FORMAT}')")
-    file = _WalkFile(path, document)
-    status = file.table("status").get("kind", "completed")
+    status = _table(path, document, "status").get("kind", "completed")
     if status != "completed":
         raise DataError(
             f"{path}: the walk {status}, so its gas demand cannot be repeated; give a walk that ran to its end"
         )
-    configuration = file.table("configuration")
-    sequence = None if configuration.get("task_sequence") is None else file.table("configuration.task_sequence")
+    configuration = _table(path, document, "configuration")
+    has_sequence = configuration.get("task_sequence") is not None
+    sequence = _table(path, document, "configuration.task_sequence") if has_sequence else None
     metric = "gas" if sequence is None else "task_sequence_gas"
     time = "configuration.gait.stride_time" if sequence is None else "metrics.task_sequence_time.value"
     # A walk without help has no gas among its metrics.
-    has_gas = metric in file.table("metrics")
-    gas = file.number(f"metrics.{metric}.value", above=_LEAST_GAS) if has_gas else 0.0
-    stride_time = file.number(time, above=0.0)
+    has_gas = metric in _table(path, document, "metrics")
+    gas = _number(path, document, f"metrics.{metric}.value", above=_LEAST_GAS) if has_gas else 0.0
+    stride_time = _number(path, document, time, above=0.0)
     recording = read_recording(folder)
     if "supplied_mass" not in recording:
         raise DataError(f"{recording.label}: there is no channel 'supplied_mass'; repeat the walk with 'ppafo walk'")
@@ -101,38 +101,30 @@ def read_walk_gas(folder: Path) -> WalkGas:
         gas,
         stride_time,
         task_sequence="" if sequence is None else str(sequence.get("name", "task sequence")),
-        scenario=_walked(configuration, file.path),
+        scenario=_walked(configuration, path),
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _WalkFile:
-    """Walk-result file as flat data, keyed by dotted path."""
+def _table(file: Path, document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return a table of a walk file by dotted path, {} if it is missing; DataError for any other type of value."""
+    node = document
+    for part in name.split("."):
+        node = node.get(part, {})
+        if not isinstance(node, Mapping):
+            raise DataError(f"{file}: '{part}' must be a JSON object; repeat the walk with 'ppafo walk'")
+    return node
 
-    path: Path
-    content: Mapping[str, Any]
 
-    def table(self, name: str) -> Mapping[str, Any]:
-        """Return a table of the file by dotted path, {} if it is missing; DataError for any other type of value."""
-        node = self.content
-        for part in name.split("."):
-            node = node.get(part, {})
-            if not isinstance(node, Mapping):
-                raise DataError(f"{self.path}: '{part}' must be a JSON object; repeat the walk with 'ppafo walk'")
-        return node
-
-    def number(self, name: str, above: float) -> float:
-        """Return a number [SI] of the file by dotted path; DataError if it is missing or not above ``above``."""
-        node: Any = self.content
-        for part in name.split("."):
-            node = node.get(part) if isinstance(node, Mapping) else None
-        if isinstance(node, bool) or not isinstance(node, int | float) or not abs(node) <= sys.float_info.max:
-            raise DataError(f"{self.path}: '{name}' must be a number; repeat the walk with 'ppafo walk'")
-        if node <= above:
-            raise DataError(
-                f"{self.path}: '{name}' = {node:g} is impossible for a walk; repeat the walk with 'ppafo walk'"
-            )
-        return float(node)
+def _number(file: Path, document: Mapping[str, Any], name: str, above: float) -> float:
+    """Return a number [SI] of a walk file by dotted path; DataError if it is missing or not above ``above``."""
+    node: Any = document
+    for part in name.split("."):
+        node = node.get(part) if isinstance(node, Mapping) else None
+    if isinstance(node, bool) or not isinstance(node, int | float) or not abs(node) <= sys.float_info.max:
+        raise DataError(f"{file}: '{name}' must be a number; repeat the walk with 'ppafo walk'")
+    if node <= above:
+        raise DataError(f"{file}: '{name}' = {node:g} is impossible for a walk; repeat the walk with 'ppafo walk'")
+    return float(node)
 
 
 def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:

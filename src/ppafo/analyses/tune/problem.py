@@ -17,7 +17,6 @@ from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
-from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import Scenario
@@ -194,14 +193,6 @@ class Spread:
         noun = "standard deviation" if self.deviations == 1.0 else "standard deviations"
         return f"mean and {self.deviations:g} {noun}"
 
-    def bad_end(self, values: Floats, is_high: bool) -> Floats:
-        """Return the unfavourable end of values (candidates, draws) [SI], high or low, as an array (candidates,)."""
-        if self.fraction is not None:
-            return np.asarray(np.quantile(values, self.fraction if is_high else 1.0 - self.fraction, axis=1))
-        # Of a sample, hence n - 1; the draws are the same for all candidates, so that it ranks them fairly.
-        spread = self.deviations * np.std(values, axis=1, ddof=1)
-        return np.asarray(np.mean(values, axis=1) + (spread if is_high else -spread))
-
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Problem:
@@ -247,7 +238,14 @@ class Problem:
 
     def bad_end(self, values: Floats, is_high: bool) -> Floats:
         """Return the unfavourable end of values (candidates, draws) [SI], high or low, as an array (candidates,)."""
-        return values[:, 0] if self.spread is None else self.spread.bad_end(values, is_high)
+        spread = self.spread
+        if spread is None:
+            return values[:, 0]
+        if spread.fraction is not None:
+            return np.asarray(np.quantile(values, spread.fraction if is_high else 1.0 - spread.fraction, axis=1))
+        # Of a sample, hence n - 1; the draws are the same for all candidates, so that it ranks them fairly.
+        deviations = spread.deviations * np.std(values, axis=1, ddof=1)
+        return np.asarray(np.mean(values, axis=1) + (deviations if is_high else -deviations))
 
     @property
     def gauge(self) -> frozenset[str]:
@@ -317,48 +315,54 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         check_metrics(list(dict.fromkeys(metrics)), scenario)
         paths = [gain.path for gain in parsed.search]
         spread = _spread(parsed, source.folder, paths, scenario)
-        drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
         repeated = first_twice(paths)
         if repeated is not None:
             raise StudyError(f"'{repeated}' appears in two [[search]] tables; omit one")
-        varies = ATMOSPHERE_PATH in (*paths, *drawn)
+        drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
         atmosphere = atmosphere_of(scenario, (*drawn, *paths))
-        searched = tuple(_searched(gain, scenario, varies) for gain in parsed.search)
-        goals, limits = [], []
-        for goal in parsed.objective:
-            if goal.weight == 0.0:
-                raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit this objective")
-            scale, where = None, f"objective '{goal.metric}': scale = '{goal.scale}'"
-            if goal.scale is not None:
-                scale = difference_of(goal.scale, goal.metric, where)
-            if scale is not None and scale <= 0.0:
-                raise StudyError(f"{where}: must be above 0")
-            goals.append(ObjectiveTerm(goal.metric, goal.weight, scale))
-        for constraint in parsed.constraints:
-            bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
-            if len(bounds) != 1:
-                has = "both" if bounds else "neither"
-                raise StudyError(
-                    f"constraint '{constraint.metric}': has {has} of at_most and at_least; give one of them"
-                )
-            where = f"constraint '{constraint.metric}' = '{bounds[0]}'"
-            limit = level_of(bounds[0], constraint.metric, where, atmosphere)
-            limits.append(MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0]))
         return Problem(
             name=parsed.name,
             description=" ".join(parsed.description.split()),
             scenario=scenario,
             overrides=scenario.origin.overrides,
-            searched=searched,
-            goals=tuple(goals),
-            constraints=tuple(limits),
+            searched=tuple(_searched(gain, scenario, atmosphere is None) for gain in parsed.search),
+            goals=tuple(map(_objective_term, parsed.objective)),
+            constraints=tuple(_metric_limit(constraint, atmosphere) for constraint in parsed.constraints),
             spread=spread,
             effort=parsed.effort,
             changes=changes_in(scenario, overrides=overrides),
         )
 
 
+def _objective_term(goal: GoalSection) -> ObjectiveTerm:
+    """Return a term of the objective with its scale in SI; StudyError for a weight of 0 or a scale not above 0."""
+    if goal.weight == 0.0:
+        raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit this objective")
+    if goal.scale is None:
+        return ObjectiveTerm(goal.metric, goal.weight, None)
+    where = f"objective '{goal.metric}': scale = '{goal.scale}'"
+    scale = difference_of(goal.scale, goal.metric, where)
+    if scale <= 0.0:
+        raise StudyError(f"{where}: must be above 0")
+    return ObjectiveTerm(goal.metric, goal.weight, scale)
+
+
+def _metric_limit(constraint: Constraint, atmosphere: float | None) -> MetricLimit:
+    """Return the limit of a constraint in SI; StudyError unless it has exactly one of at_most and at_least.
+
+    Gauge pressures are relative to ``atmosphere`` [Pa absolute], and refused if it is None because it varies.
+    """
+    bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
+    if len(bounds) != 1:
+        has = "both" if bounds else "neither"
+        raise StudyError(f"constraint '{constraint.metric}': has {has} of at_most and at_least; give one of them")
+    where = f"constraint '{constraint.metric}' = '{bounds[0]}'"
+    limit = level_of(bounds[0], constraint.metric, where, atmosphere)
+    return MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
+
+
 def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> SearchedParameter:
+    """Return a searched parameter with bounds in SI; StudyError for a path or bounds that cannot be searched."""
     with refused_as(StudyError, f"search '{gain.path}'", UnitError, ScenarioError):
         varied = varied_path(gain.path, scenario)
         ends = (gain.minimum, gain.maximum)

@@ -371,7 +371,7 @@ def suggestion_sentence(sizing: Sizing) -> str:
         and (reached := np.max(sign * recording["torque"])) < REACHED * peak
     ]
     # The error limit accepts such a peak; a run with a smaller error may have more of the peak.
-    more = f"for more, also lower limits.rms_error below '{TORQUE.text(choice.error)}' (not tried)"
+    more = f"for more, lower limits.rms_error below '{TORQUE.text(choice.error)}' (not tried)"
     reaches = f"; reaches {' and '.join(short)} in the simulated run: {more}" if short else ""
     return (
         f"suggested: {choice.valve.name} at {PRESSURE.text(choice.pressure)}{bottle}, the lightest that lasts "
