@@ -93,15 +93,13 @@ def course_panels(course: FittedCurve, look: str, legend: str, limits: Sequence[
         Mark("line", course.times, course.samples - course.model, colour=course.colour, style={"linewidth": 0.9}),
         Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
     ]
+    ends = course.times[0], course.times[-1]
     dashed = {"linewidth": 0.8, "linestyle": (0, (4, 3))}
     lower += [Mark("level", (), limit, colour=GREY, style=dashed) for limit in limits]
 
-    def set_time(axes: "Axes") -> None:
-        axes.set_xlim(course.times[0], course.times[-1])
-
     def set_both(axes: "Axes") -> None:
         # The lower one too: axes that are joined later take the limits of the one below them.
-        set_time(axes)
+        axes.set_xlim(*ends)
         largest = max(map(abs, axes.dataLim.intervaly)) * 1.1
         # What is left by rounding alone is none.
         largest = largest if largest > _ROUNDING * float(course.change.values(np.ptp(course.samples))) else 1.0
@@ -109,6 +107,6 @@ def course_panels(course: FittedCurve, look: str, legend: str, limits: Sequence[
         axes.locator_params(axis="y", nbins=3)
 
     return [
-        Panel(course.time, course.level, upper, legend=legend, then=set_time, shares_x=True),
+        Panel(course.time, course.level, upper, legend=legend, then=lambda axes: axes.set_xlim(*ends), shares_x=True),
         Panel(course.time, course.change, lower, then=set_both, tall=0.5, shares_x=True),
     ]

@@ -1,6 +1,7 @@
 """A run that does not follow its reference says so, with what hinders it; one that does is left alone."""
 
 import ast
+import dataclasses
 import math
 import re
 import subprocess
@@ -760,6 +761,23 @@ def test_a_verdict_has_the_limits_by_which_it_was_judged_and_the_swing() -> None
     assert re.search(r"RMS error [\d.]+ deg \(2 deg allowed\), largest error [\d.]+ deg \(2 deg allowed\)$", angle)
     still = ["reference.kind=constant", "reference.level=60 deg", "motion.angle=55 deg"]
     assert re.search(r"swing [\d.e-]+ deg \(1 deg allowed\)$", simulate("cylinder-servo", still).following)
+
+
+@pytest.mark.parametrize(("degrees", "text"), [(2.0004, "2.0004"), (1.9998, "1.9998"), (2.0, "2"), (2.504, "2.5")])
+def test_an_error_near_its_limit_has_the_digits_that_distinguish_it_from_the_limit(
+    monkeypatch: pytest.MonkeyPatch, degrees: float, text: str
+) -> None:
+    """With three digits 2.0004 and 1.9998 would read 2, as the limit of 2 deg does."""
+    angle, limit = math.radians(degrees), math.radians(2.0)
+    told = simulate(TASK).tracking
+    assert told is not None
+    failed = dataclasses.replace(told, controlled="angle", criterion="swing", worst=angle, allowed=limit)
+    assert f"reference: swing {text} deg (2 deg allowed) from" in failed.found
+    if degrees > 2.0:
+        stays = dataclasses.replace(failed, criterion="mean error", error=angle, missing=-angle)
+        assert stays.found == f"the angle stays {text} deg below its reference (2 deg allowed)"
+    monkeypatch.setattr("ppafo.simulation.tracking.verdict._criteria", lambda _: (("RMS error", angle, limit),))
+    assert simulate("cylinder-servo").following.endswith(f"on: RMS error {text} deg (2 deg allowed)")
 
 
 def test_a_swing_that_alone_is_beyond_its_limit_is_said_with_the_limit() -> None:

@@ -87,7 +87,7 @@ class Identification:
                 "procedure": result.procedure,
                 "summary": result.summary,
                 "recordings_are": result.kind,
-                "estimates": [_estimate_data(estimate) for estimate in result.estimates],
+                "estimates": [plain(item) | {"verdict_text": item.verdict_text} for item in result.estimates],
                 "conflict": result.conflict,
                 "remarks": list(result.remarks),
             }
@@ -300,10 +300,6 @@ def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
     return kind_of([recording.kind for recording in fit.measurements])
 
 
-def _estimate_data(estimate: Estimate) -> dict[str, Any]:
-    return {**plain(estimate), "verdict_text": estimate.verdict_text}
-
-
 def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
     """Return a trajectory fit as plain data in SI; rows and columns of matrices follow the estimates."""
     fit = outcome.fit
@@ -325,7 +321,7 @@ def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
         "confidence": fit.problem.confidence,
         "evaluations": fit.fit.evaluations,
         "has_converged": fit.fit.has_converged,
-        "estimates": [_estimate_data(estimate) for estimate in fit.estimates],
+        "estimates": [plain(item) | {"verdict_text": item.verdict_text} for item in fit.estimates],
         "covariance": fit.covariance.tolist(),
         "correlation": fit.correlation.tolist(),
         "tolerances": [plain(tolerance) for tolerance in fit.known],

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from ppafo.analyses.identify.answer import Identification
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.new_set import with_estimates
-from ppafo.identification.problem import ProblemFile
+from ppafo.identification.problem import DeviceProblem, ProblemFile
 from ppafo.identification.procedures import (
     PROCEDURES,
     FlowProblem,
@@ -49,31 +49,11 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     order in which each depends on the earlier ones, then the section [trajectory]. Raises the errors of ``identify``.
     """
     device = problem.device
-    beside = folder / device.set
-    base = load_parameter_set(beside if beside.suffix == ".toml" else device.set)
-    overrides = read_overrides(device.overrides)
-    check_valve(overrides, device.valve, f"device.valve = '{device.valve}'")
-    before = with_overrides(base, overrides, device.valve)
+    before = _set_of_device(device, folder)
     with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
         valve = chosen_valve(before, device.valve)
-        tasks = []
-        for number, procedure in enumerate(problem.procedure, start=1):
-            sources = [
-                source
-                for recording in procedure.recordings
-                for source in _sources(
-                    problem,
-                    folder / recording,
-                    file,
-                    procedure.columns,
-                    before,
-                    _ROW_TIMES.get(procedure.kind),
-                    procedure.gas if isinstance(procedure, FlowProblem) else None,
-                )
-            ]
-            tasks.append(_Task(procedure, tuple(sources), f"{file}: procedure {number}, {procedure.kind}"))
-        # Each procedure uses the results of the earlier ones.
-        tasks.sort(key=lambda task: PROCEDURES.index(task.procedure.kind))
+        reader = _RecordingReader(problem=problem, folder=folder, file=file, parameter_set=before)
+        tasks = _tasks_in_order(reader)
         used = _used_recordings(tasks, before, valve, file)
         tolerances = tolerances_of(problem.bench, file)
         results, current = _bench_results(tasks, before, valve, tolerances)
@@ -81,7 +61,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         trajectory = None
         if problem.trajectory is not None:
             section = SectionContext(
-                read=partial(_experiment_source, problem, folder, file, current),
+                read=reader._replace(parameter_set=current).read_experiment,
                 folder=folder,
                 file=f"{file}: trajectory",
                 parameter_set=current,
@@ -98,6 +78,68 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         return replace(identification, new_set=described)
 
 
+def _set_of_device(device: DeviceProblem, folder: Path) -> ParameterSet:
+    """Return the parameter set of the measured device, with the overrides of the problem file."""
+    beside = folder / device.set
+    base = load_parameter_set(beside if beside.suffix == ".toml" else device.set)
+    overrides = read_overrides(device.overrides)
+    check_valve(overrides, device.valve, f"device.valve = '{device.valve}'")
+    return with_overrides(base, overrides, device.valve)
+
+
+_ROW_TIMES = dict.fromkeys(("static-torque", "open-valve-flow", "valve-map"), 1.0)
+"""Time between rows of a table without a time column [s], for procedures whose laws do not depend on time."""
+
+
+class _RecordingReader(NamedTuple):
+    """Reader of the recordings that a problem file names.
+
+    ``folder`` is the base of relative paths, ``file`` the name of the problem file in messages. ``parameter_set``
+    provides the atmosphere for gauge pressures, and the gas for volume flows if the reader is not given one.
+    """
+
+    problem: ProblemFile
+    folder: Path
+    file: str
+    parameter_set: ParameterSet
+
+    def read(
+        self, name: str, columns: str | None, row_time: float | None = None, gas: str | None = None
+    ) -> tuple[RecordingSource, ...]:
+        """Return the recordings in a file, read through the column map ``columns`` if one is given.
+
+        ``row_time`` [s] is the time between the rows of a table of text, or of a column map, without a time column;
+        None requires the column. ``gas`` is the gas of volume flows.
+        """
+        path, atmosphere = self.folder / name, atmospheric_pressure(self.parameter_set)
+        if path.is_dir():
+            raise IdentificationError(f"{path}: is a folder, not a recording; give the recording in the folder")
+        is_text = path.suffix.lower() in TEXT_SUFFIXES and not (path.parent / RUN_FILE).exists()
+        if columns is None and row_time is not None and is_text:
+            return (source_of(path, read_csv(path, atmosphere=atmosphere, row_time=row_time)),)
+        if columns is None:
+            return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
+        molar_mass = number_in_si(self.parameter_set, "gas.molar_mass")
+        flowing = gas or ("" if molar_mass is None else f"{molar_mass!r} kg/mol")
+        column_map = self.problem.columns[columns]
+        # A direction from a rate, and trials that begin anew, need the times of the bench.
+        if row_time is not None and not (TIME in column_map.channels or column_map.direction or column_map.trial):
+            time = MappedChannel(rate=f"{1.0 / row_time!r} Hz")
+            column_map = column_map.model_copy(update={"channels": {TIME: time, **column_map.channels}})
+        recordings = read_trials(path, column_map, None, atmosphere, f"{self.file}:{columns}", flowing)
+        return tuple(source_of(path, recording, recording.label.removeprefix(path.stem)) for recording in recordings)
+
+    def read_experiment(self, experiment: ExperimentSection) -> RecordingSource:
+        """Return the recording of an experiment; IdentificationError for a file with several recordings."""
+        source, *others = self.read(experiment.recording, experiment.columns)
+        if others:
+            raise IdentificationError(
+                f"{experiment.recording}: columns.{experiment.columns}.trial selects {1 + len(others)} trials, but an "
+                "experiment has one recording; name one trial"
+            )
+        return source
+
+
 @dataclass(frozen=True, slots=True)
 class _Task:
     """Identification procedure with its recordings, and the name used in error messages."""
@@ -105,6 +147,18 @@ class _Task:
     procedure: ProcedureProblem
     sources: tuple[RecordingSource, ...]
     label: str
+
+
+def _tasks_in_order(reader: _RecordingReader) -> list[_Task]:
+    """Return the procedures of a problem with their recordings, each after the procedures whose results it uses."""
+    tasks = []
+    for number, procedure in enumerate(reader.problem.procedure, start=1):
+        row_time, gas = _ROW_TIMES.get(procedure.kind), procedure.gas if isinstance(procedure, FlowProblem) else None
+        sources = list[RecordingSource]()
+        for recording in procedure.recordings:
+            sources += reader.read(recording, procedure.columns, row_time, gas)
+        tasks.append(_Task(procedure, tuple(sources), f"{reader.file}: procedure {number}, {procedure.kind}"))
+    return sorted(tasks, key=lambda task: PROCEDURES.index(task.procedure.kind))
 
 
 def _bench_results(
@@ -137,58 +191,6 @@ def _with_checked_units(trajectory: TrajectoryOutcome, current: ParameterSet) ->
     known = {path: value if is_near[path] else number_in_si(current, path) for path, value in fit.values.items()}
     recordings = [experiment.recording for experiment in fit.problem.experiments]
     return replace(trajectory, fit=replace(fit, estimates=with_wrong_units(fit.estimates, known, recordings)))
-
-
-_ROW_TIMES = dict.fromkeys(("static-torque", "open-valve-flow", "valve-map"), 1.0)
-"""Time between rows of a table without a time column [s], for procedures whose laws do not depend on time."""
-
-
-def _sources(
-    problem: ProblemFile,
-    path: Path,
-    file: str,
-    columns: str | None,
-    parameter_set: ParameterSet,
-    row_time: float | None = None,
-    gas: str | None = None,
-) -> tuple[RecordingSource, ...]:
-    """Return the recordings in a file that a problem names, read through a column map if one is given.
-
-    ``parameter_set`` provides the atmosphere for gauge pressures and, unless ``gas`` names it, the gas for volume
-    flows. ``row_time`` [s] is the time between the rows of a table of text, or of a column map, without a time column;
-    None requires the column.
-    """
-    atmosphere = atmospheric_pressure(parameter_set)
-    if path.is_dir():
-        raise IdentificationError(f"{path}: is a folder, not a recording; give the recording in the folder")
-    is_text = path.suffix.lower() in TEXT_SUFFIXES and not (path.parent / RUN_FILE).exists()
-    if columns is None and row_time is not None and is_text:
-        return (source_of(path, read_csv(path, atmosphere=atmosphere, row_time=row_time)),)
-    if columns is None:
-        return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
-    molar_mass = number_in_si(parameter_set, "gas.molar_mass")
-    flowing = gas or ("" if molar_mass is None else f"{molar_mass!r} kg/mol")
-    column_map = problem.columns[columns]
-    # A direction from a rate, and trials that begin anew, need the times of the bench.
-    if row_time is not None and not (TIME in column_map.channels or column_map.direction or column_map.trial):
-        time = MappedChannel(rate=f"{1.0 / row_time!r} Hz")
-        column_map = column_map.model_copy(update={"channels": {TIME: time, **column_map.channels}})
-    recordings = read_trials(path, column_map, None, atmosphere, f"{file}:{columns}", flowing)
-    return tuple(source_of(path, recording, recording.label.removeprefix(path.stem)) for recording in recordings)
-
-
-def _experiment_source(
-    problem: ProblemFile, folder: Path, file: str, parameter_set: ParameterSet, experiment: ExperimentSection
-) -> RecordingSource:
-    """Return the recording of an experiment; IdentificationError for a file with several recordings."""
-    recording, columns = experiment.recording, experiment.columns
-    source, *others = _sources(problem, folder / recording, file, columns, parameter_set)
-    if others:
-        raise IdentificationError(
-            f"{recording}: columns.{columns}.trial selects {1 + len(others)} trials, but an experiment has one "
-            "recording; name one trial"
-        )
-    return source
 
 
 def _used_recordings(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:

@@ -51,7 +51,10 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     A claim of another publication that is not met counts as a result, not as a failure.
     """
     reproduction = solved.reproduction
-    rows: list[Sequence[Cell]] = [] if reproduction is None else [(SEED, *row) for row in _paper_rows(reproduction)]
+    of_paper = () if reproduction is None else reproduction.claims
+    rows: list[Sequence[Cell]] = [
+        (SEED, claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in of_paper
+    ]
     details = [] if reproduction is None else [Section(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
     for publication, claims in solved.studies:
         stated_claims: list[Sequence[Cell]] = []
@@ -96,10 +99,6 @@ def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
     return None if high is None else f"at most {high:g} {unit}".rstrip()
 
 
-def _paper_rows(reproduction: Reproduction) -> list[tuple[str, str, str, str]]:
-    return [(claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in reproduction.claims]
-
-
 def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     """Return the paper's claims as a finding.
 
@@ -116,8 +115,9 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         for claim in missed
         if claim.window is not None
     ]
+    rows_of_claims = [(claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in reproduction.claims]
     claims = Section(
-        columns=columns_of(_HEAD, _paper_rows(reproduction)),
+        columns=columns_of(_HEAD, rows_of_claims),
         remarks=("", count_sentence([claim.verdict for claim in reproduction.claims]), *remarks),
         left=len(_HEAD),
     )

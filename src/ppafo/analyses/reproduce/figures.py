@@ -209,8 +209,8 @@ def torque_task_figure(
     """
     experiments = synthetic or (None, None)
     runs = [
-        _TaskRun("solenoid", SOLENOID, solenoid, experiments[0], gas_in_paper[0]),
-        _TaskRun("proportional", PROPORTIONAL, proportional, experiments[1], gas_in_paper[1]),
+        _TaskRun("solenoid", SOLENOID, solenoid, experiment=experiments[0], gas_in_paper=gas_in_paper[0]),
+        _TaskRun("proportional", PROPORTIONAL, proportional, experiment=experiments[1], gas_in_paper=gas_in_paper[1]),
     ]
     torques = [_torque_marks(run, ceiling) for run in runs]
     opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)

@@ -14,8 +14,8 @@ from ppafo.identification.residuals import ResidualBlock
 from ppafo.identification.trajectory.numbers import ZERO_OF, FitNumber, broken_rule, full_path, reach_of, with_numbers
 from ppafo.identification.trajectory.problem import TrajectoryProblem, numbers_of
 from ppafo.identification.trajectory.runs import (
-    FitChannel,
     Floats,
+    PreparedExperiment,
     blocks_of,
     numbers_in,
     prepare,
@@ -122,33 +122,36 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     numbers = numbers_of(problem)
     free = [number.free for number in numbers]
     start = np.array([number.start for number in free])
-    runs = tuple(
-        prepare(
-            experiment,
-            numbers_in(experiment.label, numbers, start),
-            reach_of([number for number in numbers if number.acts_in(experiment.label)]),
-        )
-        for experiment in problem.experiments
-    )
+    runs = []
+    for experiment in problem.experiments:
+        reach = reach_of([number for number in numbers if number.acts_in(experiment.label)])
+        runs.append(prepare(experiment, numbers_in(experiment.label, numbers, start), reach))
     report(Progress(f"trajectory fit: {len(free)} numbers, {len(runs)} recordings"))
     blocks = blocks_of(runs, numbers, start)
     fitted = fit_residuals(
         lambda points: residuals_of(runs, numbers, points), free, blocks, problem.confidence, report, is_motion=True
     )
+    outliers = _outlier_remarks(fitted, blocks, {run.label: run.time for run in runs})
+    return _result(problem, numbers, runs, fitted, tuple(outliers))
+
+
+def _result(
+    problem: TrajectoryProblem,
+    numbers: tuple[FitNumber, ...],
+    runs: Sequence[PreparedExperiment],
+    fitted: Fit,
+    outliers: tuple[str, ...],
+) -> TrajectoryFit:
+    """Return the result of a finished search: estimates, updated tolerances, and the model beside each recording."""
     conflict = conflict_in_words(fitted, "the model is incomplete") or _wandering(fitted, numbers)
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
     rows = [row for row, number in enumerate(numbers) if not number.is_tolerance]
     estimates = tuple(_estimate(problem, fitted, numbers[row], row, conflict) for row in rows)
     errors = np.sqrt(np.diag(fitted.covariance))
     covariance = fitted.covariance[np.ix_(rows, rows)]
-    models, measurements, channels = list[Recording](), list[Recording](), list[ChannelFit]()
-    signals = signals_of(runs, numbers, fitted.values[:, None])
-    for experiment, run, columns in zip(problem.experiments, runs, signals, strict=True):
-        modelled = {name: Channel(column[:, 0], CHANNELS[name].unit) for name, column in columns.items()}
-        samples = {channel.name: Channel(channel.values, CHANNELS[channel.name].unit) for channel in run.channels}
-        models.append(Recording(f"model of {run.label}", run.time, modelled, kind="simulated"))
-        measurements.append(Recording(experiment.label, run.time, samples, kind=experiment.recording.kind))
-        channels += (_channel(fitted, run.label, channel, columns[channel.name][:, 0]) for channel in run.channels)
+    tolerances = ((row, number) for row, number in enumerate(numbers) if number.is_tolerance)
+    known = [_known(fitted, number, row, float(errors[row]), estimates) for row, number in tolerances]
+    models, measurements, channels = _comparison(problem, numbers, runs, fitted)
     scenarios = tuple(with_numbers(run.scenario, numbers_in(run.label, numbers, fitted.values)) for run in runs)
     return TrajectoryFit(
         problem=problem,
@@ -157,37 +160,63 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         estimates=estimates,
         covariance=covariance,
         correlation=covariance / np.outer(errors[rows], errors[rows]),
-        known=tuple(
-            _known(fitted, number, row, float(errors[row]), estimates)
-            for row, number in enumerate(numbers)
-            if number.is_tolerance
-        ),
+        known=tuple(known),
         channels=tuple(channels),
         models=tuple(models),
         measurements=tuple(measurements),
         scenarios=scenarios,
         conflict=conflict,
         remarks=_remarks(fitted, scenarios, estimates),
-        outliers=tuple(_outlier_remarks(fitted, blocks, {run.label: run.time for run in runs})),
+        outliers=outliers,
     )
+
+
+def _comparison(
+    problem: TrajectoryProblem, numbers: Sequence[FitNumber], runs: Sequence[PreparedExperiment], fitted: Fit
+) -> tuple[list[Recording], list[Recording], list[ChannelFit]]:
+    """Return the fitted runs at the sample times, the samples, and the residual statistics of their channels."""
+    models, measurements, channels = list[Recording](), list[Recording](), list[ChannelFit]()
+    signals = signals_of(runs, numbers, fitted.values[:, None])
+    for experiment, run, columns in zip(problem.experiments, runs, signals, strict=True):
+        modelled = {name: Channel(column[:, 0], CHANNELS[name].unit) for name, column in columns.items()}
+        samples = {channel.name: Channel(channel.values, CHANNELS[channel.name].unit) for channel in run.channels}
+        models.append(Recording(f"model of {run.label}", run.time, modelled, kind="simulated"))
+        measurements.append(Recording(experiment.label, run.time, samples, kind=experiment.recording.kind))
+        for channel in run.channels:
+            residuals = channel.values - columns[channel.name][:, 0]
+            channels.append(
+                ChannelFit(
+                    experiment=run.label,
+                    channel=channel.name,
+                    unit=CHANNELS[channel.name].unit,
+                    noise=fitted.noise[channel.name],
+                    order=fitted.correlation[channel.name],
+                    rms=float(np.sqrt(np.mean(residuals * residuals))),
+                    largest=float(np.max(np.abs(residuals))),
+                    span=float(np.ptp(channel.values)),
+                )
+            )
+    return models, measurements, channels
 
 
 def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Estimate]) -> tuple[str, ...]:
     """Return remarks on violated rules of the fitted device and on a search that did not converge."""
     remarks = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
+    texts = {item.path: f"{item.value:.4g} {item.unit}".rstrip(" -") for item in estimates}
     if fitted.edge:
         wanted, bounds = [], []
         for estimate in (item for item in estimates if item.path in fitted.edge):
             side = fitted.edge[estimate.path]
-            wanted.append(f"{estimate.path} {'above' if side > 0 else 'below'} {_in_unit(estimate.value, estimate)}")
+            wanted.append(f"{estimate.path} {'above' if side > 0 else 'below'} {texts[estimate.path]}")
             inside = estimate.value - side * _INSIDE * abs(estimate.value)
-            bounds.append(f'{"high" if side > 0 else "low"} = "{_in_unit(inside, estimate)}" of {estimate.path}')
+            bound = f"{inside:.4g} {estimate.unit}".rstrip(" -")
+            bounds.append(f'{"high" if side > 0 else "low"} = "{bound}" of {estimate.path}')
         remarks.append(
             f"the recordings favour {' and '.join(wanted)}, where every run fails; check recordings, "
             f"scenario and set, or give {' and '.join(bounds)} as a bound"
         )
     elif not fitted.has_converged:
-        starts = ", ".join(f'start = "{_in_unit(item.value, item)}" of {item.path}' for item in estimates)
+        starts = ", ".join(f'start = "{text}" of {path}' for path, text in texts.items())
         remarks.append(
             f"the search stopped after {fitted.evaluations} runs before it converged; to continue, give the parameters "
             f"{starts}"
@@ -208,10 +237,6 @@ def _outlier_remarks(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mappin
 
 _INSIDE = 1.0e-3
 """Relative distance from the edge of successful runs [-] at which a bound is suggested."""
-
-
-def _in_unit(value: float, estimate: Estimate) -> str:
-    return f"{value:.4g}" if estimate.unit in ("", "-") else f"{value:.4g} {estimate.unit}"
 
 
 def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Sequence[Estimate]) -> NuisanceParameter:
@@ -288,18 +313,3 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
         if number.acts_in(experiment.label)
     )
     return Estimate(name, value, number.unit, low, high, verdict, text, recordings, problem.confidence, size)
-
-
-def _channel(fitted: Fit, experiment: str, measured: FitChannel, model: Floats) -> ChannelFit:
-    """Return the residual statistics of a channel of an experiment, given the model at its samples."""
-    residuals = measured.values - model
-    return ChannelFit(
-        experiment=experiment,
-        channel=measured.name,
-        unit=CHANNELS[measured.name].unit,
-        noise=fitted.noise[measured.name],
-        order=fitted.correlation[measured.name],
-        rms=float(np.sqrt(np.mean(residuals * residuals))),
-        largest=float(np.max(np.abs(residuals))),
-        span=float(np.ptp(measured.values)),
-    )

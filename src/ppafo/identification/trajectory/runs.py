@@ -63,7 +63,7 @@ class FitChannel:
 
 
 @dataclass(frozen=True, slots=True)
-class _PreparedExperiment:
+class PreparedExperiment:
     """Experiment prepared for fitting: completed scenario, planned run, and samples located between its records.
 
     ``time`` has the sample times in the run [s]; a fitted offset may shift them by up to ``reach`` [s]. ``run`` has the
@@ -83,7 +83,7 @@ class _PreparedExperiment:
     inputs: StepInputs | None = None
 
 
-def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: float = 0.0) -> _PreparedExperiment:
+def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
     """Return an experiment prepared for fitting.
 
     ``numbers`` are the start values by path; ``reach`` [s] is the largest time offset that may be tried. Raises
@@ -128,16 +128,16 @@ def prepare_samples(
     reach: float,
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None = None,
-) -> _PreparedExperiment:
+) -> PreparedExperiment:
     """Return a prepared experiment from samples, at ``numbers`` [SI], with time offsets up to ``reach`` [s]."""
     run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
     unlocated = np.zeros(time.size)
     before = unlocated.astype(np.intp)
-    prepared = _PreparedExperiment(label, scenario, run, time, tuple(channels), reach, before, unlocated, recorded)
+    prepared = PreparedExperiment(label, scenario, run, time, tuple(channels), reach, before, unlocated, recorded)
     return _locate_samples(prepared, run)
 
 
-def _locate_samples(prepared: _PreparedExperiment, run: Run) -> _PreparedExperiment:
+def _locate_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
     """Locate the samples of an experiment between records that are no finer than needed."""
     time, recorded = prepared.time, prepared.recorded
     every = _steps_between_samples(time, prepared.reach, run.step)
@@ -183,7 +183,7 @@ def numbers_in(label: str, numbers: Sequence[FitNumber], point: Floats) -> dict[
 
 
 def signals_of(
-    experiments: Sequence[_PreparedExperiment], numbers: Sequence[FitNumber], points: Floats
+    experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], points: Floats
 ) -> list[dict[str, Floats]]:
     """Return the channels of each experiment [SI] (samples, points) at points [SI] (numbers, points).
 
@@ -199,7 +199,7 @@ def signals_of(
         return list(pool.map(signals_at, *arguments))
 
 
-def residuals_of(experiments: Sequence[_PreparedExperiment], numbers: Sequence[FitNumber], points: Floats) -> Floats:
+def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], points: Floats) -> Floats:
     """Return residuals, measured - model [SI] (samples of all channels, points), at points [SI] (numbers, points)."""
     signals = signals_of(experiments, numbers, points)
     return np.concatenate(
@@ -212,7 +212,7 @@ def residuals_of(experiments: Sequence[_PreparedExperiment], numbers: Sequence[F
 
 
 def blocks_of(
-    experiments: Sequence[_PreparedExperiment], numbers: Sequence[FitNumber], point: Floats
+    experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], point: Floats
 ) -> tuple[ResidualBlock, ...]:
     """Return the residual rows of each channel of each recording, with noise floor and integration error.
 
@@ -247,7 +247,7 @@ _NUMBERS_OF_RUN = (
 """Fields of a run that depend on the parameters of its scenario; program, clock and prescribed motion do not."""
 
 
-def run_with(prepared: _PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
+def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     """Return the run of an experiment with changed parameters [SI], on the same program and clock.
 
     A parameter may be an array (runs,). Raises IdentificationError if a valve setting or an effect changes to or from
@@ -268,7 +268,7 @@ def run_with(prepared: _PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     return replace(base, tolerance=tolerance, **{name: getattr(planned, name) for name in _NUMBERS_OF_RUN})
 
 
-def _check_same_program(prepared: _PreparedExperiment, device: Device, numbers: Mapping[str, Any]) -> None:
+def _check_same_program(prepared: PreparedExperiment, device: Device, numbers: Mapping[str, Any]) -> None:
     """Raise IdentificationError if a device with changed parameters needs another program than was prepared.
 
     A setting of the valve, or a parameter of an effect, that changes to or from 0 selects another model. ``numbers``
@@ -276,7 +276,7 @@ def _check_same_program(prepared: _PreparedExperiment, device: Device, numbers: 
     """
     program, planned_settings = prepared.run.program, prepared.scenario.device.valve.settings
     settings: Mapping[str, Any] = device.valve.settings
-    fitted = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
+    fitted = {path.rpartition(".")[2] for path in numbers if path.startswith(("valve.", "valves."))}
     kind = VALVES[device.valve.kind]
     for run in range(max((value.size for value in settings.values() if isinstance(value, np.ndarray)), default=1)):
         values = {name: at(value, run) for name, value in settings.items()}
@@ -294,7 +294,7 @@ def _check_same_program(prepared: _PreparedExperiment, device: Device, numbers: 
         )
 
 
-def signals_at(prepared: _PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
     """Return the channels [SI] (samples, runs) of one experiment for ``count`` runs with parameters [SI] by path.
 
     Runs that differ only in zeros and gains of compared sensors are simulated once. A pressure sensor reads gauge
@@ -319,7 +319,7 @@ def signals_at(prepared: _PreparedExperiment, columns: Mapping[str, Floats], cou
     return signals
 
 
-def _with_inputs(prepared: _PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
     """Return ideal sensor signals; runs with different zero errors of recorded inputs form separate batches."""
     zeros = {path: column for path, column in columns.items() if path.startswith(ZERO_OF)}
     others = {path: column for path, column in columns.items() if path not in zeros}
@@ -345,7 +345,7 @@ def _with_inputs(prepared: _PreparedExperiment, columns: Mapping[str, Floats], c
     return signals
 
 
-def _run_signals(prepared: _PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
     """Return the signals of ideal sensors [SI] (samples, runs)."""
     run = run_with(prepared, columns)
     rows = state_row_numbers(run)
@@ -377,7 +377,7 @@ def _run_signals(prepared: _PreparedExperiment, columns: Mapping[str, Floats], c
     return {channel.name: signals[channel.name] for channel in prepared.channels}
 
 
-def _at_samples(values: Floats, prepared: _PreparedExperiment, offsets: Floats) -> Floats:
+def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
     """Return a state at the sample times, interpolated linearly between records; each run has its time offset [s]."""
     if offsets.any():
         # Before the first record the device stands still.

@@ -80,10 +80,10 @@ def level_text(unit: str, number: float) -> str:
     return f"{without_exponent(value, '.3g')} {shown}{'_d' if unit == 'Pa_d' else ''}".rstrip()
 
 
-def change_text(controlled: str, number: float) -> str:
-    """Difference of two values of the controlled quantity, with its display unit."""
+def change_text(controlled: str, number: float, digits: int = 3) -> str:
+    """Difference of two values of the controlled quantity, with its display unit, in ``digits`` significant digits."""
     value, unit = metric_change(number, CONTROLLED[controlled].difference)
-    return f"{without_exponent(value, '.3g')} {unit}"
+    return f"{without_exponent(value, f'.{digits}g')} {unit}"
 
 
 def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, Quantity]:

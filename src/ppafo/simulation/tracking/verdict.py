@@ -105,8 +105,8 @@ class Tracking:
     def found(self) -> str:
         """Failure with the number that decided, without cause and remedy."""
         words, since = CONTROLLED[self.controlled].words, time_text(self.since)
-        numbers = (self.error, self.wanted, self.moved, abs(self.missing), self.span, self.worst, self.allowed)
-        error, wanted, moved, missing, swing, worst, allowed = (change_text(self.controlled, each) for each in numbers)
+        numbers = (self.error, self.wanted, self.moved, self.span)
+        error, wanted, moved, swing = (change_text(self.controlled, each) for each in numbers)
         plain_moved = moved.partition(" ")[0]
         if self.kind == "does not move":
             return f"the {words} loop does not move: {plain_moved} of the requested {wanted}"
@@ -120,8 +120,16 @@ class Tracking:
         is_constant = abs(self.missing) > max(0.9 * self.error, self.allowed)
         if is_constant and self.at_rest and self.criterion.endswith("error"):
             side = "below" if self.missing < 0.0 else "above"
+            missing, allowed = _error_and_limit(self.controlled, abs(self.missing), self.allowed)
             return f"the {words} stays {missing} {side} its reference ({allowed} allowed)"
+        worst, allowed = _error_and_limit(self.controlled, self.worst, self.allowed)
         return f"the {words} does not follow its reference: {self.criterion} {worst} ({allowed} allowed){since}"
+
+
+def _error_and_limit(controlled: str, error: float, limit: float) -> tuple[str, str]:
+    """Error and limit with their unit, in three digits, or in as many as distinguish the two."""
+    pairs = [(change_text(controlled, error, count), change_text(controlled, limit, count)) for count in range(3, 17)]
+    return next((pair for pair in pairs if pair[0] != pair[1]), pairs[0])
 
 
 @in_units(lambda result: result.scenario.device.shown)
@@ -182,11 +190,8 @@ def following_text(result: "RecordedResult") -> str:
     judged = _judged(result)
     # A walk without a requested torque has nothing to follow.
     if judged is None:
-        return (
-            _undecided_text(scenario, f"{len(result.recording)} samples are too few")
-            if scenario.follows_reference
-            else ""
-        )
+        reason = f"{len(result.recording)} samples are too few"
+        return _undecided_text(scenario, reason) if scenario.follows_reference else ""
     case, settled = judged[0], judged[0].settled
     if case.failure is not None:
         return ""
@@ -198,20 +203,18 @@ def following_text(result: "RecordedResult") -> str:
         longer = override_text([f"run.duration={2.0 * scenario.run.duration / settled.reference_periods:.3g} s"])
         return f"no verdict on the {controlled.words}: {short}, {left}; not tried: {longer} should give one"
 
-    def judged_text(name: str, number: float, limit: float, why: str = "") -> str:
-        allowed = "" if math.isinf(limit) else f" ({change_text(controlled.name, limit)} allowed{why})"
-        return f"{name} {change_text(controlled.name, number)}{allowed}"
-
+    errors = []
+    for number, (name, error, limit) in enumerate(_criteria(case)[:3:2]):
+        # The limit of on/off valves is several times wider, so the swing is reported beside the error.
+        is_widened = case.only_switches and scenario.follows_reference and number == 0
+        reason = ", because the valves are either open or shut" if is_widened else ""
+        error_text, limit_text = _error_and_limit(controlled.name, error, limit)
+        errors.append(f"{name} {error_text}" + ("" if math.isinf(limit) else f" ({limit_text} allowed{reason})"))
     # The interval stands before the errors: metrics of the same names cover the whole run.
-    begin = f"the {controlled.words} follows its reference;{time_text(settled.start)}: "
-    rms, *further = _criteria(case)
-    if not scenario.follows_reference:
-        return begin + judged_text(*rms)
-    # The limit of on/off valves is several times wider, so the swing is reported beside the error.
-    why = ", because the valves are either open or shut" if case.only_switches else ""
+    verdict = f"the {controlled.words} follows its reference;{time_text(settled.start)}: {', '.join(errors)}"
     # A reference just beyond reach is missed by no more than is allowed.
-    beyond = torque_beyond_reach(case)
-    return f"{begin}{judged_text(*rms, why)}, {judged_text(*further[1])}{'' if beyond is None else f'; {beyond.text}'}"
+    beyond = torque_beyond_reach(case) if scenario.follows_reference else None
+    return verdict if beyond is None else f"{verdict}; {beyond.text}"
 
 
 def _criteria(case: Case) -> tuple[tuple[str, float, float], ...]:

@@ -64,7 +64,8 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     least = float(np.quantile(np.where(reference[places] > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
     if min(least, scenario.controller.settings.get("largest_torque", 0.0)) > 0.0:
         remedies.append(remedy(scenario, {"controller.largest_torque": least}))
-    return TrackingCause(text, tuple(remedies), "increase `supply.pressure` or request less torque", True)
+    advice = "increase `supply.pressure` or request less torque"
+    return TrackingCause(text, tuple(remedies), advice, is_beyond_reach=True)
 
 
 def _speed_of_gait(case: Case) -> TrackingCause:

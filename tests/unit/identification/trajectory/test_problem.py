@@ -82,11 +82,11 @@ def test_a_problem_without_parameters_is_refused(experiment: FittedExperiment) -
         problem(experiment)
 
 
+@pytest.mark.parametrize("path", ["valves.proportional.delay", "valve.delay"])
 @pytest.mark.parametrize(("start", "then"), [(0.0, 0.002), (0.002, 0.0)])
 def test_a_setting_of_the_valve_that_goes_to_or_from_zero_is_named(
-    experiment: FittedExperiment, start: float, then: float
+    experiment: FittedExperiment, path: str, start: float, then: float
 ) -> None:
-    path = "valves.proportional.delay"
     prepared = prepare(experiment, {path: start})
     with pytest.raises(IdentificationError, match=r"'step': the fit changed valve\.delay to or from 0"):
         run_with(prepared, {path: then})
