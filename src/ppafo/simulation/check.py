@@ -272,10 +272,13 @@ def estimated_error(result: RecordedResult, fine: RecordedResult) -> ErrorEstima
     )
 
 
-def with_tolerance(scenario: Scenario, error: ErrorEstimate) -> ErrorEstimate:
+Rerun = Callable[[Sequence[Run]], Sequence[RecordedResult]]
+"""Function that executes other planned runs of the same scenario."""
+
+
+def with_tolerance(scenario: Scenario, error: ErrorEstimate, rerun: Rerun) -> ErrorEstimate:
     """Complete the estimate by a smaller tolerance whose trial run has the promised accuracy, if one is found."""
     from ppafo.simulation.plan import plan_run
-    from ppafo.simulation.simulate import results_of
 
     tolerance, over_promise = scenario.run.tolerance, error.over_promise
     smallest = max(SMALLEST_TRIED * tolerance, SMALLEST_TOLERANCE)
@@ -285,7 +288,7 @@ def with_tolerance(scenario: Scenario, error: ErrorEstimate) -> ErrorEstimate:
         if tolerance >= last:
             return error
         run = plan_run(replace(scenario, run=replace(scenario.run, tolerance=tolerance)))
-        trial, fine = results_of(scenario, [run, finer(run)])
+        trial, fine = rerun([run, finer(run)])
         over_promise = estimated_error(trial, fine).over_promise if trial.status.is_completed else math.inf
     return replace(error, tolerance=tolerance) if tolerance < scenario.run.tolerance else error
 
@@ -313,8 +316,8 @@ def _signal_range(result: RecordedResult, unit: str) -> float:
     return float(np.ptp(np.concatenate([*chambers, constant]))) or supply.atmospheric_pressure
 
 
-def checked(result: RecordedResult, run: Run, rerun: Callable[[Sequence[Run]], Sequence[RecordedResult]]) -> Check:
-    """Return the repeatability check of a result, from its planned run; ``rerun`` executes runs of the same scenario.
+def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
+    """Return the repeatability check of a result, from its planned run.
 
     Raises SimulationError for a Python controller that gives a different run each time, which makes a check impossible.
     """
@@ -352,7 +355,7 @@ def checked(result: RecordedResult, run: Run, rerun: Callable[[Sequence[Run]], S
         scenario=scenario.name,
         metrics=tuple(metrics),
         courses=tuple(courses),
-        error=with_tolerance(scenario, estimated_error(result, results[0])),
+        error=with_tolerance(scenario, estimated_error(result, results[0]), rerun),
         parts_at=min(separations, default=None),
         failed=tuple(dict.fromkeys(kind for kind, repeat in repeats if not repeat.status.is_completed)),
     )

@@ -175,8 +175,9 @@ class Result:
             raise SimulationError(f"{self.scenario.name}: the run diverged, so its error cannot be estimated")
         from ppafo.simulation.check import estimated_error, finer, with_tolerance
 
-        fine = results_of(self.scenario, [finer(plan_run(self.scenario))])[0]
-        return with_tolerance(self.scenario, estimated_error(self, fine))
+        rerun = partial(results_of, self.scenario)
+        (fine,) = rerun([finer(plan_run(self.scenario))])
+        return with_tolerance(self.scenario, estimated_error(self, fine), rerun)
 
     @_in_own_units
     def check(self) -> "Check":

@@ -42,11 +42,12 @@ def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
 
 def standing_still(result: "RecordedResult") -> str:
     """Remark on a free joint that friction holds for the whole run while no angle is controlled; "" for other runs."""
-    scenario, angle, torque = result.scenario, result.recording["angle"], result.recording["torque"]
+    scenario, angle = result.scenario, result.recording["angle"]
     is_free = isinstance(scenario.motion, FreeMotion) and scenario.controlled != ANGLE and result.status.is_completed
     if not is_free or np.ptp(angle) > 0.0 or stop_of(scenario, angle):
         return ""
-    holding, most = (level_text("N m", each) for each in (scenario.device.friction.static_torque, np.abs(torque).max()))
+    torques = (float(scenario.device.friction.static_torque), float(np.abs(result.recording["torque"]).max()))
+    holding, most = (level_text("N m", torque) for torque in torques)
     text = f"the joint does not move: static friction of {holding} holds it, the actuator gives at most {most}"
     return f"{text}; not tried: reduce `friction.static_torque`, or lock the joint ({LOCKED.text})"
 
