@@ -216,3 +216,15 @@ def test_times_and_units_are_at_hand(result: Result) -> None:
         result.plot(ax=None)  # type: ignore[call-arg]
     with pytest.raises(DataError, match=r"log: 'torque' must be a Channel, such as Channel\(values, 'N m'\)"):
         Recording("log", np.array([0.0, 1.0]), {"torque": [1.0, 2.0]})  # type: ignore[dict-item]
+
+
+def test_run_json_has_one_verdict_whether_python_or_the_command_line_wrote_it(tmp_path: Path) -> None:
+    """A pair of valves too coarse for a reference beyond reach on purpose, so that no remedy is tried."""
+    task, change = "torque-task-solenoid", "valve.area=15.8 mm^2"
+    ppafo.simulate(task, [change]).save(tmp_path / "python")
+    assert main(["simulate", task, "--set", change, "--out", str(tmp_path / "command")]) == 0
+    texts = [json.loads((tmp_path / name / "run.json").read_text())["verdict"] for name in ("python", "command")]
+    # Each caller is told overrides in the form that the caller gives.
+    assert texts[0] == [re.sub(r"--set ('.*?')", r"overrides=[\1]", said) for said in texts[1]]
+    assert sum("the pair of valves changes the torque by 2.75 N m" in said for said in texts[0]) == 1
+    assert sum(said.startswith("the torque stays ") for said in texts[0]) == 1
