@@ -14,7 +14,7 @@ from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.case import Case, TrackingCause
+from ppafo.simulation.tracking.case import Case, TrackingCause, only_opens_fully
 from ppafo.simulation.tracking.load_causes import (
     flung_at_start,
     load_beyond_reach,
@@ -130,7 +130,7 @@ def oscillation(case: Case) -> TrackingCause | None:
     """Cause: valves, gains or small chambers make the loop oscillate."""
     law, scenario = case.law, case.scenario
     names = [quantity.name for quantity in speed_settings(scenario, law).values()]
-    late = _late_text(case) if case.only_opens_fully and not names else ""
+    late = _late_text(case) if only_opens_fully(case.recording) and not names else ""
     if not (case.oscillates or case.only_switches or late):
         return None
     if law is not None and case.only_switches:
@@ -138,7 +138,7 @@ def oscillation(case: Case) -> TrackingCause | None:
     if law is not None and names:
         return gains_of_another_device(case) or _fast_loop(case, law, names[0])
     name = "the user-defined controller" if law is None else f"`{law.name}`"
-    if not case.only_opens_fully:
+    if not only_opens_fully(case.recording):
         return TrackingCause(f"{name} is too fast for the delays of the loop", (), "reduce its gains, or slow it down")
     quicker = f"reduce `{_DELAY}`, " * bool(late) + "increase `controller.rate`, " * (
         scenario.controller.period >= _SLOW
@@ -292,7 +292,7 @@ def _opened_away(case: Case) -> TrackingCause | None:
             f"{100.0 * away:.0f} % of this time"
         )
         return TrackingCause(text, (), "reverse the sign of the command or of the measurement")
-    if away <= _ALWAYS or begins[samples].any() or not case.only_opens_fully:
+    if away <= _ALWAYS or begins[samples].any() or not only_opens_fully(case.recording):
         return None
     worst = change_text(scenario.controlled, case.settled.largest_error)
     opened = f"the valve stays open {worst} beyond the reference: the hysteresis of the controller"
