@@ -130,7 +130,8 @@ def oscillation(case: Case) -> TrackingCause | None:
     """Cause: valves, gains or small chambers make the loop oscillate."""
     law, scenario = case.law, case.scenario
     names = [quantity.name for quantity in speed_settings(scenario, law).values()]
-    late = _late_text(case) if only_opens_fully(case.recording) and not names else ""
+    may_be_late = scenario.follows_reference and only_opens_fully(case.recording) and not names
+    late = _late_text(case) if may_be_late else ""
     if not (case.oscillates or case.only_switches or late):
         return None
     if law is not None and case.only_switches:
