@@ -59,11 +59,13 @@ def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
     return numbers
 
 
-# Does a device lack a value?
+# Does a device lack a value, or count as ideal without one?
+
+_SWITCHING = ("closing_delay", "switching_interval")
 
 
 def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a warning on values that a device lacks, unless the set names a completed set."""
+    """Yield a warning on values that a device lacks, unless the set names a completed set, and on ideal valves."""
     parameter_set = evidence.parameter_set
     if parameter_set.completed_by:
         return
@@ -84,6 +86,20 @@ def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
             paragraph=(
                 f"Missing for a device: {', '.join(paths)}. Add {them} to the file or as overrides. "
                 "Checks that need missing values were skipped."
+            ),
+        )
+    ideal = [name for name in parameter_set.valve_kinds if f"valves.{name}.opening_delay" in evidence.declared]
+    ideal = [name for name in ideal if f"valves.{name}.opening_delay" not in parameter_set.numbers]
+    if ideal:
+        yield AuditFinding(
+            id="ideal-opening",
+            severity="warning",
+            title=f"{', '.join(ideal)}: no opening_delay, so that a coil opens its valve at once",
+            values=evidence.values_of(*(f"valves.{name}.{key}" for name in ideal for key in _SWITCHING)),
+            sides=(),
+            paragraph=(
+                f"Without valves.{ideal[0]}.opening_delay gas flows as soon as the coil has current, and the dead time "
+                "of a loop counts closing_delay and switching_interval alone. Give the switch-on time."
             ),
         )
 
