@@ -23,10 +23,10 @@ import numpy as np
 
 from ppafo.control.torque_loop import BOUNDARY, CONVERGENCE, OPENING, PROPORTIONAL_GAIN
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.running import most_reversals
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking import most_reversals
 from ppafo.walking import load_walk
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

@@ -1,13 +1,11 @@
 """Execution of scenarios by name, file or object: a vane alone or a walking leg."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ppafo.arguments import Overrides, Threads, checked
 from ppafo.loading import scenario_or_load
-from ppafo.model.columns import first
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.scenario import Scenario
@@ -53,16 +51,6 @@ def gains(scenario: Scenario) -> "Gains | None":
 
     law = scenario.law
     return None if law is None else gains_of(scenario, law)
-
-
-def most_reversals(scenario: Scenario) -> float:
-    """Return the largest ``command_reversals`` without oscillation; inf for a controller that may switch."""
-    from ppafo.simulation import tracking as rules
-
-    law = scenario.law
-    if law is None:
-        return math.inf
-    return rules.most_reversals(scenario, law, first(scenario.run.duration), scenario.motion.stride_time)
 
 
 @checked

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ppafo.kinds import Kinds
 from ppafo.metrics import command, gas, motion, strides, switching, tracking
 from ppafo.metrics.metric import Metric, MetricKind
-from ppafo.metrics.settled import SETTLED_METRICS
+from ppafo.metrics.settled import VERDICT_METRICS
 from ppafo.signals import Recording
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 
@@ -39,7 +39,7 @@ METRICS: Kinds[MetricKind] = Kinds(
 def metric_kind(name: str) -> MetricKind | None:
     """Return a metric by name, including metrics used only for verdicts; None for an unknown name."""
     # A name that is none of the package's has METRICS look for a metric of another package.
-    return SETTLED_METRICS.get(name) or METRICS.get(name)
+    return VERDICT_METRICS.get(name) or METRICS.get(name)
 
 
 def evaluate(recording: Recording) -> dict[str, Metric]:

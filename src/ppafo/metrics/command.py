@@ -113,20 +113,6 @@ def requested_samples(recording: Recording) -> Masks:
     return np.asarray((recording["command"] <= VENTS_ABOVE) & (recording["controller_phase"] != MID_STANCE))
 
 
-def torque_error(recording: Recording) -> float | None:
-    """RMS torque error over samples of a walk with a requested torque [N m]; None without such samples."""
-    requested = requested_samples(recording)
-    if not requested.any():
-        return None
-    return float(np.sqrt(np.mean((recording["reference"] - recording["torque"])[requested] ** 2)))
-
-
-def requested_torque(recording: Recording) -> float | None:
-    """RMS torque requested by a walking controller [N m]; None if no torque is requested."""
-    requested = requested_samples(recording)
-    return float(np.sqrt(np.mean(recording["reference"][requested] ** 2))) if requested.any() else None
-
-
 METRICS = (
     MetricKind(
         "torque_error",

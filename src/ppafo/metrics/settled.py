@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.command import Reversals, start_reversals, update_reversals
+from ppafo.metrics.command import Reversals, is_torque_requested, start_reversals, update_reversals
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
 from ppafo.model.columns import larger
-from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
+from ppafo.signals.meter import REQUESTED, WALK, MeterKind, ReferenceSummary, Sample
 
 SHORTEST_HOLD = 0.1
 """Shortest hold accepted for a verdict, as a fraction of the run [-]."""
@@ -182,3 +182,33 @@ SETTLED_METRICS = {
     for name, read in _NUMBERS.items()
 }
 """Metrics of the settled part by name [SI unit of the controlled quantity], used for verdicts only."""
+
+
+class _PlantarflexionPeaks(NamedTuple):
+    """Largest torque in plantarflexion [N m] that a walk requests, and that the actuator gives; 0 without any."""
+
+    requested_peak: float = 0.0
+    given_peak: float = 0.0
+
+
+def start_plantarflexion(_course: ReferenceSummary, sample: Sample) -> _PlantarflexionPeaks:
+    """Start the plantarflexion meter at the first sample, which has no request yet."""
+    return _PlantarflexionPeaks(given_peak=max(0.0, sample.torque))
+
+
+def update_plantarflexion(
+    state: _PlantarflexionPeaks, _course: ReferenceSummary, sample: Sample
+) -> _PlantarflexionPeaks:
+    """Update the plantarflexion meter with a sample."""
+    requested = sample.reference if is_torque_requested(sample.command, sample.stride.phase) else 0.0
+    return _PlantarflexionPeaks(max(state.requested_peak, requested), max(state.given_peak, sample.torque))
+
+
+_METERS = (MeterKind("plantarflexion", _PlantarflexionPeaks, start_plantarflexion, update_plantarflexion),)
+WALK_PEAKS = {
+    name: MetricKind(name, "N m", "for verdicts", (), None, read, _METERS, needs=(WALK, REQUESTED))
+    for name in _PlantarflexionPeaks._fields
+    for read in (ReadAt((f"meters.plantarflexion.{name}",)),)
+}
+"""Metrics of the peaks of a walk by name, used for verdicts only."""
+VERDICT_METRICS = {**SETTLED_METRICS, **WALK_PEAKS}

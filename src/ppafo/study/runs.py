@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.metrics import metric_kind
-from ppafo.metrics.settled import SETTLED_METRICS
+from ppafo.metrics.settled import VERDICT_METRICS
 from ppafo.metrics.tracking import ONE_INSTANT, SUSTAINED
 from ppafo.progress import Progress, Report
-from ppafo.running import most_reversals
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
@@ -20,6 +19,7 @@ from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking import most_reversals
 from ppafo.simulation.tracking.metered import TrackingExcess, command_turning, needed_metrics, tracking_excess
 from ppafo.simulation.tracking.settled import smallest_change
 from ppafo.studies.distributions import Floats
@@ -142,7 +142,7 @@ def scenario_runs(
 
     Paths in ``gauge`` hold gauge pressures relative to the atmosphere of each run.
     """
-    check_metrics([name for name in metrics if name not in SETTLED_METRICS], scenario)
+    check_metrics([name for name in metrics if name not in VERDICT_METRICS], scenario)
 
     def evaluate(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
         try:

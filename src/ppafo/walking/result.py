@@ -3,18 +3,21 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.control.torque_loop import REACH
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.simulation import at_hand
-from ppafo.simulation.numbers import changes_in
+from ppafo.simulation.gains import terms_of
+from ppafo.simulation.numbers import changes_in, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking, following_text, tracking_in
@@ -158,14 +161,15 @@ class WalkResult:
 
 def limited_request(scenario: Scenario) -> str:
     """Remark on peaks of the desired torque that ``largest_torque`` of the controller cuts; "" without any."""
-    settings, path = scenario.controller.settings, "controller.largest_torque"
+    settings, path, law = scenario.controller.settings, "controller.largest_torque", scenario.law
     limit = settings.get("largest_torque", math.inf)
     peaks = {name: settings[name] for name in PEAKS if settings.get(name, 0.0) > limit}
-    if not peaks:
+    if not peaks or law is None:
         return ""
-    # The default limit is the largest torque of the device.
-    advice = "the actuator cannot give more at this supply pressure"
-    if path not in scenario.links:
-        advice = "not tried: " + override_text([f"{path}={level_text('N m', max(peaks.values()))}"])
+    reach = float(terms_of(scenario, law)[REACH].number(partial(number_at, scenario)))
+    larger, present = (level_text("N m", torque) for torque in (min(max(peaks.values()), reach), limit))
+    advice = f"the actuator gives at most {level_text('N m', reach)} at this supply pressure"
+    if reach > limit and larger != present:
+        advice = f"not tried: {override_text([f'{path}={larger}'])}"
     cut = ", ".join(f"controller.{name} = {level_text('N m', peak)}" for name, peak in peaks.items())
-    return f"{cut}: the request is limited by {path} = {level_text('N m', limit)}; {advice}"
+    return f"{cut}: the request is limited by {path} = {present}; {advice}"

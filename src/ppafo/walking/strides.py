@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.metrics import METRICS, Metric
-from ppafo.metrics.command import command_reversals, peak_torque, requested_torque, torque_error
+from ppafo.metrics.command import command_reversals, peak_torque, requested_samples
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.model.contact import FLAT, SWING
 from ppafo.model.helping import HELPS, PUSH_OFF
@@ -109,23 +109,17 @@ def walk_metrics(
         "vented_strides": Metric(float((~helped).sum()), "-", less),
         "total_gas": Metric(gas, "kg", "gas taken from the supply in the whole walk"),
     }
-    # A controller that requests a torque is judged by how well it gets it in push-off.
-    if "reference" in recording and chosen.any():
+    of_torque: dict[str, float] = {}
+    if "reference" in recording:
+        reference, requested = recording["reference"], requested_samples(recording)
+        error = reference - recording["torque"]
+        # A controller that requests a torque is judged by how well it gets it in push-off.
         pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
-        error = (recording["reference"] - recording["torque"])[pushes]
-        if error.size:
-            rms = float(np.sqrt(np.mean(error**2)))
-            summary = "RMS of requested torque less actuator torque in push-off"
-            metrics["push_off_error"] = Metric(rms, "N m", summary)
-    of_torque: dict[str, float | None] = {
-        "torque_error": torque_error(recording) if "reference" in recording else None,
-        "requested_torque": requested_torque(recording) if "reference" in recording else None,
-        "peak_torque": peak_torque(recording),
-        "command_reversals": command_reversals(recording),
-    }
-    for name, value in of_torque.items():
-        if value is not None:
-            metrics[name] = Metric(value, METRICS[name].unit, METRICS[name].summary)
+        parts = {"push_off_error": error[pushes], "torque_error": error[requested]}
+        parts["requested_torque"] = reference[requested]
+        of_torque = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items() if part.size}
+    of_torque |= {"peak_torque": peak_torque(recording), "command_reversals": command_reversals(recording)}
+    metrics |= {name: Metric(value, METRICS[name].unit, METRICS[name].summary) for name, value in of_torque.items()}
     if "safe_state" in recording and recording["safe_state"].any():
         time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
         summary = "time at which the controller first lifted only, paused or stopped"

@@ -9,8 +9,9 @@ import pytest
 import ppafo
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
-from ppafo.running import gains, most_reversals, simulate
+from ppafo.running import gains, simulate
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.tracking import most_reversals
 from ppafo.walking import load_walk, walk
 
 FAST = ["controller.proportional_gain=60 1/(N m)", "controller.derivative_gain=0.05 s/(N m)", "valve.delay=5 ms"]

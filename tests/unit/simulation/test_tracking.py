@@ -20,10 +20,10 @@ from ppafo.loading import load_scenario, reloaded
 from ppafo.metrics.metric import hold_start
 from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.remedy_trials import tried
-from ppafo.running import most_reversals, simulate
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.tracking import tracking_in
+from ppafo.simulation.tracking import most_reversals, tracking_in
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.simulation.tracking.rule import failure_of_task
 from ppafo.simulation.tracking.settled import SettledPart, settled_task
@@ -161,10 +161,56 @@ def test_a_walk_that_gives_half_of_the_requested_peak_does_not_follow_and_is_tol
     assert "the controller requests more torque than the actuator gives" in verdict.sentence
     (limit,) = verdict.mended
     assert simulate("proportional", [*changes, limit]).tracking is None
-    # A study judges by the settings, for any limit of its runs.
+    # A study judges by the request and the limit of each of its runs.
     columns = {"controller.largest_torque": np.array([13.0, 40.0])}
     metered = run_ensemble(scenario, columns, with_companions([], scenario)).metrics
     assert excess(metered, scenario, columns).follows.tolist() == [1.0, 0.0]
+
+
+HELD_DOWN = ["controller.landing_peak_torque=0 N m", "controller.hold_stiffness=1 N m/rad"]
+OF_PUSH_OFF = {"supply.pressure": [204_747.0, 446_063.0] * 2, "controller.peak_time": [0.53, 0.53, 0.9, 0.9]}
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "columns", "follows"),
+    [
+        # 15 psi on 14.5 cm^3 are 1.5 N m, of 5 N m requested; dorsiflexion has its 5 N m at 50 psi_g.
+        (
+            "proportional",
+            ["supply.dorsiflexion_pressure=50 psi_g"],
+            {"supply.pressure": [204_747.0, 446_063.0]},
+            [0, 1],
+        ),
+        # A push-off that begins after the toes leave the ground is never requested: the assistance is in dorsiflexion.
+        ("proportional", HELD_DOWN, OF_PUSH_OFF, [0, 1, 1, 1]),
+        # A law that requests no torque is judged by its limit alone: no peak within the reach is above 1.5 of 5 N m.
+        ("solenoid", [], {"controller.largest_torque": [1.0, 5.0]}, [0, 1]),
+    ],
+)
+def test_a_sweep_counts_the_walks_that_follow_by_themselves(
+    name: str, changes: list[str], columns: dict[str, list[float]], follows: list[int]
+) -> None:
+    scenario = load_scenario(name, [*changes, "run.duration=6 s"])
+    draws = {path: np.array(values) for path, values in columns.items()}
+    metered = run_ensemble(scenario, draws, with_companions([], scenario)).metrics
+    assert excess(metered, scenario, draws).follows.tolist() == follows
+    walks = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    assert [tracking_in(simulate(with_numbers(scenario, walked))) is None for walked in walks] == follows
+
+
+@pytest.mark.parametrize(("opening", "is_told"), [(0.6, False), (1.0, True)])
+def test_a_python_controller_of_a_walk_is_told_its_rate_where_it_only_switches(opening: float, is_told: bool) -> None:
+    class Alternating:
+        def reset(self) -> None:
+            """Nothing is kept."""
+
+        def update(self, time: float, _reference: float, _measurement: Any) -> float:
+            return opening if time % 0.04 < 0.02 else -opening
+
+    result = simulate(load_scenario("proportional", ["run.duration=6 s"]).controlled_by(Alternating()))
+    # A reversal every 20 ms, above half open in either case, but none at 0 s: 299 in 6 s.
+    assert result.metrics["command_reversals"].value == 299.0
+    assert ("the valves are reversed 49.8 times a second" in str(result)) == is_told
 
 
 def test_a_walk_whose_law_only_switches_is_told_how_often_the_valves_are_reversed() -> None:

@@ -46,10 +46,11 @@ class Case(NamedTuple):
         command = np.abs(self.recording["command"])
         return np.asarray((command >= _FULLY_OPEN) & (command <= 1.0 + SHUT))
 
-    @property
-    def only_opens_fully(self) -> bool:
-        """True if every recorded command is a full opening or 0, whatever the controller declares."""
-        return bool(np.all(self.is_fully_open | (np.abs(self.recording["command"]) <= SHUT)))
+
+def only_opens_fully(recording: Recording) -> bool:
+    """Return whether each recorded command opens a valve fully, shuts or vents, whatever the controller declares."""
+    command = np.abs(recording["command"])
+    return not np.any((command > SHUT) & (command < _FULLY_OPEN))
 
 
 class TrackingCause(NamedTuple):

@@ -14,7 +14,7 @@ from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.case import Case, TrackingCause
+from ppafo.simulation.tracking.case import Case, TrackingCause, only_opens_fully
 from ppafo.simulation.tracking.load_causes import (
     flung_at_start,
     load_beyond_reach,
@@ -126,7 +126,7 @@ def oscillation(case: Case) -> TrackingCause | None:
     if law is not None and names:
         return gains_of_another_device(case) or _fast_loop(case, law, names[0])
     name = "the user-defined controller" if law is None else f"`{law.name}`"
-    if not case.only_opens_fully:
+    if not only_opens_fully(case.recording):
         return TrackingCause(f"{name} is too fast for the delays of the loop", (), "reduce its gains, or slow it down")
     rate = "increase `controller.rate`, " * (scenario.controller.period >= _SLOW)
     zone = change_text(scenario.controlled, LARGEST_SHARE * case.settled.wanted_change)
@@ -276,7 +276,7 @@ def _opened_away(case: Case) -> TrackingCause | None:
             f"{100.0 * away:.0f} % of this time"
         )
         return TrackingCause(text, (), "reverse the sign of the command or of the measurement")
-    if away <= _ALWAYS or begins[samples].any() or not case.only_opens_fully:
+    if away <= _ALWAYS or begins[samples].any() or not only_opens_fully(case.recording):
         return None
     worst = change_text(scenario.controlled, case.settled.largest_error)
     return _wide_zone(case, f"the valve stays fully open away from the reference and is not reversed, {worst} off")

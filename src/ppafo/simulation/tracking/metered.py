@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ppafo.metrics.metric import Floats
-from ppafo.metrics.settled import SETTLED_METRICS
+from ppafo.metrics.settled import SETTLED_METRICS, WALK_PEAKS
 from ppafo.model.columns import first
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import (
@@ -20,7 +20,7 @@ from ppafo.simulation.tracking.rule import (
 from ppafo.simulation.tracking.settled import SettledPart, settled_tasks
 from ppafo.simulation.tracking.shortfall import shortfall
 
-_OF_WALK = ("torque_error", "requested_torque", "peak_torque")
+_OF_WALK = ("torque_error", "requested_torque", "peak_torque", *WALK_PEAKS)
 """Metrics by which a walk is judged, in addition to the reversals of its command."""
 
 
@@ -72,21 +72,19 @@ def tracking_excess(
     Numbers of the scenario may be arrays (runs,). ``metrics`` are the available ``needed_metrics``; ``most_reversals``
     is the number of command reversals above which the loop oscillates; ``least`` is the ``smallest_change``.
     """
-    runs = next(iter(metrics.values())).size
-    none = np.full(runs, np.nan)
+    none = np.full(next(iter(metrics.values())).size, np.nan)
     turning = command_turning(scenario, metrics, most_reversals)
     counted = np.isfinite(metrics.get(REVERSALS, none)) & np.isfinite(most_reversals)
     numbers = {name: metrics.get(name, none) for name in needed_metrics(scenario)}
     with np.errstate(divide="ignore", invalid="ignore"):
         if not scenario.follows_reference:
-            error, requested, peak = (numbers[name] for name in _OF_WALK)
-            settings = scenario.controller.settings
-            limit = np.asarray(settings.get("largest_torque", 0.0))
+            error, requested, peak, *_ = (numbers[name] for name in _OF_WALK)
+            limit = np.asarray(scenario.controller.settings.get("largest_torque", 0.0))
             of_walk: dict[str, Any] = {
                 "wanted_change": np.nan_to_num(requested, nan=np.inf),
                 "rms_error": np.nan_to_num(error),
                 "peak": peak,
-                "requested_peak": np.minimum(settings.get("peak_torque", 0.0), np.where(limit > 0.0, limit, np.inf)),
+                **{name: np.nan_to_num(numbers[name]) for name in WALK_PEAKS},
             }
             settled = SettledPart(samples=slice(None), **of_walk)
             # A law that requests no torque is judged by the peak alone.

@@ -12,6 +12,7 @@ from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.case import only_opens_fully
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
 from ppafo.simulation.tracking.rule import (
     REVERSALS,
@@ -60,8 +61,9 @@ def unlimited_switching(result: "RecordedResult") -> str:
     Without data the limit is the switching frequency that the paper reports of its solenoid valves.
     """
     scenario = result.scenario
-    # A Python object that controls a walk may switch, too: its reversals are not judged otherwise.
-    may_switch = only_switches(scenario, scenario.law) or (scenario.law is None and not scenario.follows_reference)
+    # The recorded commands say whether a Python object that controls a walk only switches.
+    is_python = scenario.law is None and not scenario.follows_reference
+    may_switch = only_switches(scenario, scenario.law) or (is_python and only_opens_fully(result.recording))
     if not may_switch or REVERSALS not in result.metrics:
         return ""
     often = result.metrics[REVERSALS].value / max(result.recording.duration, 1.0)

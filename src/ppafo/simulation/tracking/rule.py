@@ -12,6 +12,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import Floats
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.metrics.tracking import SUSTAINED
+from ppafo.model.columns import first
 from ppafo.simulation.profiles import profile_bounds, profile_values
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.settled import SettledPart
@@ -46,7 +47,7 @@ LARGEST_PEAK = 1.5
 LARGEST_PEAK_WALK = 1.5
 """Peak torque of a walk divided by the torque limit of its controller [-]."""
 LEAST_PEAK_WALK = 0.7
-"""Peak torque of a walk divided by the largest requested torque, below which a walk does not follow [-]."""
+"""Largest torque of a walk in plantarflexion divided by the largest requested one; with less it does not follow [-]."""
 MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
 """Command reversals per stride and per second above which a loop oscillates."""
 PER_TURN = 2.0
@@ -61,11 +62,13 @@ Failure = Literal["does not move", "oscillates", "overshoots", "does not follow"
 """Kind of failure."""
 
 
-def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: float, stride_time: float = 0.0) -> float:
+def most_reversals(scenario: Scenario, duration: float | None = None) -> float:
     """Largest number of command reversals in ``duration`` [s] of a loop that does not oscillate.
 
-    Infinite for a controller that may switch. ``stride_time`` [s] is the stride time of a walk, 0 for a task.
+    Infinite for a controller that may switch. The default duration is the duration of the run.
     """
+    law, stride_time = scenario.law, scenario.motion.stride_time
+    duration = first(scenario.run.duration) if duration is None else duration
     # A law that requests openings between shut and open should not reverse, where the valve has these openings.
     if law is None or is_pair(scenario) or not scenario.motion.motion_kind.asks_gradually(law):
         return math.inf
@@ -107,7 +110,7 @@ def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: Floats 
     limit, 0 for none. The numbers of ``settled`` may be arrays (runs,).
     """
     peak = settled.peak / np.where(np.asarray(limit) > 0.0, LARGEST_PEAK_WALK * limit, np.inf)
-    lacking = LEAST_PEAK_WALK * settled.requested_peak / np.maximum(settled.peak, 1.0e-9)
+    lacking = LEAST_PEAK_WALK * settled.requested_peak / np.maximum(settled.given_peak, 1.0e-9)
     error = settled.rms_error / settled.wanted_change / LARGEST_SHARE_OF_WAVE
     return np.maximum(np.maximum(turning, peak), np.maximum(error, lacking))
 

@@ -64,6 +64,8 @@ class SettledPart(NamedTuple):
     """
     requested_peak: float = 0.0
     """Largest torque in plantarflexion that a walk requests [N m]; 0 for a task."""
+    given_peak: float = 0.0
+    """Largest torque in plantarflexion that the actuator of a walk gives [N m]; 0 for a task."""
     rests: bool = False
     """True if reference and joint stand still."""
     ends_on_ramp: bool = False
@@ -115,6 +117,7 @@ def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
         value_range=float(np.ptp(value)),
         peak=peak,
         requested_peak=max(float(np.max(reference)), 0.0),
+        given_peak=max(float(np.max(recording["torque"])), 0.0),
         duration=float(np.ptp(recording.time[[0, -1]])),
     )
 

@@ -138,14 +138,14 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
     judged, scenario = _judged(result), result.scenario
     if judged is None or (failure := judged[0].failure) is None:
         return None
-    case, turning, per_second, stride_time = judged
+    case, turning, per_second = judged
     settled, is_task = case.settled, scenario.follows_reference
     found = (find(case) for find in (CAUSES_OF_TASK if is_task else CAUSES_OF_WALK))
     cause, *others = (each for each in found if each is not None)
     # Reversals of the value where these fail, else of the command, as also of a controller that declares nothing.
     if settled.error_reversals and turning <= 1.0 and (case.law is not None or per_second == 0.0):
         per_second = settled.error_reversals / settled.duration
-    overshoots, is_of_walk = failure == "overshoots", stride_time > 0.0
+    overshoots, stride_time = failure == "overshoots", scenario.motion.stride_time
     # A loop that is quiet at the end reversed before the part whose error is stated.
     is_over = turning > 1.0 and settled.command_reversal_rate < _QUIET * per_second
     interval = "second of the whole run" if is_over else "second"
@@ -162,8 +162,8 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         wanted=scenario.controller.settings["largest_torque"] if overshoots and not is_task else settled.wanted_change,
         missing=settled.mean_error,
         moved=settled.peak if overshoots else settled.value_range,
-        reversals=per_second * (stride_time if is_of_walk else 1.0),
-        per="stride" if is_of_walk else interval,
+        reversals=per_second * (stride_time or 1.0),
+        per="stride" if stride_time else interval,
         cause=cause.text,
         advice=cause.advice,
         remedies=cause.remedies,
@@ -222,7 +222,7 @@ def _criteria(case: Case) -> tuple[tuple[str, float, float], ...]:
     scenario, settled, switches = case.scenario, case.settled, case.only_switches
     mean, wanted, asked = abs(settled.mean_error), settled.wanted_change, settled.requested_peak
     if not scenario.follows_reference:
-        short = ("missing peak torque", asked - settled.peak, (1.0 - LEAST_PEAK_WALK) * asked)
+        short = ("missing peak torque", asked - settled.given_peak, (1.0 - LEAST_PEAK_WALK) * asked)
         return ("RMS error", settled.rms_error, LARGEST_SHARE_OF_WAVE * wanted), short
     deviation = ("swing", settled.error_range) if settled.rests else ("largest error", settled.largest_error)
     beyond, where = float(np.max(shortfall(scenario))), " at every angle" * (scenario.motion.locked_angle is None)
@@ -267,11 +267,10 @@ def time_text(since: float) -> str:
     return f" from {since:.3g} s on" if since > 0.0 else " where a torque is requested"
 
 
-def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None:
+def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
     """Run with its tracking failure, if any, and rates of command reversals; None if the run is not judged.
 
-    The further numbers are the command reversals divided by the limit [-], the reversals per second, and the stride
-    time [s], 0 for a task.
+    The further numbers are the command reversals divided by the limit [-], and the reversals per second.
     """
     scenario, law, recording = result.scenario, result.scenario.law, result.recording
     is_task = scenario.follows_reference
@@ -282,12 +281,9 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     settled = settled_task(scenario, recording) if is_task else settled_walk(recording, limit)
     if settled is None:
         return None
-    reversals, strides = (
-        result.metrics[name].value if name in result.metrics else 0.0 for name in (REVERSALS, "strides")
-    )
-    stride_time = recording.duration / strides if strides > 0.0 else 0.0
+    reversals = result.metrics[REVERSALS].value if REVERSALS in result.metrics else 0.0
     counted = settled.command_reversal_rate * max(recording.duration, 1.0) if is_noisy(scenario) else reversals
-    turning = counted / most_reversals(scenario, law, recording.duration, stride_time)
+    turning = counted / most_reversals(scenario, recording.duration)
     if is_task:
         failure = failure_of_task(settled, turning, only_switches(scenario, law))
     else:
@@ -295,7 +291,7 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
     # An error at the cut peaks of a wave reverses more often than the wave, and is no oscillation.
     if failure == "oscillates" and turning <= 1.0 and is_task and cuts_wave(case):
-        return case._replace(failure="does not follow"), turning, reversals / recording.duration, stride_time
+        return case._replace(failure="does not follow"), turning, reversals / recording.duration
     # A run that ends on its ramp has not yet requested its largest torque.
     beyond = float(np.max(shortfall(scenario))) if is_task and not settled.ends_on_ramp else 0.0
     # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error. The
@@ -303,4 +299,4 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float, float] | None
     missing = abs(settled.mean_error) if settled.rests else max(abs(settled.mean_error), beyond)
     if failure is None and beyond > 0.0 and missing > LARGEST_SHARE * settled.wanted_change:
         case = case._replace(failure="does not follow")
-    return case, turning, reversals / recording.duration, stride_time
+    return case, turning, reversals / recording.duration

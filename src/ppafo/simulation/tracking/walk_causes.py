@@ -33,7 +33,7 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     places, reaches = reach_at_samples(case)
     above, below = reference[places] - reaches[:, 1], reaches[:, 0] - reference[places]
     share = float(np.mean((above > 0.0) | (below > 0.0)))
-    lacks_peak = case.settled.peak < LEAST_PEAK_WALK * case.settled.requested_peak
+    lacks_peak = case.settled.given_peak < LEAST_PEAK_WALK * case.settled.requested_peak
     if share <= (0.0 if lacks_peak else _OFTEN):
         return None
     if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():

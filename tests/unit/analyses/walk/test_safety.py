@@ -15,17 +15,23 @@ from ppafo.wording import read_by
 
 
 def test_a_peak_torque_above_the_limit_of_the_controller_is_said_in_the_first_lines() -> None:
-    peak = "controller.peak_torque=9 N m"
-    worn = walk(load_walk("proportional", [peak]), minutes=0.1)
+    """50 psi on the 14.5 cm^3 of the vane are 5 N m, and 100 psi 10 N m."""
+    peak, supplied = "controller.peak_torque=9 N m", "supply.pressure=100 psi_g"
+    worn = walk(load_walk("proportional", [peak, supplied]), minutes=0.1)
     cut = "controller.peak_torque = 9 N m: the request is limited by controller.largest_torque = 5 N m; not tried: "
     (said,) = [line for line in str(worn).partition("\n\n")[0].splitlines() if line.startswith(cut)]
     mended = ast.literal_eval(said.removeprefix(f"{cut}overrides="))
-    assert limited_request(load_walk("proportional", [peak, *mended])) == ""
+    assert limited_request(load_walk("proportional", [peak, supplied, *mended])) == ""
     with read_by("command line"):
         assert limited_request(worn.scenario) == f"{cut}--set 'controller.largest_torque=9 N m'"
     law = ["device.valve=proportional", "controller.kind=event_proportional", "controller.vent_time=0.15 s"]
     said = limited_request(load_walk("off", [*law, peak]))
-    assert said.endswith("largest_torque = 5 N m; the actuator cannot give more at this supply pressure")
+    given = "the actuator gives at most 5 N m at this supply pressure"
+    assert said.endswith(f"largest_torque = 5 N m; {given}")
+    assert limited_request(load_walk("proportional", [peak])).endswith(f"largest_torque = 5 N m; {given}")
+    # Beyond reach a limit below reach may be increased to the reach.
+    beyond = ["controller.peak_torque=20 N m", supplied]
+    assert limited_request(load_walk("proportional", beyond)).endswith("['controller.largest_torque=10 N m']")
 
 
 @pytest.mark.long
