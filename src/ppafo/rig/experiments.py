@@ -18,11 +18,10 @@ from ppafo.rig.setup import ExperimentRequest, ExperimentResult
 from ppafo.rig.steady import record_open_valve, record_static_torque, record_steady_leak, record_valve_map
 from ppafo.rig.transient import record_free_decay, record_step_response, record_torque_task, record_vane_leak
 from ppafo.signals.recording import Recording
-from ppafo.simulation.scenario import UNITS
+from ppafo.simulation.scenario import LARGEST_SEED, UNITS
 from ppafo.version import __version__
 from ppafo.wording import known_names, one_line
 
-_LARGEST_SEED = 2**32 - 1
 _DEFAULT_DEVICE = "ppafo2011"
 _DEFAULT_PRESET = "paper-bench"
 NOTICE = "synthetic: made by the simulated test bench of ppafo in place of a measurement"
@@ -72,8 +71,8 @@ def record(
     of samples recorded. Raises SimulationError if the solver fails.
     """
     summary, run = find_experiment(experiment)
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= _LARGEST_SEED:
-        raise ParameterError(f"seed = {seed} must be a whole number from 0 to {_LARGEST_SEED}")
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
+        raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
     overrides = tuple(overrides)
     of_preset = tuple(override for override in overrides if override.strip().startswith(PREFIX))
     others = tuple(override for override in overrides if override not in of_preset)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 PYTHON_CONTROLLER = "python"
 LARGEST_SEED = 2**32 - 1
+"""Largest random seed, of noise and of draws (32 bits), exactly representable in a column of floats."""
 
 UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques in N m"
 

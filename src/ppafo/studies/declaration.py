@@ -11,13 +11,12 @@ from pydantic import Field
 
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema
 from ppafo.documents.problems import LABEL, NAME
+from ppafo.simulation.scenario import LARGEST_SEED
 
 MAXIMUM_RUNS = 2**32
 """Largest number of draws: the period of a 32-bit Sobol sequence; no other method needs a lower limit."""
 MAXIMUM_RUNS_OF_CHUNK = 1_000_000
 """Largest number of runs of a chunk, whose rows stay in memory until written: about 100 MB for ten columns."""
-LARGEST_SEED = 2**32 - 1
-"""Largest random seed (32 bits), exactly representable in a column of floats."""
 DEFAULT_SEED = 1
 """Default random seed of the draws of a study."""
 MAXIMUM_GRID_VALUES = 1_000_000

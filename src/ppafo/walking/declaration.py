@@ -20,6 +20,7 @@ from ppafo.plugins import nearest_kind
 from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, TEXTS, THERMAL, THERMAL_GAS, DeclaredContent, line_paths
 from ppafo.simulation.document import kind_at
 from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, MotionKind, is_walk
+from ppafo.simulation.scenario import LARGEST_SEED
 from ppafo.simulation.schema import controller_table, file_model, kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
 from ppafo.walking.preparation import DISTORTED, FROZEN
@@ -31,7 +32,6 @@ SUMMARY = "the device on a leg that walks along a prescribed gait"
 THRESHOLDS = next(iter(TIMINGS))
 """Default gait phase estimator of a walk file."""
 
-LARGEST_SEED = 2**32 - 1
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
 STEP = Quantity("step", "s", "largest step; 1 ms unless given", 1.0e-3, 1.0e-6, 0.01)
 

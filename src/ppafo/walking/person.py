@@ -17,8 +17,7 @@ from ppafo.model.columns import larger, over_runs, smaller
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
-from ppafo.simulation.scenario import Scenario
-from ppafo.walking.declaration import LARGEST_SEED
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.walking.gait_series import SERIES, gait_series, gait_timing, strike_angle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.variation import draw_builds, draw_fitting, draw_gaits

@@ -19,7 +19,7 @@ from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, r
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.numbers import changes_in
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Floats, LogUniformBetween, UniformBetween
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
@@ -28,7 +28,6 @@ from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, in_its_unit, value_at, varied_path
 from ppafo.wording import first_twice
 
-LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
 """Largest number of draws over which each candidate of a tuning runs."""
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
@@ -271,7 +270,7 @@ class Problem:
 
 
 TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "analyses" / "tune" / "library", StudyError)
-NOISE_DRAWS = 16
+SEARCH_NOISE_STREAMS = 16
 """Number of noise streams for every candidate if only the sensors are uncertain."""
 
 
@@ -394,7 +393,7 @@ def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario:
     robust = parsed.robust
     if robust is None:
         noise = Uncertainty(()).with_noise_of([scenario])
-        return Spread(noise, "", NOISE_DRAWS, parsed.effort.seed, 0.0, None) if noise.drawn else None
+        return Spread(noise, "", SEARCH_NOISE_STREAMS, parsed.effort.seed, 0.0, None) if noise.drawn else None
     with refused_as(StudyError, "robust", StudyError):
         study = load_study(beside(robust.study, folder, list_studies()))
         uncertainty = uncertainty_of(study).with_noise_of([scenario])
