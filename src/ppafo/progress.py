@@ -16,7 +16,7 @@ class Progress:
     """Progress of a task: activity, items done and in total, and elapsed time [s].
 
     ``total`` is 0 if unknown. Of the ``done`` items, ``earlier`` were done before the start and ``failed`` failed.
-    ``elapsed`` is the time since the start [s].
+    ``elapsed`` is the time since the start [s]. ``is_bound`` is True if ``total`` is an upper bound.
     """
 
     activity: str = ""
@@ -26,12 +26,14 @@ class Progress:
     earlier: int = 0
     elapsed: float = 0.0
     noun: str = "runs"
+    is_bound: bool = False
 
     def line(self) -> str:
         """Return the progress as text."""
         words = [f"{self.activity} ..."] if self.activity and not self.total else [self.activity] * bool(self.activity)
         if self.total:
-            words.append(f"{self.done:,} of {self.total:,} {self.noun} ({100.0 * self.done / self.total:.0f} %)")
+            total = f"{'at most ' * self.is_bound}{self.total:,} {self.noun}"
+            words.append(f"{self.done:,} of {total} ({100.0 * self.done / self.total:.0f} %)")
         if self.total and self.done > self.earlier and self.elapsed > 0.0:
             rate = (self.done - self.earlier) / self.elapsed
             words += [f"{rate:,.0f} {self.noun}/s"] * (rate >= 10.0)

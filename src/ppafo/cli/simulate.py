@@ -10,7 +10,6 @@ from ppafo.cli import output
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, CommandOutput
 from ppafo.documents.json_text import json_text, plain
 from ppafo.units.shown import in_units, shown_in
-from ppafo.wording import changed_text
 
 if TYPE_CHECKING:
     from ppafo.report.finding import Finding
@@ -77,23 +76,14 @@ def simulate(
 
 @dataclass(frozen=True, slots=True)
 class _RunReport:
-    """Result of a run for its report: repeatability check, estimated error, tracking verdict, gains."""
+    """Result of a run for its report: repeatability check, estimated error, tracking verdict, sentences, gains."""
 
     result: "Result"
     check: "Check | None"
     error: "ErrorEstimate | None"
     tracking: "Tracking | None"
+    verdict: list[str]
     gains: "Gains | None"
-
-    @property
-    def verdict(self) -> list[str]:
-        """Sentences on tracking, stops, switching frequency, replaced values of the set, and changed values."""
-        from ppafo.simulation.numbers import changes_in
-        from ppafo.simulation.tracking.remarks import remarks_on
-
-        sentence = self.result.following if self.tracking is None else self.tracking.sentence
-        remarks = remarks_on(self.result, self.tracking is None and bool(sentence))
-        return [said for said in (sentence, *remarks, changed_text(changes_in(self.result.scenario))) if said]
 
     @property
     def usage(self) -> list[str]:
@@ -115,15 +105,20 @@ def assessed(result: "Result", check: bool) -> _RunReport:
     error = None if repeatability is None else repeatability.error
     if error is None and result.status.is_completed and scenario.motion.motion_kind.is_repeated_for_its_error:
         error = result.error()
-    return _RunReport(result, repeatability, error, tried(scenario, result.tracking), gains(scenario))
+    verdict = tried(scenario, result.tracking)
+    return _RunReport(result, repeatability, error, verdict, result.sentences(verdict), gains(scenario))
 
 
 def _text(report: _RunReport) -> str:
     """Format status, tracking, metrics, repeatability and gains of a run."""
     from ppafo.report.display_units import metrics_lines
+    from ppafo.simulation.tracking.pair_step import coarse_pair
 
     # The result's own text has a verdict whose remedies were not tried.
-    head = [f"{report.result.scenario.name}: {report.result.status.kind}", *report.verdict, ""]
+    scenario = report.result.scenario
+    # A warning before the run has told of the pair.
+    verdict = [said for said in report.verdict if said != coarse_pair(scenario)]
+    head = [f"{scenario.name}: {report.result.status.kind}", *verdict, ""]
     exact = "" if report.error is None else report.error.sentence
     exact = exact if report.check is None else repr(report.check)
     # Gains that are in force are no news: they stand last.

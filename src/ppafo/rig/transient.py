@@ -149,7 +149,8 @@ def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str
         "breakaways": solution.breakaways,
     }
     moved = vane_motion(scenario)
-    motion = "leg" if moved.leg else getattr(moved, "kind", "free").replace("prescribed", "measured")
+    kind = "leg" if moved.leg else getattr(moved, "kind", "free")
+    motion = {"prescribed": "measured"}.get(kind, kind)
     return ExperimentResult(recording, bench_run.device, offsets, settings, scenario.origin.replaced, motion)
 
 

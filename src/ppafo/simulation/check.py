@@ -106,11 +106,11 @@ class ErrorEstimate:
         within = f"Estimated error of the time steps: at most {over_time} over time{of_metrics}."
         if self.over_promise <= 1.0:
             return within
-        lasting = (
+        no_remedy = (
             "; trials with smaller values of `run.tolerance` do not reach it: repeated impacts, or a loop that "
             "oscillates, may amplify small differences, and the metrics then hold for one run among many"
         )
-        remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it" if self.tolerance else lasting
+        remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it" if self.tolerance else no_remedy
         return f"{within} That is {self.over_promise:.2g} times the promised accuracy of a run{remedy}."
 
 
@@ -340,11 +340,13 @@ def checked(result: RecordedResult, run: Run, rerun: Rerun) -> Check:
     separations = [repeat.status.time for repeat in results if repeat.status.time is not None]
     for name, signal in _recorded_signals(result).items():
         extent = _signal_range(result, signal.unit)
-        parted = [_largest_differences(repeat.recording, recording, signal.channels) for repeat in results]
-        changes = _largest_changes((kind, float(np.max(each))) for (kind, _), each in zip(repeats, parted, strict=True))
+        differences = [_largest_differences(repeat.recording, recording, signal.channels) for repeat in results]
+        by_kind = zip((kind for kind, _ in repeats), differences, strict=True)
+        changes = _largest_changes((kind, float(np.max(each))) for kind, each in by_kind)
         promised, allowed = signal.promised_error * extent / MARGIN, ALLOWED_PARTING * extent
         courses.append(NumberCheck(name, signal.unit, extent, allowed, changes, promised))
-        separations += [float(recording.time[np.argmax(each > allowed)]) for each in parted if np.any(each > allowed)]
+        late = (each > allowed for each in differences if np.any(each > allowed))
+        separations += [float(recording.time[np.argmax(each)]) for each in late]
     units = {name: metric.unit for compared in (result, *results) for name, metric in compared.metrics.items()}
     for name, unit in units.items():
         value = _value(result, name)

@@ -126,12 +126,22 @@ class Result:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Remarks on the use of the run: a missed reference, a stop, a too coarse pair of valves, replaced values."""
+        no_warnings = (self.following, changed_text(changes_in(self.scenario)))
+        return tuple(sentence for sentence in self.sentences(self.tracking) if sentence not in no_warnings)
+
+    @_in_own_units
+    def sentences(self, verdict: "Tracking | None") -> list[str]:
+        """Sentences of ``run.json``: tracking, remarks, a too coarse pair of valves, and changed values.
+
+        ``verdict`` is ``tracking``, with or without remedies that were tried.
+        """
         from ppafo.simulation.tracking.pair_step import coarse_pair
         from ppafo.simulation.tracking.remarks import remarks_on
 
-        verdict = self.tracking
-        said = ("" if verdict is None else verdict.sentence, *remarks_on(self, bool(self.following)))
-        return tuple(sentence for sentence in (*said, coarse_pair(self.scenario)) if sentence)
+        tracked = self.following if verdict is None else verdict.sentence
+        remarks = remarks_on(self, verdict is None and bool(tracked))
+        said = (tracked, *remarks, coarse_pair(self.scenario), changed_text(changes_in(self.scenario)))
+        return list(filter(None, said))
 
     @_in_own_units
     def __repr__(self) -> str:
@@ -195,10 +205,9 @@ class Result:
     @_in_own_units
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``run.json`` as plain data in SI units, except the fields added by storage."""
-        said = (self.following, *self.warnings, changed_text(changes_in(self.scenario)))
         return {
             "status": plain(self.status),
-            "verdict": list(filter(None, said)),
+            "verdict": self.sentences(self.tracking),
             "metrics": {name: plain(metric) for name, metric in self.metrics.items()},
             "versions": dict(self.versions),
             "seed": self.scenario.sensors.seed,

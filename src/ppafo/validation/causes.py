@@ -333,7 +333,7 @@ def _samples(records: Sequence[Record]) -> list[CandidateCause]:
 
 
 def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[CandidateCause]:
-    """Return another motion as candidate cause: a locked vane for a recorded angle at rest, else a leg for free."""
+    """Another motion as candidate: a locked vane for a recorded angle at rest, else a leg if the motion is free."""
     if settings.motion not in ("free", "leg"):
         return []
     angles = [record.values[record.channels.index(ANGLE)] for record in records if ANGLE in record.channels]
@@ -341,7 +341,7 @@ def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candid
     if not angles or (settings.motion == "leg" and not is_at_rest):
         return []
     motion: Motion = "locked" if is_at_rest else "leg"
-    seems = "be locked, because its recorded angle is constant" if is_at_rest else "move the foot of the fixture"
+    seems = "be locked, because its recorded angle is constant" if is_at_rest else "be coupled to a leg"
     words = f"the vane seems to {seems} ({argument_text('motion', motion)})"
     return [CandidateCause("motion", words, lambda _: ModelChange(motion=motion))]
 

@@ -14,6 +14,7 @@ from ppafo.remedy_trials import tried
 from ppafo.running import simulate
 from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.remedies import level_text
 
 SERVO = ("cylinder-servo", ("run.duration=1 s",))
 STUCK = ("friction.static_torque=2 N m", "friction.dynamic_torque=1 N m")
@@ -86,12 +87,27 @@ def test_a_free_joint_that_friction_holds_for_the_whole_run_is_said_to_stand_sti
     assert np.ptp(held.recording["angle"]) == 0.0
     assert held.following.startswith("the torque follows its reference")
     (said,) = held.warnings
-    assert "the joint does not move: static friction of 20 N m holds it, the actuator gives at most 4" in said
+    # The largest torque of the run, which is above the reference of 4 N m.
+    most = level_text("N m", held.metrics["peak_torque"].value)
+    holds = f"the joint does not move: static friction of 20 N m holds it against at most {most} of actuator and load"
+    assert said.startswith(f"{holds}; not tried: reduce ")
     # As advised: a locked joint is meant to stand still, and one with less friction moves.
     assert not simulate("torque-task-proportional", ["reference.level=4 N m"]).warnings
     free = simulate("torque-task-proportional", [*HELD, "friction.static_torque=1 N m"])
     assert np.ptp(free.recording["angle"]) > 0.01
     assert "does not move" not in " ".join(free.warnings)
+
+
+def test_friction_is_not_to_be_reduced_where_nothing_turns_the_joint_or_the_reference_is_beyond_reach() -> None:
+    friction = "friction.static_torque=20 N m"
+    shut = simulate("torque-task-proportional", [*HELD, friction, "controller.kind=constant", "controller.command=0"])
+    assert shut.recording["torque"].max() == 0.0
+    assert "does not move" not in " ".join(shut.warnings)
+    # The paper's actuator gives 5 N m; the reference, not the friction, is at fault.
+    beyond = simulate("torque-task-proportional", [*HELD[:-1], friction, "reference.level=9 N m"])
+    (still,) = [said for said in beyond.warnings if "does not move" in said]
+    assert still.endswith("static friction of 20 N m holds it against at most 5 N m of actuator and load")
+    assert any("actuator gives at most 5 N m" in said for said in beyond.warnings)
 
 
 def test_a_search_says_of_the_value_that_it_found_that_the_joint_stands_still_and_that_gains_follow_it() -> None:

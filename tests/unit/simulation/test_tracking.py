@@ -291,7 +291,7 @@ def test_a_valve_that_is_never_reversed_is_neither_called_too_small_nor_of_the_w
     assert told is not None
     # The paper's actuator reaches 5 N m in either direction.
     error = 3 if command > 0.0 else 7
-    assert f"fully open away from the reference and is not reversed, {error} N m off" in told.sentence
+    assert f"the valve stays open {error} N m beyond the reference: the hysteresis" in told.sentence
 
 
 @pytest.mark.parametrize("rate", ["1 kHz", "20 Hz"])
@@ -304,7 +304,43 @@ def test_the_wrong_sign_is_named_for_one_of_two_opposite_laws(band: float, rate:
     assert "reverse the sign" not in right.sentence
     assert "reverse the sign" in wrong.sentence
     # 2 N m above the reference is beyond the 5 N m of the actuator, so that the relay is never reversed.
-    assert ("is not reversed, 1 N m off" in right.cause) == (band == 2.0)
+    assert right.cause.startswith("the valve stays open 1 N m beyond the reference") == (band == 2.0)
+
+
+class OfAngle(Switching):
+    """On/off law of an angle."""
+
+    def update(self, time: float, reference: float, measurement: Any) -> float:
+        return super().update(time, reference, SimpleNamespace(torque=measurement.angle))
+
+
+@pytest.mark.parametrize("rate", ["1 kHz", "20 Hz"])
+@pytest.mark.parametrize("degrees", [0.5, 2.0, 5.0])
+def test_the_sign_is_named_before_the_load_that_throws_the_joint_off(degrees: float, rate: str) -> None:
+    """5 N m press the joint down from chambers at the pressure of the atmosphere, whatever the sign is."""
+    ramp = ["reference.kind=ramp_hold", "reference.level=80 deg", "reference.start_level=60 deg", "motion.angle=60 deg"]
+    for load in ("0 N m", "5 N m"):
+        changes = [*ramp, f"controller.rate={rate}", f"motion.external_torque={load}"]
+        scenario = load_scenario("cylinder-servo", changes)
+        for sign in (1.0, -1.0):
+            told = simulate(scenario.controlled_by(OfAngle(math.radians(degrees), sign))).tracking
+            assert told is not None
+            assert ("reverse the sign" in told.sentence) == (sign < 0.0)
+
+
+@pytest.mark.parametrize("rate", ["1 kHz", "20 Hz", "5 Hz"])
+@pytest.mark.parametrize("band", [0.3, 1.0])
+def test_a_late_law_is_told_its_delay_and_a_slow_one_of_the_wrong_sign_the_sign(band: float, rate: str) -> None:
+    scenario = load_scenario(TASK, ["reference.level=4 N m", f"controller.rate={rate}", "sensors.delay=100 ms"])
+    right, wrong = (simulate(scenario.controlled_by(Switching(band, sign))).tracking for sign in (1.0, -1.0))
+    assert right is not None
+    assert wrong is not None
+    assert "the measured torque comes late (`sensors.delay = 0.1 s`)" in right.cause
+    assert "reverse the sign" not in right.sentence
+    assert wrong.advice == "reverse the sign of the command or of the measurement"
+    punctual = load_scenario(TASK, ["reference.level=4 N m", f"controller.rate={rate}"]).controlled_by(Switching(band))
+    at_once = simulate(punctual).tracking
+    assert at_once is None or "sensors.delay" not in at_once.sentence
 
 
 def test_a_law_that_only_switches_without_a_declaration_is_told_a_dead_zone_and_the_declaration(tmp_path: Path) -> None:
@@ -995,7 +1031,7 @@ def test_a_swing_that_a_law_causes_itself_is_not_blamed_on_its_valves(tmp_path: 
     # Twice the band, and what the valves add on either side in their dead time.
     assert found is not None
     assert 2.0 < float(found[1]) < 2.5
-    assert "; `hysteresis` itself lets it swing, by `band = 1 N m`: the valves cause a step of only " in wide
+    assert "; `hysteresis` itself lets it swing (`band = 1 N m`): the valves cause a step of only " in wide
     (narrower,) = re.findall(r"for example, with --set '([^']*)' it follows", wide)
     assert said(narrower).startswith("the torque follows its reference")
 
@@ -1034,10 +1070,10 @@ def test_the_criterion_that_decided_is_named_with_its_value_and_its_limit_on_bot
     verdict = above.tracking
     assert verdict is not None
     # 0.08 of 1.08 parts are missing, 0.05 of them allowed.
-    assert verdict.criterion == "the reference is beyond reach, by"
+    assert verdict.criterion == "reach"
     assert verdict.worst == pytest.approx(0.08 * most, rel=1e-6)
     assert verdict.allowed == pytest.approx(0.05 * 1.08 * most, rel=1e-3)
-    assert "does not follow its reference: the reference is beyond reach, by 0.4" in verdict.found
+    assert "does not follow its reference: the reference exceeds the largest available torque by 0.4" in verdict.found
     assert " N m (0.27 N m allowed) from 5 s on" in verdict.found
 
 

@@ -16,7 +16,7 @@ from ppafo.report.kind import ConfidenceInterval, Kind, of_metric
 from ppafo.report.live_parts import live_part
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, COLOURS, GREY, look_of_valve
-from ppafo.simulation.gains import remark_on_following_gains
+from ppafo.simulation.gains import gains_of, remark_on_following_gains
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking
@@ -186,6 +186,8 @@ def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
         for metric in (_ERROR, _GAS)
         if len(comparison.configurations) > 2 and task.best.get(metric)
     }
+    laws = ((case, case.scenario.law) for case in task.cases)
+    gains = ((case, gains_of(case.scenario, law)) for case, law in laws if law is not None)
     return [
         Section(
             f"Task: {task.task}",
@@ -194,6 +196,7 @@ def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
                 *(Column(kind.words, [case.value(name) for case in task.cases], kind) for name, kind in kinds),
                 Column("status", [case.word for case in task.cases]),
             ],
+            remarks=[f"{case.configuration}: {used.sentence}" for case, used in gains if used is not None],
         ),
         *(
             Section(f"{name} against {comparison.baseline}{where}", _paired(comparison, task, name))

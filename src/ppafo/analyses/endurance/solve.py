@@ -178,7 +178,10 @@ def endurance_of_walk_gas(
     strides = max(life.repeats, 1.0e-9)
     stride_time, mass = life.walked / strides, life.course.regulated / strides
     before = Kind("", "kg", "gas mass", ".3g").text(at_set_pressure.mass_per_stride)
-    origin = f"{at_set_pressure.origin} on the bottle, mean over its strides ({before} at constant set pressure)"
+    origin = (
+        f"{at_set_pressure.origin}, the device walks on the bottle: mean over its strides ({before} at constant set "
+        "pressure; on the bottle the pressure at the valve falls with each draw, and the gas is colder and denser)"
+    )
     demand = GasDemand(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
     usable = supply.mass - smallest_mass_when_warm(supply.bottle, demand)
     return Endurance(

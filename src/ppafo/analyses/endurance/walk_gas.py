@@ -69,7 +69,7 @@ def demand_of_walk(walk: WalkGas) -> GasDemand:
     peak = max(largest_flow(walk.recording), walk.gas_per_stride / walk.stride_time)
     draw = demand_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
     along = f" in task sequence '{walk.task_sequence}'" if walk.task_sequence else ""
-    return replace(draw, origin=f"walk '{walk.name}'{along}, {walk.recording.kind}, repeated")
+    return replace(draw, origin=f"walk '{walk.name}'{along}, {walk.recording.kind}")
 
 
 def read_walk_gas(folder: Path) -> WalkGas:

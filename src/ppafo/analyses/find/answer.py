@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.analyses.find.solve import FOLLOWS, REFUSED, FindResult
+from ppafo.analyses.find.solve import FOLLOWS, FindResult
 from ppafo.parameters.overrides import over
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric, of_path
@@ -75,7 +75,9 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
     met, (index, neighbour) = outcome.met_intervals, outcome.found
     drawn = "tracking error, divided by its limit," if condition.text == FOLLOWS else "metric"
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
-    remarks = list(_remarks(outcome, kind))
+    # Values that meet the condition although the run does not follow its reference.
+    missed = int(np.count_nonzero(~tried["follows"] & condition.is_kept(tried["judged"]))) * (condition.text != FOLLOWS)
+    remarks = list(_remarks(outcome, kind, missed))
     # In more digits than are shown, so that the value that is pasted meets the condition.
     used = ""
     if index is not None:
@@ -84,7 +86,7 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
         name="find",
         kicker="Search",
         title=f"The {wanted} {path.path} such that {'the run ' if condition.text == FOLLOWS else ''}{condition.text}",
-        said=(_verdict(outcome, kind), *remarks),
+        said=(_verdict(outcome, kind, missed), *remarks),
         parts=(
             Section("Where the condition is met", columns),
             Section("To use the value" if used else "", code=used),
@@ -119,12 +121,7 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
     )
 
 
-def _not_followed(outcome: FindResult) -> int:
-    """Return the number of values that meet the condition although the run does not follow its reference."""
-    return int(np.count_nonzero(~outcome.tried["follows"] & outcome.condition.is_kept(outcome.tried["judged"])))
-
-
-def _verdict(outcome: FindResult, kind: Kind) -> str:
+def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
     """Return a sentence on the value found, or on the nearest value if none meets the condition."""
     path, condition, tried = outcome.path.path, outcome.condition, outcome.tried
     of_condition, (index, neighbour) = of_metric(condition.metric), outcome.found
@@ -140,24 +137,23 @@ def _verdict(outcome: FindResult, kind: Kind) -> str:
         return f"no {path} {ends} {meets}; the nearest is {there}{kind.text(tried['value'][row])}"
     value = float(tried["value"][index])
     # Beyond it the condition may be met by a loop that does not follow its reference.
-    follows = " and follows its reference" if _not_followed(outcome) and not is_verdict else ""
+    follows = " and follows its reference" if missed else ""
     lead = f"{path} = {kind.text(value)} is the {wanted} value that {meets}{follows}"
     # Verdicts have the number that decided, in a line of their own.
     number = of_condition.text(float(tried["metric"][index]))
     there = "" if outcome.verdicts else f": {condition.metric} is {number} there"
-    if any(said.startswith(REFUSED) for _, said in outcome.verdicts[1:]):
+    if any(is_refused for _, _, is_refused in outcome.verdicts):
         lead = f"{path} = {kind.text(value)} is the {wanted} value that is not refused; it {meets}"
     if neighbour is None:
         return f"{lead}, at the end of the range{there}; a wider range may have a {further} value"
     return f"{lead}{there} (bracketed to {kind.change(abs(value - neighbour), '.1g')})"
 
 
-def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
+def _remarks(outcome: FindResult, kind: Kind, missed: int) -> Iterator[str]:
     """Yield remarks on runs, further intervals, noise, oscillation and failures."""
     condition, is_met, tried, runs = outcome.condition, outcome.is_met, outcome.tried, outcome.runs
     index, _ = outcome.found
-    missed = 0 if condition.text == FOLLOWS else _not_followed(outcome)
-    yield from (f"at {kind.text(value, '.9g')} {said}" for value, said in outcome.verdicts if said)
+    yield from (f"at {kind.text(value, '.9g')} {said}" for value, said, _ in outcome.verdicts if said)
     yield from filter(None, [outcome.gains])
     evenly = np.count_nonzero(tried["is_of_grid"])
     met = np.count_nonzero(is_met)
@@ -169,8 +165,6 @@ def _remarks(outcome: FindResult, kind: Kind) -> Iterator[str]:
     if (changes := np.count_nonzero(np.diff(is_met))) > 1:
         side = "below" if outcome.highest else "above"
         yield f"the condition changes {changes} times over the range, so it is not met everywhere {side} this value"
-    if missed or condition.text == FOLLOWS:
-        yield "a run that follows may have the allowed error, so the actuator may reach less than the reference"
     if streams := outcome.noise_streams:
         spread = ""
         if index is not None:

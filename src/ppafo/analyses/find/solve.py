@@ -38,8 +38,6 @@ _SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 FOLLOWS = "follows"
 """Text of the condition that the run follows its reference, by the verdict of ``simulate``."""
-REFUSED = "the value is refused:"
-"""Beginning of the verdict on a value that makes no run."""
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
@@ -115,7 +113,7 @@ class FindResult:
     """Search result: tried values, ascending, as a structured array of ``TRIED``, and the counted ``runs``.
 
     ``gains`` is a remark on gains that follow the varied number. ``verdicts`` are values [SI] with the verdict of a run
-    of their own, for the condition that the run follows.
+    of their own, for the condition that the run follows, and True for a refused value.
     """
 
     scenario: str
@@ -126,7 +124,7 @@ class FindResult:
     runs: Runs
     tried: NDArray[np.void]
     gains: str = ""
-    verdicts: tuple[tuple[float, str], ...] = ()
+    verdicts: tuple[tuple[float, str, bool], ...] = ()
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
@@ -214,16 +212,8 @@ def outermost(
     seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
     counter = RunCounter(grid * max(1, seeds.size), progress)
     runs = scenario_runs(base, with_companions([condition.metric], base), counter, (), threads)
-    search = FindResult(
-        base.name,
-        path,
-        condition,
-        highest,
-        seeds.size,
-        runs,
-        np.empty(0, TRIED),
-        remark_on_following_gains(base, [path.path]),
-    )
+    gains = remark_on_following_gains(base, [path.path])
+    search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED), gains)
     search = search.with_values(base, np.linspace(low, high, grid), seeds, True)
     if not np.isfinite(search.tried["judged"]).any():
         ends = f"from {path.quote(low)} to {path.quote(high)}"
@@ -248,14 +238,15 @@ def outermost(
     # The value found and its outer neighbour, or else the nearest value.
     values = [search.nearest if index is None else float(search.tried["value"][index])]
     values += [] if neighbour is None else [neighbour]
-    return replace(search, verdicts=tuple((value, _verdict(base, f"{path.path}={value!r} {SI}")) for value in values))
+    return replace(search, verdicts=tuple((value, *_verdict(base, f"{path.path}={value!r} {SI}")) for value in values))
 
 
-def _verdict(base: Scenario, override: str) -> str:
-    """Return the verdict on a run with an override, with a remark if it stands still, or the refusal of its value."""
+def _verdict(base: Scenario, override: str) -> tuple[str, bool]:
+    """Return the verdict on a run with an override, or the refusal of the value, and True for a refused value."""
     try:
         result = simulate(with_overrides(base, [override]))
     except (ParameterError, ScenarioError) as error:
-        return f"{REFUSED} {error}"
-    said = result.following if result.tracking is None else result.tracking.found
-    return "; ".join(filter(None, (said, standing_still(result))))
+        return f"the value is refused: {error}", True
+    verdict = result.tracking
+    said = result.following if verdict is None else verdict.found
+    return "; ".join(filter(None, (said, standing_still(result, verdict is None)))), False

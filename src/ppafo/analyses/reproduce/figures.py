@@ -292,7 +292,7 @@ def _gas_panel(runs: Sequence[_TaskRun], most: float) -> Panel:
     Gas that leaks past the vane is vented from the other chamber. ``most`` is the larger supplied gas [g].
     """
     # Grey in the legend, as the bars have the colours of the valves.
-    names = ("in chambers", GREY, 1.0), ("vented", GREY, 0.35), ("of it leaked", BLACK, 1.0)
+    names = ("in chambers", GREY, 1.0), ("vented", GREY, 0.35), ("leaked (part of vented)", BLACK, 1.0)
     none = (0.0, 0.0)
     marks = [
         Mark("band", none, (none, none), label=label, colour=colour, style={"alpha": alpha})

@@ -62,7 +62,7 @@ def solve_tuning(problem: Problem, threads: int | None, progress: Report | None)
     """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
     spread, report = problem.spread, progress or report_nothing
     metrics = with_companions(problem.metrics, problem.scenario)
-    counter = RunCounter(_largest_runs(problem), lambda now: report(replace(now, activity="tuning, at most")))
+    counter = RunCounter(_largest_runs(problem), lambda now: report(replace(now, activity="tuning", is_bound=True)))
     runs = scenario_runs(problem.scenario, metrics, counter, problem.gauge, threads)
     draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
     gains_before = {path: [value] for path, value in problem.before.items()}

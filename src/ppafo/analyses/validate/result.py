@@ -76,12 +76,13 @@ def verdict(validation: Validation) -> str:
         if not channel.passes
     )
     why, causes = _why(validation.causes, worst.in_noise, validation.passes), validation.causes
-    moved = ""
+    motion_remedy = ""
     if not validation.passes and causes.found is None and any(row.motion == "free" for row in validation.recordings):
         # A cause is searched with the motion as it was said, which is wrong for a device that something else moved.
         motion = argument_text("motion", "leg")
-        moved = f"if the device was on a leg, locked or driven, give {motion}, locked or measured first"
-    explanation = "nothing but noise is left" if causes.is_noise else "; ".join(filter(None, (size, moved, why)))
+        motion_remedy = f"if the device was on a leg, locked or driven, give {motion}, locked or measured first"
+    texts = ("nothing but noise is left",) if causes.is_noise else (size, motion_remedy, why)
+    explanation = "; ".join(filter(None, texts))
     if not validation.passes:
         return f"{name} does not agree: {failed}; {explanation}"
     wide = f" ({worst.channel}: {100 * worst.limit:.3g} %, which is wider than the noise and may hide a wrong number)"

@@ -316,10 +316,7 @@ def slide_part(
     rests = way == 0.0 and stays and stays_later
 
     slid = PartSlide(
-        torque=next_torque,
-        friction=friction,
-        angular_velocity=full_velocity,
-        departs=0.0 if slides or rests else 1.0,
+        torque=next_torque, friction=friction, angular_velocity=full_velocity, departs=0.0 if slides or rests else 1.0
     )
     angle = begun.next_angle if slides else place
     return slid, PartEnd(
@@ -358,13 +355,7 @@ def depart_part(
 
 
 def part_error(
-    plant: PlantParameters,
-    begun: FreePart,
-    slid: PartSlide,
-    angle: float,
-    length: float,
-    *,
-    parts: ActuatorFunctions,
+    plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: float, length: float, *, parts: ActuatorFunctions
 ) -> float:
     """Ratio of the error of the angle at the end of a part [rad] to the allowed error [-]."""
     friction, rate = begun.way * slid.friction.in_motion, slid.angular_velocity
@@ -391,12 +382,7 @@ def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: fl
 
 
 def first_event(
-    plant: PlantParameters,
-    state: PlantState,
-    free_angle: float,
-    acceleration: float,
-    full_velocity: float,
-    step: float,
+    plant: PlantParameters, state: PlantState, free_angle: float, acceleration: float, full_velocity: float, step: float
 ) -> _Departure:
     """First event of a step: impact on a stop, reversal, or, for a vane at rest, departure at the start of the step.
 
@@ -473,10 +459,7 @@ def end_free(
     # '&' and no branch: the step of a walk runs on all lanes.
     slides_through = (way != 0.0) & (full_velocity * way > 0.0) & (begun.free_angle == predicted)
     return FreeEnd(
-        torque=next_torque,
-        angle=predicted,
-        angular_velocity=full_velocity,
-        departs=0.0 if slides_through else 1.0,
+        torque=next_torque, angle=predicted, angular_velocity=full_velocity, departs=0.0 if slides_through else 1.0
     )
 
 

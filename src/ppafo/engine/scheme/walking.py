@@ -5,22 +5,11 @@ The torques on the ankle in addition to actuator, friction and damping come from
 
 from typing import NamedTuple
 
-from ppafo.engine.scheme.motion import (
-    FreeEnd,
-    FreeStep,
-    begin_free,
-    clamp_angle,
-    depart_free,
-    end_free,
-    with_motion,
-)
+from ppafo.engine.scheme.motion import FreeEnd, FreeStep, begin_free, clamp_angle, depart_free, end_free, with_motion
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.model import contact as ground
 from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
-from ppafo.model.gait import (
-    GaitNow,
-    GaitTiming,
-)
+from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import FootLoad, LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank
 from ppafo.model.plant import (
     ActuatorFunctions,
@@ -325,17 +314,7 @@ def end_walk(
     after = with_motion(state, ended.motion.angle, ended.motion.angular_velocity)
     acceleration = (after.angular_velocity - state.angular_velocity) / max(step, 1.0e-30)
     given = external_torque(
-        plant,
-        leg,
-        share,
-        after,
-        held,
-        ended.torque,
-        -carried.plate,
-        begun.led,
-        acceleration,
-        free,
-        parts=parts,
+        plant, leg, share, after, held, ended.torque, -carried.plate, begun.led, acceleration, free, parts=parts
     )
     landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset, leg.keeps_gait)
     height = leg.toe_lever * (ended.foot.sine - now.sine_healthy_foot)

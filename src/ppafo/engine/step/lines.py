@@ -51,14 +51,7 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
         )
     else:
         lane.fed_gas = supply_lines.begin_fed_gas(
-            lane.plant,
-            lane.lines,
-            lane.line_state,
-            lane.state,
-            next_angle,
-            lane.flowing,
-            length,
-            parts=parts.functions,
+            lane.plant, lane.lines, lane.line_state, lane.state, next_angle, lane.flowing, length, parts=parts.functions
         )
 
 

@@ -127,13 +127,7 @@ def depart(parts: Program, lane: Lane) -> None:
     """Set the end of a step in which the foot reverses or starts to move, which is rare."""
     parts.gas.add(parts, lane)
     lane.ended, lane.ahead = walking.depart_in_walk(
-        lane.plant,
-        lane.fed,
-        lane.walk_begun,
-        lane.ended,
-        lane.ahead,
-        length_of(parts, lane),
-        parts=parts.functions,
+        lane.plant, lane.fed, lane.walk_begun, lane.ended, lane.ahead, length_of(parts, lane), parts=parts.functions
     )
 
 

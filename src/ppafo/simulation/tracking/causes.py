@@ -31,8 +31,8 @@ from ppafo.simulation.tracking.remedies import (
     default_gain_remedies,
     default_integral_remedy,
     level_text,
-    quicker_loops,
     remedy,
+    rescaled_gains,
     sized_valves,
     smaller_pair,
     speed_settings,
@@ -60,8 +60,9 @@ _SLOWER = (0.7, 0.4, 0.2, 0.1, 0.05)
 """Frequencies of a reference in trials, divided by its own frequency [-]."""
 _SLOW, _FEW_DECISIONS = 0.01, 20.0
 """Period of a controller [s], and decisions in the settled part below which that period makes the loop fail [-]."""
-_DELAY = "sensors.delay"
-"""Path of the delay of all sensors."""
+_DELAY, _LONG_DELAY = "sensors.delay", 0.1
+"""Path of the delay of all sensors, and delay divided by the time between two crossings of the reference, from which
+the delay is named [-]."""
 _SENSOR_FLAWS = (_DELAY, *(f"sensors.{of}_{flaw}" for flaw in ("noise", "resolution") for of in ("angle", "pressure")))
 """Paths of the imperfections of sensors that a remedy reduces."""
 _LESS = (10.0, 1000.0)
@@ -81,13 +82,23 @@ def _slow_decisions(case: Case) -> TrackingCause | None:
     period, settled = case.scenario.controller.period, case.settled.duration
     if period < _SLOW or settled >= _FEW_DECISIONS * period:
         return None
-    rates = (10.0 / period, 100.0 / period, _USUAL_RATE)
+    rates, late = (10.0 / period, 100.0 / period, _USUAL_RATE), _late_text(case)
     text = (
         f"the controller decides every {1.0e3 * period:.3g} ms, only {settled / period:.2g} times in the settled "
-        f"{settled:.3g} s"
+        f"{settled:.3g} s{late and f', and {late}'}"
     )
     remedies = (Remedy({}, (f"controller.rate={rate:g} Hz",)) for rate in rates if rate <= _USUAL_RATE)
     return TrackingCause(text, tuple(remedies), "increase `controller.rate`")
+
+
+def _late_text(case: Case) -> str:
+    """Words for a sensor delay that is long beside the time between two crossings of the reference; "" otherwise."""
+    scenario, delay = case.scenario, float(case.scenario.sensors.delay)
+    reference, value = followed(case.recording)
+    crossings = int(np.count_nonzero(np.diff((value > reference)[case.settled.samples])))
+    if delay * max(crossings, 1) <= _LONG_DELAY * case.settled.duration:
+        return ""
+    return f"the measured {CONTROLLED[scenario.controlled].words} comes late (`{_DELAY} = {level_text('s', delay)}`)"
 
 
 def _shut_valve(case: Case) -> TrackingCause | None:
@@ -96,7 +107,7 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     command, band = np.abs(case.recording["command"][settled.samples]), dead_band(scenario)
     # A loop that rests at the edge of the band is a little beyond it now and then.
     typical = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
-    if typical <= SHUT and case.failure != "overshoots":
+    if case.failure != "overshoots" and (np.max(command) if settled.error_reversals else typical) <= SHUT:
         return TrackingCause("the command stays 0: the gains are 0, or the dead zone is wider than the error")
     if typical > _EDGE * band or settled.error_reversals or case.failure == "overshoots":
         return None
@@ -106,7 +117,7 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     remedies = [remedy(scenario, {"controller.dead_band": band})] if known_band < band else []
     # A law that knows the band asks for more openings than it gets, and errs by what its gain lacks.
     gain_factor = band / typical if known_band < band else settled.rms_error / (LARGEST_SHARE * settled.wanted_change)
-    remedies += quicker_loops(scenario, case.law, (1.5 * gain_factor, 3.0 * gain_factor))
+    remedies += rescaled_gains(scenario, case.law, (1.5 * gain_factor, 3.0 * gain_factor))
     remedies += default_integral_remedy(scenario, case.law)
     if torque_asked(scenario, case.law, settled.rms_error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
@@ -118,21 +129,26 @@ def _shut_valve(case: Case) -> TrackingCause | None:
 def oscillation(case: Case) -> TrackingCause | None:
     """Cause: valves, gains or small chambers make the loop oscillate."""
     law, scenario = case.law, case.scenario
-    if not (case.oscillates or case.only_switches):
+    names = [quantity.name for quantity in speed_settings(scenario, law).values()]
+    may_be_late = scenario.follows_reference and only_opens_fully(case.recording) and not names
+    late = _late_text(case) if may_be_late else ""
+    if not (case.oscillates or case.only_switches or late):
         return None
     if law is not None and case.only_switches:
         return _step_of_valves(case, law)
-    names = [quantity.name for quantity in speed_settings(scenario, law).values()]
     if law is not None and names:
         return gains_of_another_device(case) or _fast_loop(case, law, names[0])
     name = "the user-defined controller" if law is None else f"`{law.name}`"
     if not only_opens_fully(case.recording):
         return TrackingCause(f"{name} is too fast for the delays of the loop", (), "reduce its gains, or slow it down")
-    rate = "increase `controller.rate`, " * (scenario.controller.period >= _SLOW)
+    quicker = f"reduce `{_DELAY}`, " * bool(late) + "increase `controller.rate`, " * (
+        scenario.controller.period >= _SLOW
+    )
     zone = change_text(scenario.controlled, LARGEST_SHARE * case.settled.wanted_change)
     declaration = ", or give it hysteresis and only_switches=True in its ControllerKind" * (law is not None)
-    advice = f"{rate}let it command 0 within a dead zone below {zone} about its reference{declaration}"
-    return TrackingCause(f"{name} commands only full openings, and reverses them without pause", (), advice)
+    advice = f"{quicker}let it command 0 within a dead zone below {zone} about its reference{declaration}"
+    reason = late or "reverses them without pause"
+    return TrackingCause(f"{name} commands only full openings, and {reason}", (), advice)
 
 
 def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
@@ -167,7 +183,7 @@ def _wide_zone(case: Case, begin: str, end: str = "") -> TrackingCause:
         if item.unit == unit and scenario.controller.settings[item.name] > 0.0
     }
     own = ", ".join(f"`{name} = {change_text(scenario.controlled, width)}`" for name, width in widths.items())
-    text = f"{begin}, by {own or 'its rule'}{end}"
+    text = f"{begin}{own and f' ({own})'}{end}"
     narrower = [{f"controller.{name}": width / factor for name, width in widths.items()} for factor in _NARROWER]
     smaller = [remedy(scenario, numbers) for numbers in narrower if numbers]
     return TrackingCause(text, tuple(smaller), "change the settings or the rule of the controller")
@@ -186,7 +202,7 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
         )
         # Near a stop for a part of the time, a loop needs no gain for that angle throughout.
         factors = (rate, 2.0 * rate) if rate == rates[0][0] else (2.0, 4.0, rate)
-        return TrackingCause(text, quicker_loops(scenario, law, (1.0 / factor for factor in factors)))
+        return TrackingCause(text, rescaled_gains(scenario, law, (1.0 / factor for factor in factors)))
     if sensors.angle_noise or sensors.pressure_noise:
         noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
         reason = f"sensor noise ({noise}) reverses the command"
@@ -197,7 +213,7 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
     else:
         reason = "the loop has delays that this gain does not include"
     text = f"`{gain}` is about the gain computed for this device: {reason}"
-    return TrackingCause(text, quicker_loops(scenario, law, (0.5, 0.25)))
+    return TrackingCause(text, rescaled_gains(scenario, law, (0.5, 0.25)))
 
 
 def _loop_rate(scenario: Scenario, angle: float) -> float:
@@ -267,10 +283,11 @@ def _opened_away(case: Case) -> TrackingCause | None:
     command = upwards * case.recording["command"]
     is_away = np.asarray(command * (reference - value) < 0.0)
     away = np.mean(is_away[samples][is_open[samples]])
-    # With the right sign a valve is opened fully towards the reference, however late the loop is then.
-    ways = np.where(is_open, np.sign(command), 0.0)
+    # With the right sign a valve is opened fully towards the reference as it is measured, however late the loop is.
+    ways, time = np.where(is_open, np.sign(command), 0.0), case.recording.time
     begins = is_open & (np.diff(ways, prepend=0.0) != 0.0)
-    if away > _MOSTLY and np.mean(is_away[begins]) > _ALWAYS:
+    measured = np.interp(time - float(scenario.sensors.delay), time, value)
+    if away > _MOSTLY and np.mean((command * (reference - measured))[begins] < 0.0) > _ALWAYS:
         text = (
             f"the valve is fully open for {100.0 * share:.0f} % of the time, and drives away from the reference for "
             f"{100.0 * away:.0f} % of this time"
@@ -279,7 +296,8 @@ def _opened_away(case: Case) -> TrackingCause | None:
     if away <= _ALWAYS or begins[samples].any() or not only_opens_fully(case.recording):
         return None
     worst = change_text(scenario.controlled, case.settled.largest_error)
-    return _wide_zone(case, f"the valve stays fully open away from the reference and is not reversed, {worst} off")
+    opened = f"the valve stays open {worst} beyond the reference: the hysteresis of the controller"
+    return _wide_zone(case, opened, " is wider than the allowed error")
 
 
 def _lag(case: Case) -> TrackingCause | None:
@@ -294,7 +312,7 @@ def _lag(case: Case) -> TrackingCause | None:
     text = "the reference changes faster than the loop can follow"
     if delay > 0.0 and delay**2 * squares >= _EXPLAINED * case.settled.rms_error**2:
         text = f"it lags its reference by {1.0e3 * delay:.3g} ms"
-    remedies = [*stiffened(scenario, (2.0, 4.0)), *quicker_loops(scenario, case.law, (2.0, 4.0))]
+    remedies = [*stiffened(scenario, (2.0, 4.0)), *rescaled_gains(scenario, case.law, (2.0, 4.0))]
     frequency = float(scenario.reference.settings.get("frequency", 0.0))
     for share in _SLOWER if frequency else ():
         slower = {"reference.frequency": share * frequency}
@@ -357,7 +375,7 @@ def _not_settled(case: Case) -> TrackingCause:
         longer = [remedy(case.scenario, {"run.duration": times * case.scenario.run.duration}) for times in (2.0, 4.0)]
         text = f"it has not settled by {case.settled.start:.3g} s"
         return TrackingCause(
-            text, (*longer, *quicker_loops(case.scenario, case.law, (2.0, 4.0))), "increase `run.duration`"
+            text, (*longer, *rescaled_gains(case.scenario, case.law, (2.0, 4.0))), "increase `run.duration`"
         )
     integral = next((name for name in settings if "integral" in name and settings[name] == 0.0), "")
     if integral:
@@ -368,6 +386,7 @@ def _not_settled(case: Case) -> TrackingCause:
 
 
 CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
+    _opened_away,
     torque_beyond_reach,
     load_beyond_reach,
     flung_at_start,
@@ -375,7 +394,6 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _slow_decisions,
     _static_friction,
     _shut_valve,
-    _opened_away,
     oscillation,
     lambda case: small_valve(case, _MOSTLY, "this task", _LARGER_VALVES, "use a larger valve or a slower reference"),
     gains_of_another_device,

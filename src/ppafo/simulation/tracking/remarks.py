@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.model.plant import gravity_torque
 from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.reach import torque_reach
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.load_causes import LOCKED, ON_STOP, stop_of
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.simulation.tracking.remedies import level_text
+from ppafo.simulation.tracking.rule import SMALLEST_MOVE
 
 if TYPE_CHECKING:
     from ppafo.simulation.at_hand import RecordedResult
@@ -24,7 +26,7 @@ def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
     """
     scenario, recording = result.scenario, result.recording
     motion, actuator, reached = scenario.motion, scenario.device.actuator, []
-    yield standing_still(result)
+    yield standing_still(result, follows)
     if isinstance(motion, FreeMotion):
         for side, stop in (("lower", actuator.angle_min), ("upper", actuator.angle_max)):
             rests = np.abs(recording["angle"] - stop) <= ON_STOP
@@ -40,16 +42,28 @@ def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
     yield scenario.origin.replaced
 
 
-def standing_still(result: "RecordedResult") -> str:
-    """Remark on a free joint that friction holds for the whole run while no angle is controlled; "" for other runs."""
-    scenario, angle = result.scenario, result.recording["angle"]
-    is_free = isinstance(scenario.motion, FreeMotion) and scenario.controlled != ANGLE and result.status.is_completed
-    if not is_free or np.ptp(angle) > 0.0 or stop_of(scenario, angle):
+def standing_still(result: "RecordedResult", follows: bool) -> str:
+    """Remark on a free joint that friction holds for the whole run while no angle is controlled; "" for other runs.
+
+    ``follows``: as for ``remarks_on``; without it the verdict has the remedy, unless the loop is open.
+    """
+    scenario, angle, motion = result.scenario, result.recording["angle"], result.scenario.motion
+    if not isinstance(motion, FreeMotion) or scenario.controlled == ANGLE or not result.status.is_completed:
         return ""
-    torques = (float(scenario.device.friction.static_torque), float(np.abs(result.recording["torque"]).max()))
-    holding, most = (level_text("N m", torque) for torque in torques)
-    text = f"the joint does not move: static friction of {holding} holds it, the actuator gives at most {most}"
-    return f"{text}; not tried: reduce `friction.static_torque`, or lock the joint ({LOCKED.text})"
+    if np.ptp(angle) > 0.0 or stop_of(scenario, angle):
+        return ""
+    load = motion.outside_torque + gravity_torque(float(angle[0]), scenario.device.foot_plate.gravity_torque)
+    holding, most = (
+        float(scenario.device.friction.static_torque),
+        float(np.abs(result.recording["torque"] - load).max()),
+    )
+    holds = f"static friction of {level_text('N m', holding)} holds it against at most {level_text('N m', most)}"
+    remedy = f"; not tried: reduce `friction.static_torque`, or lock the joint ({LOCKED.text})"
+    text = f"the joint does not move: {holds} of actuator and load" + remedy * (
+        follows or scenario.controller.is_open_loop
+    )
+    # A joint on which no torque acts is at rest without friction.
+    return text if most > SMALLEST_MOVE * holding else ""
 
 
 def _without_effect(scenario: Scenario) -> str:

@@ -10,6 +10,7 @@ from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import SonicOrifice
 from ppafo.parameters.graph import LinkedDefault
+from ppafo.parameters.overrides import read_overrides
 from ppafo.report.display_units import metric_change, metric_level
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS
@@ -114,7 +115,8 @@ def default_gain_remedies(scenario: Scenario, law: ControllerKind | None) -> lis
         path, present = f"controller.{quantity.name}", float(settings[quantity.name])
         if abs(present - defaults.get(path, present)) > _SAME_GAIN * defaults.get(path, present):
             slopes = {f"controller.{name}": 0.0 for name in SLOPE_GAINS if settings.get(name, 0.0) > 0.0}
-            given = {each: defaults[each] for each in defaults if f"{each}=" in " ".join(scenario.origin.overrides)}
+            typed = {override.typed for override in read_overrides(scenario.origin.overrides)}
+            given = {each: defaults[each] for each in defaults if each in typed}
             changes = ({path: defaults[path], **slopes}, {**slopes, **given})
             return [remedy(scenario, numbers) for numbers in changes[: max(1, len(given))]]
     return []
@@ -130,7 +132,7 @@ def default_integral_remedy(scenario: Scenario, law: ControllerKind | None) -> l
     return [remedy(scenario, {f"controller.{name}": default}) for name in names if settings.get(name) == 0.0 < default]
 
 
-def quicker_loops(scenario: Scenario, law: ControllerKind | None, factors: Iterable[float]) -> tuple[Remedy, ...]:
+def rescaled_gains(scenario: Scenario, law: ControllerKind | None, factors: Iterable[float]) -> tuple[Remedy, ...]:
     """Remedies that change the speed of the innermost loop by each of some factors; empty if it cannot be set."""
     innermost, settings = list(speed_settings(scenario, law).items())[:1], scenario.controller.settings
     powers = [(f"controller.{item.name}", item.name, -1.0 if term in SLOWER_ABOVE else 1.0) for term, item in innermost]

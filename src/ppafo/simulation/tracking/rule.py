@@ -60,6 +60,13 @@ REVERSALS = "command_reversals"
 """Metric that counts reversals of the command."""
 Failure = Literal["does not move", "oscillates", "overshoots", "does not follow"]
 """Kind of failure."""
+Criterion = Literal["RMS error", "mean error", "swing", "largest error", "missing peak torque", "reach", "any reach"]
+"""Number of the settled part with a limit; a torque reference may exceed the reach of a locked or of a moving joint."""
+CRITERION_TEXTS: dict[Criterion | Literal[""], str] = {
+    "reach": "the reference exceeds the largest available torque by",
+    "any reach": "the reference exceeds the largest available torque at every angle by",
+}
+"""Words before the number of a criterion whose name is no noun phrase."""
 
 
 def most_reversals(scenario: Scenario, duration: float | None = None) -> float:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -16,11 +16,13 @@ from ppafo.simulation.tracking.causes import CAUSES_OF_TASK
 from ppafo.simulation.tracking.load_causes import cuts_wave, torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
+    CRITERION_TEXTS,
     LARGEST_MEAN_SWITCHED,
     LARGEST_SHARE,
     LARGEST_SHARE_OF_WAVE,
     LEAST_PEAK_WALK,
     REVERSALS,
+    Criterion,
     Failure,
     deviation_limit,
     failure_of_task,
@@ -81,7 +83,7 @@ class Tracking:
     at_rest: bool = True
     since: float = 0.0
     span: float = 0.0
-    criterion: str = ""
+    criterion: Criterion | Literal[""] = ""
     worst: float = 0.0
     allowed: float = 0.0
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
@@ -118,12 +120,13 @@ class Tracking:
         if self.kind == "overshoots":
             return f"the {words} overshoots: {plain_moved} instead of at most {wanted}"
         is_constant = abs(self.missing) > max(0.9 * self.error, self.allowed)
-        if is_constant and self.at_rest and self.criterion.endswith("error"):
+        if is_constant and self.at_rest and self.criterion in ("RMS error", "mean error"):
             side = "below" if self.missing < 0.0 else "above"
             missing, allowed = _error_and_limit(self.controlled, abs(self.missing), self.allowed)
             return f"the {words} stays {missing} {side} its reference ({allowed} allowed)"
         worst, allowed = _error_and_limit(self.controlled, self.worst, self.allowed)
-        return f"the {words} does not follow its reference: {self.criterion} {worst} ({allowed} allowed){since}"
+        criterion = CRITERION_TEXTS.get(self.criterion, self.criterion)
+        return f"the {words} does not follow its reference: {criterion} {worst} ({allowed} allowed){since}"
 
 
 def _error_and_limit(controlled: str, error: float, limit: float) -> tuple[str, str]:
@@ -152,7 +155,8 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
     criteria = _criteria(case)
     is_within = is_task and not criteria[0][1] > criteria[0][2]
     decided = next((each for each in criteria if each[1] > each[2]), criteria[-1])
-    criterion, worst, allowed = decided if failure == "does not follow" else ("", 0.0, 0.0)
+    criterion, worst, allowed = decided
+    fails = failure == "does not follow"
     is_slow_swing = settled.reference_range > 0.0 and not settled.error_reversals
     is_swing = is_slow_swing or (is_within and case.only_switches and settled.error_range > criteria[2][2])
     return Tracking(
@@ -171,9 +175,9 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
         at_rest=settled.rests,
         since=settled.start,
-        criterion=criterion,
-        worst=worst,
-        allowed=allowed,
+        criterion=criterion if fails else "",
+        worst=worst if fails else 0.0,
+        allowed=allowed if fails else 0.0,
         span=settled.error_range if failure == "oscillates" and turning <= 1.0 and is_swing else 0.0,
     )
 
@@ -217,21 +221,24 @@ def following_text(result: "RecordedResult") -> str:
     return verdict if beyond is None else f"{verdict}; {beyond.text}"
 
 
-def _criteria(case: Case) -> tuple[tuple[str, float, float], ...]:
+def _criteria(case: Case) -> tuple[tuple[Criterion, float, float], ...]:
     """Errors of the settled part that may be above their limits: name, number and limit [SI], most telling first."""
     scenario, settled, switches = case.scenario, case.settled, case.only_switches
     mean, wanted, asked = abs(settled.mean_error), settled.wanted_change, settled.requested_peak
     if not scenario.follows_reference:
-        short = ("missing peak torque", asked - settled.given_peak, (1.0 - LEAST_PEAK_WALK) * asked)
-        return ("RMS error", settled.rms_error, LARGEST_SHARE_OF_WAVE * wanted), short
-    deviation = ("swing", settled.error_range) if settled.rests else ("largest error", settled.largest_error)
-    beyond, where = float(np.max(shortfall(scenario))), " at every angle" * (scenario.motion.locked_angle is None)
-    lack = (f"the reference is beyond reach{where}, by", beyond) if beyond > mean else ("mean error", mean)
+        return (
+            ("RMS error", settled.rms_error, LARGEST_SHARE_OF_WAVE * wanted),
+            ("missing peak torque", asked - settled.given_peak, (1.0 - LEAST_PEAK_WALK) * asked),
+        )
+    beyond = float(np.max(shortfall(scenario)))
+    deviation = settled.error_range if settled.rests else settled.largest_error
+    is_cut = beyond > mean and not settled.rests
+    reach: Criterion = "any reach" if scenario.motion.locked_angle is None else "reach"
     return (
         ("RMS error", settled.rms_error, float(rms_error_limit(settled, switches))),
         ("mean error", mean, LARGEST_MEAN_SWITCHED * wanted if switches and settled.rests else math.inf),
-        (*deviation, float(deviation_limit(settled, switches))),
-        (*(("mean error", mean) if settled.rests else lack), LARGEST_SHARE * wanted),
+        ("swing" if settled.rests else "largest error", deviation, float(deviation_limit(settled, switches))),
+        (reach if is_cut else "mean error", beyond if is_cut else mean, LARGEST_SHARE * wanted),
     )
 
 

@@ -11,7 +11,7 @@ from ppafo.simulation.numbers import number_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation, small_valve
 from ppafo.simulation.tracking.load_causes import ONE_WAY, reach_at_samples, reach_text
-from ppafo.simulation.tracking.remedies import dead_band, level_text, quicker_loops, remedy, sized_valves
+from ppafo.simulation.tracking.remedies import dead_band, level_text, remedy, rescaled_gains, sized_valves
 from ppafo.simulation.tracking.rule import LEAST_PEAK_WALK
 
 _OFTEN = 0.1
@@ -90,7 +90,7 @@ def _dead_band_of_walk(case: Case) -> TrackingCause | None:
         return None
     text = f"the command stays within `valve.dead_band = {band:.2g}` for {100.0 * share:.0f} % of the time"
     advice = "use a valve without dead band, or a controller that compensates the dead band"
-    return TrackingCause(text, quicker_loops(scenario, case.law, (2.0, 4.0, 8.0)), advice)
+    return TrackingCause(text, rescaled_gains(scenario, case.law, (2.0, 4.0, 8.0)), advice)
 
 
 CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (

@@ -150,6 +150,16 @@ def test_without_a_reference_there_is_gas_and_no_error() -> None:
 FAST = ["controller.proportional_gain=60 1/(N m)", "controller.derivative_gain=0.05 s/(N m)", "valve.delay=5 ms"]
 
 
+def test_the_gains_of_each_configuration_stand_below_its_task() -> None:
+    given = compare(["torque-task-proportional", "torque-task-solenoid"])
+    text = str(given)
+    # The paper's gains, stated in the scenario; the solenoid pair switches and has no gain.
+    assert "torque-task-proportional: gains: proportional_gain 0.095 1/(N m), integral_gain 0.25 1/(N m s)" in text
+    assert "torque-task-solenoid: gains" not in text
+    faster = ppafo.load_scenario("torque-task-proportional", ["controller.proportional_gain=0.2 1/(N m)"])
+    assert "gains: proportional_gain 0.2 1/(N m)" in str(compare([faster, "torque-task-solenoid"]))
+
+
 def test_a_loop_that_oscillates_is_said_and_is_on_no_front() -> None:
     fast = ppafo.load_scenario("torque-task-proportional", FAST)
     given = {"paper": ppafo.load_scenario("torque-task-proportional"), "fast": fast}

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ppafo
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.gas_demand import largest_flow
 from ppafo.analyses.endurance.question import bottle as endurance
@@ -135,6 +136,17 @@ def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsy
     made = endurance(solenoid(), longest=5.0).found
     assert isinstance(made, Endurance)
     assert document["result"]["strides"] == pytest.approx(made.discharge.strides, rel=1e-6)
+
+
+def test_the_gas_on_a_bottle_differs_by_its_regulator_and_its_cold() -> None:
+    walked = ppafo.walk("solenoid", minutes=0.2)
+    draw = ppafo.bottle(walked, bottle="co2-16g").found.draw
+    assert "the device walks on the bottle: mean over its strides (0.678 g at constant set pressure; on" in draw.origin
+    # The regulator of that cartridge, and the mean temperature of its gas at the device, without any bottle.
+    causes = {"supply_line.plantarflexion.droop": "3e6 Pa s/kg", "gas.temperature": "11 degC"}
+    alone = ppafo.walk("solenoid", overrides=causes, minutes=0.2).metrics["gas"].value
+    assert alone == pytest.approx(draw.mass_per_stride, rel=0.01)
+    assert alone < 0.97 * walked.metrics["gas"].value
 
 
 def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

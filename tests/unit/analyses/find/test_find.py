@@ -16,6 +16,7 @@ from ppafo.analyses.find.question import find
 from ppafo.analyses.find.solve import ACCURACY
 from ppafo.cli.main import main
 from ppafo.errors import StudyError
+from ppafo.parameters.plant import plant_parameters
 from ppafo.progress import Progress
 from ppafo.report.finding import Finding
 from ppafo.simulation.tracking.settled import settled_task
@@ -280,7 +281,11 @@ def test_a_run_that_follows_is_a_condition_of_its_own(tmp_path: Path) -> None:
     at_limit = float(np.interp(1.0, np.asarray(errors)[::-1], np.asarray(pressures)[::-1]))
     assert at_limit == pytest.approx((found.value - 101325.0) / 6894.757, abs=0.01)
     assert axes.get_ylabel().replace("\n", " ") == "Tracking error over its limit"
-    assert any("may have the allowed error" in line for line in answer.said)
+    # Pressure above the atmosphere times one volume; it is said in the line of the value found, and nowhere else.
+    volume = plant_parameters(ppafo.load_scenario(TASK).device).torque_constant
+    most = (found.value - 101325.0) * volume
+    assert [line.endswith(f"the actuator gives at most {most:.3g} N m") for line in answer.said].count(True) == 1
+    assert all("actuator" not in line for line in answer.said[2:])
     with pytest.raises(
         StudyError, match="'follows' needs a reference, which scenario 'step-response' lacks; give a condition"
     ):

@@ -258,7 +258,6 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
         "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
         "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
-        f"Made with: ppafo design {problem.file}",
     )
     failed = sum(sizing.failures.values())
     most = f"; most often: {max(sizing.failures, key=sizing.failures.__getitem__)}" if failed else ""
@@ -279,6 +278,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                     *(f"{sized.valve.name}: {sized.remark}" for sized in sizing.valves if sized.remark),
                     *([noisy] if sizing.streams else []),
                     f"{sizing.runs:,} trial runs in {sizing.seconds:.0f} s, {failed:,} of them rejected{most}",
+                    f"made with: ppafo design {problem.file}",
                 )
             ),
             finding.Section(

@@ -97,8 +97,9 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         remarks.append(f"a{' lighter' * (bottle is not None)} bottle has enough gas, but gets too cold before the end")
     if lowest is not None and bottles[chosen] is None:
         largest = max(problem.bottles, key=lambda part: part.values["content"])
-        duration = f"{largest.name} lasts for {100.0 * largest.values['content'] / gas_in_all:.0f} % of the use"
-        remarks.append(f"no bottle is large enough: {duration}")
+        share = largest.values["content"] / gas_in_all
+        duration = f"lasts for {100.0 * share:.0f} % of the use, {share * problem.repetitions:.0f} repetitions"
+        remarks.append(f"no bottle is large enough: {largest.name} {duration}")
     gas_used = gas * problem.repetitions
     margins = None
     if lowest is not None:

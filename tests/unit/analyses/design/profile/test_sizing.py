@@ -226,10 +226,17 @@ def test_a_controller_without_gains_is_limited_by_the_control(folder: Path) -> N
 
 def test_use_that_no_bottle_lasts_for_is_no_suggestion(folder: Path) -> None:
     (folder / "long.toml").write_text(FILE.replace("repetitions = 100", "hours = 24"))
-    sized = design(folder / "long.toml").found
+    finding = design(folder / "long.toml")
+    sized, valve = finding.found, finding.found.valves[0]
     assert sized.choice is None
-    assert sized.valves[0].works
-    assert "no bottle is large enough: pipeline-jacpac-9oz lasts for" in sized.valves[0].remark
+    assert valve.works
+    assert "no bottle is large enough: pipeline-jacpac-9oz lasts for" in valve.remark
+    # 9 oz are 255 g.
+    repetitions = 0.255 / (valve.gas * (1.0 + sized.problem.reserve))
+    found = re.search(r"% of the use, (\d+) repetitions", valve.remark)
+    assert found is not None
+    assert int(found[1]) == pytest.approx(repetitions, rel=2e-3, abs=0.6)
+    assert f"made with: ppafo design {folder / 'long.toml'}" in str(finding)
 
 
 def test_the_lightest_bottle_that_holds_enough_is_chosen() -> None:
