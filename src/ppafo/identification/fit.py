@@ -31,7 +31,7 @@ from ppafo.signals.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Result of a fit in SI units, in the order of ``numbers``.
+    """Result of a fit in SI units, in the order of ``numbers``; a variable with a base includes its base here.
 
     ``numbers``: variables of the fit. ``values``: estimates. ``covariance``: their covariance. ``low``, ``high``: ends
     of the confidence intervals at ``confidence``. ``noise``: standard deviation by channel. ``correlation``: order of
@@ -160,10 +160,19 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     low, high = interval_ends(runs, point, linear, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
     is_free = ~_is_at_bound(runs, point, errors @ jacobian)
     conflict = conflict_of(runs, linear.rows, point, is_free, freedom) or too_smooth(linear.sensors)
+    for row, base in np.argwhere(runs.base).tolist():
+        correlation = covariance[row, base] / math.sqrt(covariance[row, row] * covariance[base, base])
+        for limits, sign in ((low, -1.0), (high, 1.0)):
+            own, below = limits[row] - point[row], limits[base] - point[base]
+            width = math.sqrt(max(own * own + below * below + 2.0 * correlation * own * below, 0.0))
+            limits[row] = point[row] + point[base] + sign * width
+        low[row] = max(low[row], low[base] + runs.low[row])
+    covariance = covariance + runs.base @ covariance + (covariance + runs.base @ covariance) @ runs.base.T
+    jacobian, point = jacobian - jacobian @ runs.base, point + runs.base @ point
     # Positive unknowns count relative to their estimates, because a start may be far off. After a conflict an estimate
     # may be far too large, so the start limits it.
     estimated = point if conflict is None else np.minimum(point, 1.0)
-    typical = np.where((runs.low > 0.0) & (runs.prior == 0.0), estimated, 1.0)
+    typical = np.where(((runs.low > 0.0) | runs.base.any(axis=1)) & (runs.prior == 0.0), estimated, 1.0)
     return Fit(
         numbers=runs.numbers,
         values=point * runs.scale,
@@ -183,7 +192,7 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         sensors=linear.sensors,
         jacobian=jacobian / runs.scale,
         confidence=confidence,
-        edge={} if math.isfinite(end.gain) else _edge(runs, point, end.step),
+        edge={} if math.isfinite(end.gain) else _edge(runs, end.point, end.step),
     )
 
 
@@ -358,7 +367,8 @@ def _likelihood(runs: FitRuns, fitted: Fit) -> float:
 def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:
     """Yield at most two scaled start points with a lower robust cost than the fit."""
     sought = ~(runs.prior > 0.0)
-    point = fitted.values / runs.scale
+    point, is_excess = fitted.values / runs.scale, runs.base.any(axis=1)
+    point = point - runs.base @ point
     low, high = np.maximum(runs.low, -1.0e3)[sought], np.minimum(runs.high, 1.0e3)[sought]
     is_ratio = (low > 0.0) & (high > 10.0 * low)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -366,9 +376,10 @@ def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:
     # A fixed seed gives the same result for the same recordings.
     drawn = qmc.Sobol(int(sought.sum()), seed=1).random(_OTHER_STARTS).T
     drawn = ends[0][:, None] + drawn * (ends[1] - ends[0])[:, None]
-    # The last column is the fitted point.
-    points = np.repeat(point[:, None], _OTHER_STARTS + 1, axis=1)
-    points[sought, :-1] = np.where(is_ratio[:, None], np.exp(np.where(is_ratio[:, None], drawn, 0.0)), drawn)
+    # The last column is the fitted point, before it the same without an excess, which may hide its base.
+    points = np.repeat(point[:, None], _OTHER_STARTS + 1 + int(is_excess.any()), axis=1)
+    points[sought, :_OTHER_STARTS] = np.where(is_ratio[:, None], np.exp(np.where(is_ratio[:, None], drawn, 0.0)), drawn)
+    points[is_excess, :-1] = 0.0
     noise = [np.full(block.rows.stop - block.rows.start, fitted.noise[block.channel]) for block in runs.blocks]
     residuals = runs.residuals_at_points(points)
     costs = np.sum(np.log1p(np.square(residuals / np.concatenate(noise)[:, None])), axis=0)

@@ -81,14 +81,16 @@ def _end(
     far, (squares, reached) = math.inf, straight
     if math.sqrt(max(squares - least, 0.0)) > _BENT * times:
         squares, reached = _least_along(runs, reached, number, linear)
-    for _ in range(_TRIES):
+    # At the bound of an excess the samples may say nothing of its size, which the straight line then overestimates.
+    is_excess = bool(runs.base[number].any())
+    for _ in range(2 * _TRIES if is_excess else _TRIES):
         # By how many standard errors priors and samples tell this point from the estimate.
         parted = math.sqrt(max(squares - least, 0.0))
         if parted * (_BENT if inner is point else 1.0) < times:
             inner, near = reached, parted
             if float(inner[number]) == bound:
                 return bound
-        elif inner is point:
+        elif inner is point and not is_excess:
             return float(reached[number])
         else:
             outer, far = reached, parted

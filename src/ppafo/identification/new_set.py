@@ -41,20 +41,27 @@ class NewSet:
 
 def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], valve: str | None = None) -> NewSet:
     """Return the set with every usable estimate written to its entry; later estimates override earlier ones."""
-    is_identified: dict[str, bool] = {}
+    used: dict[str, Estimate] = {}
     for estimate in estimates:
         find_effects([estimate.path])
         quantity = parameter_set.declarations().get(estimate.path)
         if quantity is not None and estimate.is_usable and is_within(estimate.value, quantity):
             parameter_set = _with_estimate(parameter_set, estimate, quantity)
-            is_identified[estimate.path] = estimate.is_identified
+            used[estimate.path] = estimate
+    static, dynamic = (used.get(f"friction.{kind}_torque") for kind in ("static", "dynamic"))
+    if static is not None and dynamic is not None and static.value >= dynamic.value:
+        # Rounded to the digits of its interval, static friction may be below dynamic friction.
+        entry, below = (parameter_set.numbers[item.path] for item in (static, dynamic))
+        if entry.unit == below.unit and entry.value < below.value:
+            higher = entry.model_copy(update={"value": below.value})
+            parameter_set = replace(parameter_set, numbers={**parameter_set.numbers, static.path: higher})
     problem = ""
     try:
         build_device(parameter_set, valve)
     except ParameterError as error:
         problem = str(error)
-    written = tuple(path for path, is_so in is_identified.items() if is_so)
-    fitted = tuple(path for path, is_so in is_identified.items() if not is_so)
+    written = tuple(path for path, estimate in used.items() if estimate.is_identified)
+    fitted = tuple(path for path, estimate in used.items() if not estimate.is_identified)
     return NewSet(parameter_set, written, fitted, problem)
 
 

@@ -13,7 +13,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError
 from ppafo.identification.procedures import ProcedureProblem
 from ppafo.identification.tolerances import BenchSection
-from ppafo.identification.trajectory.layout import TrajectorySection, refuse_removed
+from ppafo.identification.trajectory.layout import TrajectorySection
 from ppafo.parameters.parameter_set import Citation
 from ppafo.storage.column_map import ColumnMap
 from ppafo.wording import known_names
@@ -62,9 +62,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
 
     Raises IdentificationError for an invalid file.
     """
-    document = _FILE.parse(content, file)
-    refuse_removed(document, file)
-    problem = validate(ProblemFile, document, file, IdentificationError)
+    problem = validate(ProblemFile, _FILE.parse(content, file), file, IdentificationError)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]; give at least one")

@@ -32,7 +32,8 @@ class FitVariable:
     """Variable of a fit: start, bounds and typical magnitude ``scale``, in SI units.
 
     ``deviation`` is the standard deviation of its prior about the start: infinite for an unknown, finite for a
-    tolerance. Tolerances of one ``family``, such as the friction in each recording, are tested together.
+    tolerance. Tolerances of one ``family``, such as the friction in each recording, are tested together. With a
+    ``base``, the name of another variable of the same scale, start and bounds are of the excess over that variable.
     """
 
     name: str
@@ -42,6 +43,7 @@ class FitVariable:
     scale: float
     deviation: float = math.inf
     family: str = ""
+    base: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,7 @@ class FitRuns:
 
     ``start`` is also the mean of the priors, ``prior`` the reciprocal of their standard deviations, 0 for an unknown;
     both are scaled. ``steps`` are the lengths of finite differences [-], which ``adapt_steps`` changes.
+    ``base @ point`` has the scaled values over which variables with a base are counted, 0 for the others.
     """
 
     def __init__(
@@ -85,6 +88,7 @@ class FitRuns:
             for name in ("start", "low", "high", "deviation")
         )
         self.prior = 1.0 / deviation
+        self.base = np.array([[float(other.name == number.base) for other in numbers] for number in numbers])
         self.channels = tuple(dict.fromkeys(block.channel for block in blocks))
         self.steps = np.full(len(numbers), _LONGEST_STEP)
         self.evaluations = 0
@@ -93,7 +97,7 @@ class FitRuns:
     def residuals_at_points(self, points: Floats) -> Floats:
         """Return residuals [SI] (rows, points) at scaled points (numbers, points)."""
         self.evaluations += points.shape[1]
-        return self._residuals(points * self.scale[:, None])
+        return self._residuals((points + self.base @ points) * self.scale[:, None])
 
     def residuals_at(self, point: Floats) -> Floats:
         """Return residuals [SI] (rows,) at one scaled point; a repeated call does not run the model again."""

@@ -342,12 +342,8 @@ def test_the_published_schema_has_the_section() -> None:
         (f"[trajectory]\nexperiments = []\n{PARAMETERS}", "problem.toml: trajectory.experiments"),
         (
             FIT.replace("[trajectory]", "[trajectory]\nprofiles = ['foot_plate.inertia']"),
-            "problem.toml: trajectory: profiles: the table of the result has the intervals; omit this key",
+            "unknown key 'trajectory.profiles'; allowed here: parameters, experiments",
         ),
-        (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "loss: the first pass is always robust; omit"),
-        (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: parameters are scaled automatically; omit this key"),
-        (f"{FIT}{REPLAYED}held = '75 deg'\n", "trajectory: held: was renamed to locked; write locked = '75 deg'"),
-        (f"{FIT}[bench.can]\nsupply_pressure = ['20 psi_g', '90 psi_g']\n", "to rank in [[trajectory.candidates]]"),
     ],
 )
 def test_a_mistake_is_one_line_that_says_where(solve: Solve, text: str, message: str) -> None:

@@ -34,12 +34,12 @@ _AT_ONCE = 2.0
 """Duration near the end of a swing, relative to the last half of the swing [-], below which the vane did not rest."""
 
 _SWING_SECTION = (
-    'parameters = [{path = "friction.viscous_damping"}, {path = "friction.dynamic_torque", start = "0.01 N m"}, '
-    '{path = "friction.static_torque", start = "0.02 N m"}] and an experiment with '
-    f'channels = ["{ANGLE}"], initial_state = "recording", scenario = "step-response" and '
-    'overrides = ["motion.kind=free", "effects.joint_load.stiffness=... N m/rad", '
+    'trajectory = {parameters = [{path = "friction.viscous_damping"}, '
+    '{path = "friction.dynamic_torque", start = "0.01 N m"}, {path = "friction.static_torque", start = "0.01 N m"}], '
+    f'experiments = [{{label = "swing", channels = ["{ANGLE}"], initial_state = "recording", '
+    'scenario = "step-response", overrides = ["motion.kind=free", "effects.joint_load.stiffness=... N m/rad", '
     '"effects.joint_load.rest_angle=... deg", "controller.command=0", "initial.pressure_1=atmosphere", '
-    '"initial.pressure_2=atmosphere", "actuator.dead_volume_1=10 L", "actuator.dead_volume_2=10 L"]'
+    '"initial.pressure_2=atmosphere", "actuator.dead_volume_1=10 L", "actuator.dead_volume_2=10 L"], recording = '
 )
 """Fit of a swing on a spring, with chambers open to the atmosphere; with little friction the first run swings too."""
 
@@ -127,8 +127,9 @@ def _check_comes_to_rest(source: RecordingSource, time: Floats, angle: Floats, n
         if time[back[0]] - reached < _AT_ONCE * (reached - halfway):
             raise IdentificationError(
                 f"{source.name}: {PROCEDURE}: the vane turns back at {time[end]:.3g} s without coming to rest, so "
-                f"another torque acts, such as a spring or gravity; fit it in [trajectory] with {_SWING_SECTION} "
-                "(a load is known or a parameter); if a stop or a hand turned the vane, give an end before"
+                "another torque acts, such as a spring or gravity; instead of the procedure write above the tables of "
+                f'the problem file {_SWING_SECTION}"{source.name}"}}]}} (fill in the load; columns as in '
+                "the procedure); if a stop or a hand turned the vane, give an end before"
             )
 
 

@@ -11,6 +11,7 @@ With r the ratio of downstream to upstream pressure and k the heat capacity rati
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -229,6 +230,14 @@ def reported_parts(
     return [replace(size, size=alone.size), replace(gap, size=alone.beside)], Paths(size.path, beside=gap.path)
 
 
+def shown_flow(opening: Opening, paths: Paths, pressures: Mapping[str, Floats], at: Values) -> Floats:
+    """Return the flow meter reading [kg/s] through an opening at two shown pressures [Pa], by channel."""
+    first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
+    sizes = paths.sizes(at)
+    sizes = sizes._replace(beside=sizes.beside + at[APPARENT])
+    return read_flow(at, opening.gas, opening.flow(sizes, first, second))
+
+
 def solve_flow(
     opening: Opening,
     paths: Paths,
@@ -243,13 +252,6 @@ def solve_flow(
     """
     (first_name, shown_first), (second_name, shown_second) = pressures.items()
     flow = readings.measured
-
-    def law(at: Values) -> Floats:
-        first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
-        sizes = paths.sizes(at)
-        sizes = sizes._replace(beside=sizes.beside + at[APPARENT])
-        return read_flow(at, opening.gas, opening.flow(sizes, first, second))
-
     start, alone = opening.rough_sizes(shown_first, shown_second, flow)
     numbers = (
         *paths.sought(start, alone),
@@ -257,4 +259,4 @@ def solve_flow(
         # A gain that differs between small and large flows bends the curve of one opening as a gap beside it does.
         *(within(APPARENT, tolerances.gain_of("mass_flow") * alone.beside) if opening.law == "both" else ()),
     )
-    return solve(law, readings, numbers, confidence)
+    return solve(partial(shown_flow, opening, paths, pressures), readings, numbers, confidence)

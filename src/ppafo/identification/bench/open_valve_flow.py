@@ -7,6 +7,7 @@ functions and constants as in ``flow``. Temperature and law of the gas, and gain
 tolerances. Of ISO 6358, C is the choked flow, and b is observable only from both choked and subsonic flow.
 """
 
+from collections import defaultdict
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ from ppafo.identification.bench.flow import (
     Opening,
     orifice_shape,
     reported_parts,
+    shown_flow,
     solve_flow,
 )
 from ppafo.identification.bench.law import PooledReadings, recordings_of
@@ -116,7 +118,8 @@ def open_valve_flow(
     # Densely, so that the curve has no kinks at the readings; between them the upstream pressure is interpolated.
     dense, order = np.linspace(ratio.min(), ratio.max(), 200), np.argsort(ratio)
     first = np.interp(dense, ratio[order], upstream[order])
-    law_flow = opening.flow(paths.sizes({"": 0.0, **fitted.by_name}), first, dense * first)
+    shown = {"upstream_pressure": first, "downstream_pressure": dense * first}
+    law_flow = shown_flow(opening, paths, shown, defaultdict(float, fitted.by_name))
     curve = curve_mark(law, dense, _GRAMS_PER_BAR * law_flow / first)
     marks = readings_mark("measured", ratio, measured_ordinate), curve
     axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -114,6 +114,9 @@ class TrajectoryFit:
         return {estimate.path: estimate.value for estimate in self.estimates}
 
 
+_STATIC, _DYNAMIC = "friction.static_torque", "friction.dynamic_torque"
+
+
 def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> TrajectoryFit:
     """Fit the parameters of a problem to its recordings; each estimate has an interval [SI] and a verdict.
 
@@ -122,6 +125,14 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     numbers = numbers_of(problem)
     free = [number.free for number in numbers]
     start = np.array([number.start for number in free])
+    rows = {(item.path, item.recordings): row for row, item in enumerate(numbers) if not item.is_tolerance}
+    for (path, labels), row in rows.items():
+        dynamic, given = rows.get((_DYNAMIC, labels)), problem.parameters[row]
+        is_free = given.low is None and given.high is None and math.isinf(given.deviation)
+        if path == _STATIC and dynamic is not None and is_free:
+            # Friction at rest is at least friction in motion, so that the excess is sought.
+            base, excess = free[dynamic], max(free[row].start - free[dynamic].start, 0.0)
+            free[row] = replace(free[row], start=excess, low=0.0, scale=base.scale, base=base.name)
     runs = []
     for experiment in problem.experiments:
         reach = reach_of([number for number in numbers if number.acts_in(experiment.label)])
@@ -275,13 +286,18 @@ _OWN_SHARE = 0.2
 """Weight in an undetermined combination [-] from which a parameter itself counts as not identifiable."""
 _AT_BOUND = 1.0e-6
 """Relative distance from a bound [-] up to which an estimate counts as at its bound."""
+_NEAR = 1.0e-3
+"""Same distance, as a fraction of the width of the interval [-]."""
 
 
 def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: int, conflict: str) -> Estimate:
     """Return the estimate of one parameter with its verdict and explanation."""
     value, low, high = (float(column[row]) for column in (fitted.values, fitted.low, fitted.high))
-    name, free = number.free.name, number.free
-    bound = next((end for end in (free.low, free.high) if abs(value - end) <= _AT_BOUND * abs(end or 1.0)), None)
+    name, free = number.free.name, fitted.numbers[row]
+    bounds = [fitted.by_name.get(free.base, 0.0) + end for end in (free.low, free.high)]
+    bound = next(
+        (end for end in bounds if abs(value - end) <= max(_AT_BOUND * abs(end or 1.0), _NEAR * (high - low))), None
+    )
     combination = next((weights for weights in fitted.unidentified if abs(weights.get(name, 0.0)) >= _OWN_SHARE), None)
     verdict: Verdict = "identified"
     # Of a quantity of either sign, such as the zero of a sensor, the value may be zero.
@@ -290,13 +306,13 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
     if combination is not None:
         verdict = "not identifiable"
         # So far from where it was linearised the interval of a straight line means nothing.
-        low, high = min(low, free.low), max(high, free.high)
+        low, high = min(low, bounds[0]), max(high, bounds[1])
         others = [other for other in combination if other != name]
         text = f"trades off against {' and '.join(others)}; {remedy}"
         if not others:
             # Where the model lacks something, that may be what moves a number so far from its start.
             text = conflict or f"the recordings are hardly sensitive to this parameter; {remedy}"
-    elif bound is not None:
+    elif bound is not None and not free.base:
         end, unit = in_shown_unit(bound, number.unit)
         verdict, text = "at its bound", f"the recordings favour a value at or beyond {end:.6g} {unit}".rstrip(" -")
     elif relative_half_width(value, low, high, size) >= UNKNOWN:
@@ -307,6 +323,14 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
         verdict, text = "holds for this model only", conflict
     else:
         text = widened_by(fitted, name)
+        cut = [
+            bound for bound, end in zip(bounds, (low, high), strict=True) if abs(end - bound) <= _AT_BOUND * abs(end)
+        ]
+        if free.base and low <= bounds[0]:
+            text += f"; the interval contains its bound, {free.base}"
+        elif cut:
+            end, unit = in_shown_unit(cut[0], number.unit)
+            text += f"; the interval ends at its bound, {end:.4g} {unit}".rstrip(" -")
     recordings = tuple(
         experiment.source or experiment.recording.label
         for experiment in problem.experiments

@@ -1,13 +1,11 @@
 """Layout of the section [trajectory] of a problem file: quantities as text with units, files by name."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.documents.problems import NAME
-from ppafo.errors import IdentificationError
 from ppafo.identification.keys import Columns, Confidence
 from ppafo.identification.trajectory.experiment import ALL_INPUTS
 
@@ -92,28 +90,3 @@ class TrajectorySection(StrictTable):
     candidates: tuple[CandidateSection, ...] = Field(
         (), strict=False, description="experiments to rank by the information that they would bring"
     )
-
-
-_REMOVED = {
-    "loss": "the first pass is always robust; omit this key",
-    "other_starts": "other starts are tried if the first does not explain the recordings; omit this key",
-    "seed": "the fit uses no random numbers; omit this key",
-    "directions": "recordings that disagree are found automatically; omit this key",
-    "profiles": "the table of the result has the intervals; omit this key",
-    "scale": "parameters are scaled automatically; omit this key",
-    "held": "was renamed to locked; write locked = '75 deg'",
-}
-
-
-def refuse_removed(document: Mapping[str, Any], file: str) -> None:
-    """Raise IdentificationError for keys of earlier versions, naming the replacement."""
-    section, bench = document.get("trajectory"), document.get("bench")
-    if isinstance(bench, dict) and "can" in bench:
-        raise IdentificationError(
-            f"{file}: bench.can is not supported; list the experiments to rank in [[trajectory.candidates]]"
-        )
-    lists = [section.get(name) for name in ("parameters", "experiments")] if isinstance(section, dict) else []
-    tables = [section, *(table for tables in lists if isinstance(tables, list) for table in tables)]
-    for key, instead in _REMOVED.items():
-        if any(isinstance(table, dict) and key in table for table in tables):
-            raise IdentificationError(f"{file}: trajectory: {key}: {instead}")

@@ -90,10 +90,6 @@ def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
     )
 
 
-_ABOVE_DYNAMIC = 1.1
-"""Static friction over fitted dynamic friction [-] that is proposed as a lower bound: beyond the change of a refit."""
-
-
 def broken_rule(device: Device) -> str:
     """Return a sentence on a rule that the parameters of a device violate; empty for a valid device."""
     dynamic, static = device.friction.dynamic_torque, device.friction.static_torque
@@ -101,7 +97,7 @@ def broken_rule(device: Device) -> str:
         return (
             f"friction.dynamic_torque was fitted to {dynamic:.3g} N m, above friction.static_torque of "
             f"{static:.3g} N m (fitted, or moved within its tolerance); let the section fit both, "
-            f"friction.static_torque with low = '{_ABOVE_DYNAMIC * dynamic:.3g} N m'"
+            "friction.static_torque without low, high and prior"
         )
     if device.actuator.angle_min >= device.actuator.angle_max:
         return "actuator.angle_min was fitted above actuator.angle_max"

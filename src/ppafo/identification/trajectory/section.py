@@ -115,12 +115,8 @@ def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExpe
     if entry.scenario is None:
         scenario, start, inputs = _replay(entry, source.recording, context, where)
     else:
-        for name in ("locked", "volume"):
-            if getattr(entry, name) is not None:
-                raise IdentificationError(
-                    f"{where}: {name} cannot be combined with a scenario, which prescribes the motion of the "
-                    "vane; omit one of them"
-                )
+        reason = "cannot be combined with a scenario, which prescribes the motion of the vane; omit one of them"
+        refuse_first(where, *((getattr(entry, name) is not None, f"{name} {reason}") for name in ("locked", "volume")))
         scenario = _scenario(entry.scenario, entry.overrides, context)
         start, inputs = quantity_in(entry, "start", "s", where) or 0.0, entry.inputs or ()
     channels = entry.channels

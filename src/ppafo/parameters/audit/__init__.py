@@ -91,8 +91,6 @@ def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> li
             id="idle-acceptance",
             severity="warning",
             title=f"the set accepts '{name}', which does not exist",
-            values=(),
-            sides=(),
             paragraph=f"There is no finding '{name}'. Remove the entry from the set; its reason is: {why}",
         )
         for name, why in idle.items()

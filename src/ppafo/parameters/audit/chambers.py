@@ -119,7 +119,6 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
     end = evidence.in_set_unit(end_path, evidence.number(end_path) or 0.0)
     yield AuditFinding(
         id=f"volume-{chamber}",
-        severity="error",
         title=f"volume of chamber {chamber} is not positive over the range of angles",
         values=evidence.values_of(_SLOPE, stop_path, dead_path, end_path),
         sides=(
@@ -255,7 +254,6 @@ def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
             id="rounded-table",
             severity="note",
             title="the measured volumes are rounded",
-            values=(),
             sides=(ComparedNumber("largest move", moved, "m^3"), ComparedNumber("last digit", digit, "m^3")),
             paragraph=(
                 f"Between the angles of {parameter_set.actuator_file} the interpolated volumes would be negative or "

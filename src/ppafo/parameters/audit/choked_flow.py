@@ -75,7 +75,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
     title = "the reported exponent in C1 is not the exponent of choked flow"
     if exponent is None:
         text = f"The formula '{formula}' is not an arithmetic expression in k; the correct exponent is (k + 1)/(k - 1)."
-        yield AuditFinding("choked-flow-exponent", "warning", title, values, (), text)
+        yield AuditFinding(id="choked-flow-exponent", severity="warning", title=title, values=values, paragraph=text)
         return
     # C1 contains the square root of the power, hence half the difference of the exponents.
     literal = correct * (2.0 / (k + 1.0)) ** (0.5 * (exponent - expected))
@@ -85,7 +85,6 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
         agreement = f", and the reported C1 of {reported:.4g} s/m is closer to the {nearer} value"
     yield AuditFinding(
         id="choked-flow-exponent",
-        severity="error",
         title=title,
         values=values,
         sides=(

@@ -42,7 +42,7 @@ class ComparedNumber:
     unit: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AuditFinding:
     """Finding of an audit: a contradiction (error), a caveat for users of results (warning), or a passed check (note).
 
@@ -51,10 +51,10 @@ class AuditFinding:
     """
 
     id: str
-    severity: Severity
+    severity: Severity = "error"
     title: str
-    values: tuple[NamedValue, ...]
-    sides: tuple[ComparedNumber, ...]
+    values: tuple[NamedValue, ...] = ()
+    sides: tuple[ComparedNumber, ...] = ()
     paragraph: str
     accepted: str = ""
 

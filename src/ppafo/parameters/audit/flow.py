@@ -35,7 +35,6 @@ def check_flow(evidence: Evidence) -> Iterator[AuditFinding]:
             pressure = evidence.in_set_unit(pressure_path, evidence.number(pressure_path) or 0.0)
             yield AuditFinding(
                 id=f"flow-of-{flow.name}",
-                severity="error",
                 title=f"the reported flow of valve '{flow.name}' does not follow from Cd A",
                 values=evidence.values_of(*_paths(flow.name)),
                 sides=(
@@ -88,7 +87,6 @@ def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> It
             continue
         yield AuditFinding(
             id=f"one-coefficient-{first.name}-{other.name}",
-            severity="error",
             title=f"the reported flows of '{first.name}' and '{other.name}' contradict their common Cd",
             values=evidence.values_of(*_paths(first.name)[:3], *_paths(other.name)[:3]),
             sides=(
@@ -126,7 +124,6 @@ def check_sonic_flow(evidence: Evidence) -> Iterator[AuditFinding]:
         predicted, consistent = conductance * per_size, measured / per_size
         yield AuditFinding(
             id=f"flow-of-{name}",
-            severity="error",
             title=f"the reported flow of valve '{name}' does not follow from its sonic conductance",
             values=evidence.values_of(*paths),
             sides=(

@@ -36,7 +36,6 @@ def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
         ratio, unit = evidence.values_of(rate_path)[0], evidence.declared[product].unit
         yield AuditFinding(
             id=f"{name.replace(' ', '-')}-against-inertia",
-            severity="error",
             title=f"{name} is not the product of inertia and the reported ratio",
             values=evidence.values_of(product, _INERTIA, rate_path),
             sides=(

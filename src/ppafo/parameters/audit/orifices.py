@@ -38,10 +38,8 @@ def check_orifices(evidence: Evidence) -> Iterator[AuditFinding]:
         if names:
             yield AuditFinding(
                 id=f"forms-of-{section.rpartition('.')[2]}",
-                severity="error",
                 title=f"{section} is given in two forms",
                 values=evidence.values_of(*(f"{section}.{name}" for name in names)),
-                sides=(),
                 paragraph=(
                     f"{section} has {', '.join(names)}, which specify one orifice twice, so no device can be built. "
                     "Give area and discharge_coefficient alone, or sonic_conductance and critical_ratio alone."

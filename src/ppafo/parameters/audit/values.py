@@ -32,10 +32,8 @@ def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
         stated_number = f"{number:g} {unit}".rstrip() if identifier in stated else "no number of that name"
         yield AuditFinding(
             id=f"{path.replace('.', '-').replace('_', '-')}-against-statement",
-            severity="error",
             title=f"{path} differs from the statement '{entry.key}'",
             values=evidence.values_of(path),
-            sides=(),
             paragraph=(
                 f"{path} is {number_text(entry)} and refers to '{entry.key}', which has {stated_number}. Give that "
                 "number, or the key of another statement ('ppafo reproduce --list'); for a value of another origin, "
@@ -59,11 +57,13 @@ def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
     return numbers
 
 
-# Does a device lack a value?
+# Does a device lack a value, or count as ideal without one?
+
+_SWITCHING = ("closing_delay", "switching_interval")
 
 
 def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a warning on values that a device lacks, unless the set names a completed set."""
+    """Yield a warning on values that a device lacks, unless the set names a completed set, and on ideal valves."""
     parameter_set = evidence.parameter_set
     if parameter_set.completed_by:
         return
@@ -79,11 +79,22 @@ def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
             id="missing-values",
             severity="warning",
             title=f"incomplete device: {count_of(len(paths), 'value')} {are} missing",
-            values=(),
-            sides=(),
             paragraph=(
                 f"Missing for a device: {', '.join(paths)}. Add {them} to the file or as overrides. "
                 "Checks that need missing values were skipped."
+            ),
+        )
+    ideal = [name for name in parameter_set.valve_kinds if f"valves.{name}.opening_delay" in evidence.declared]
+    ideal = [name for name in ideal if f"valves.{name}.opening_delay" not in parameter_set.numbers]
+    if ideal and not missing:
+        yield AuditFinding(
+            id="ideal-opening",
+            severity="warning",
+            title=f"{', '.join(ideal)}: no opening_delay, so that a coil opens its valve at once",
+            values=evidence.values_of(*(f"valves.{name}.{key}" for name in ideal for key in _SWITCHING)),
+            paragraph=(
+                f"Without valves.{ideal[0]}.opening_delay gas flows as soon as the coil has current, and the dead time "
+                "of a loop counts closing_delay and switching_interval alone. Give the switch-on time."
             ),
         )
 
@@ -102,10 +113,8 @@ def check_contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
     for line, paths in found.items():
         yield AuditFinding(
             id=paths[0].replace(".", "-").replace("_", "-"),
-            severity="error",
             title="contradictory values prevent a run",
             values=evidence.values_of(*paths),
-            sides=(),
             paragraph=f"No run is possible: {line}.",
         )
 
@@ -134,7 +143,6 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
         name = path.rpartition(".")[2].replace("_", "-")
         yield AuditFinding(
             id=f"{name}-upside-down",
-            severity="error",
             title=f"{path} is inverted: its unit belongs to the reciprocal",
             values=evidence.values_of(path),
             sides=(
@@ -156,7 +164,6 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
         )
         yield AuditFinding(
             id="dimensions",
-            severity="error",
             title="values with a unit that does not fit the equation",
             values=evidence.values_of(*foreign),
             sides=tuple(ComparedNumber(path, evidence.number(path) or 0.0, "as given, base units") for path in foreign),
@@ -178,7 +185,6 @@ def check_ranges(evidence: Evidence) -> Iterator[AuditFinding]:
             continue
         yield AuditFinding(
             id=f"range-of-{path.replace('.', '-').replace('_', '-')}",
-            severity="error",
             title=f"{path} is out of range",
             values=evidence.values_of(path),
             sides=(
@@ -210,10 +216,8 @@ def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
     if species is None:
         yield AuditFinding(
             id="gas-species",
-            severity="error",
             title=f"no data for the gas '{name}'",
             values=evidence.values_of("gas.species"),
-            sides=(),
             paragraph=f"The gas '{name}' is unknown; available: {', '.join(SPECIES)}.",
         )
         return
@@ -224,7 +228,6 @@ def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
             unit = evidence.declared[path].unit
             yield AuditFinding(
                 id=path.replace(".", "-").replace("_", "-"),
-                severity="error",
                 title=f"{path} does not belong to the named gas",
                 values=evidence.values_of("gas.species", path),
                 sides=(ComparedNumber("in the set", value, unit), ComparedNumber("of the gas", expected, unit)),

@@ -78,6 +78,20 @@ def test_flow_of_the_standard_gives_back_its_two_numbers_and_an_orifice_law_hold
     assert wrong.estimates[0].verdict == "holds for this model only"
 
 
+def test_the_drawn_curve_has_the_zero_of_the_meter_as_the_residuals_have() -> None:
+    source = planted.flow()
+    upstream, downstream = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
+    flow = 7.0e-9 * planted.CO2.flow_per_sonic_conductance * iso6358_shape(upstream, downstream, 0.2)
+    shown = changed(source, "mass_flow", flow + 0.04 * flow.max())
+    tolerances = Tolerances(gas_temperature=0.0, gas_law=0.0, zero_of_pressure=0.0, gain=0.0)
+    result = open_valve_flow((shown,), planted.CO2, law="iso6358", path="valves.main", tolerances=tolerances)
+    curve = next(mark for mark in result.panels[0].marks if mark.label == "iso6358")
+    order = np.argsort(downstream / upstream)
+    first = np.interp(curve.x, (downstream / upstream)[order], upstream[order])
+    law = 7.0e-9 * planted.CO2.flow_per_sonic_conductance * iso6358_shape(first, curve.x * first, 0.2)
+    assert np.allclose(curve.y, 1.0e8 * (law + 0.04 * flow.max()) / first, rtol=2e-3)
+
+
 def test_a_laminar_valve_gives_back_its_coefficient() -> None:
     source = planted.flow()
     pressures = source.recording["upstream_pressure"], source.recording["downstream_pressure"]

@@ -155,6 +155,15 @@ def test_a_value_that_no_device_can_have_is_an_error() -> None:
     assert "must lie between 0 and 1" in finding.paragraph
 
 
+def test_a_solenoid_without_an_opening_delay_is_named_and_one_with_it_is_not() -> None:
+    finding = findings()["ideal-opening"]
+    assert finding.severity == "warning"
+    assert finding.title == "solenoid, solenoid_recycling: no opening_delay, so that a coil opens its valve at once"
+    delays = [f"valves.{name}.opening_delay=9 ms" for name in ("solenoid", "solenoid_recycling")]
+    assert "ideal-opening" in findings(delays[0])
+    assert "ideal-opening" not in findings(*delays)
+
+
 def test_a_set_with_almost_nothing_in_it_has_nothing_to_say_but_what_is_missing() -> None:
     [finding] = findings_of(replace(BASE, numbers={}, texts={}, accepted={}))
     assert (finding.id, finding.severity) == ("missing-values", "warning")
