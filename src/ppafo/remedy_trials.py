@@ -64,6 +64,8 @@ def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> "list[
     """Return cause, remedy and changed scenario for each remedy that can be applied, the most certain cause first."""
     causes = [(verdict.cause, remedy) for remedy in verdict.remedies]
     causes += [(other.text, remedy) for other in verdict.others for remedy in other.remedies]
+    # Without its file a scenario takes numbers alone, no other kinds.
+    causes = [(cause, remedy) for cause, remedy in causes if is_of_file or remedy.numbers]
     trials = []
     for cause, remedy in causes[:MOST_TRIED]:
         with contextlib.suppress(PpafoError):

@@ -81,7 +81,7 @@ def stepped(*overrides: str) -> Course:
         ports = solenoid_recycling.connect(plant, shown)
         joined = plant_with_joined_chambers(plant, solenoid_recycling.joined_opening(shown))
         flowing = sloped_flows(joined, *held_pressures(plant, held, state), *ports, single_port_flow_slopes)
-        begun = begin_still_gas(state, held, flowing, STEP)
+        begun = begin_still_gas(plant, state, held, flowing, STEP, parts=VANE_FUNCTIONS)
         passing = stage_flows(joined, begun.end_1, begun.end_2, *ports, single_port_flow)
         second = second_still_stage(begun, passing)
         state = with_gas(state, still_change(joined, begun, second, STEP))

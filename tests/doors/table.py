@@ -82,7 +82,14 @@ _LINES = (
     *("supply_line.dorsiflexion.largest_flow=1 g/s", "supply_line.dorsiflexion.volume=3 cm^3"),
 )
 _KNOTS = (
-    *("reference.period=0.2 s", "reference.value_01=0 N m", "reference.time_02=20 ms", "reference.value_02=3 N m"),
+    # Above this level a smooth curve through the knots leaves the range of a fixed-point converter.
+    *(
+        "reference.level=3 N m",
+        "reference.period=0.2 s",
+        "reference.value_01=0 N m",
+        "reference.time_02=20 ms",
+        "reference.value_02=3 N m",
+    ),
     *("reference.time_03=0.1 s", "reference.value_03=1 N m"),
 )
 

@@ -3,12 +3,12 @@
 import base64
 import html
 from collections.abc import Mapping
-from functools import cache, partial
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from ppafo.metrics import Metric
 from ppafo.report.display_units import metric_text, metric_words
-from ppafo.report.style import FONT_TYPES, render_figure
+from ppafo.report.style import render_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,17 +35,16 @@ def png_of(figure: "Figure") -> bytes:
 
 def shown(figure: "Figure") -> "Figure":
     """Return the figure, prepared for display in a notebook with or without a backend, and for publishers."""
-    vars(figure).update(_repr_png_=partial(png_of, figure))
-    _embed_truetype()
+    vars(figure).update(_repr_png_=partial(png_of, figure), savefig=partial(_save, figure))
     return figure
 
 
-@cache
-def _embed_truetype() -> None:
-    """Make TrueType the font type of saved figures, once: many publishers refuse Type 3, Matplotlib's default.
+def _save(figure: "Figure", *arguments: Any, **options: Any) -> None:
+    """Save a figure as ``Figure.savefig`` does, with TrueType fonts: many publishers refuse Type 3 fonts.
 
-    Matplotlib reads the font type where a figure is saved; a font type that is set later remains.
+    The settings of Matplotlib, which other figures of the caller share, remain as they are.
     """
     import matplotlib
 
-    matplotlib.rcParams.update(FONT_TYPES)
+    with matplotlib.rc_context({"pdf.fonttype": 42, "ps.fonttype": 42}):
+        type(figure).savefig(figure, *arguments, **options)

@@ -75,8 +75,6 @@ def look_of_valve(kind: str) -> DrawingStyle:
 
 RESOLUTION = 150
 """Resolution of a PNG file [dots per inch]."""
-FONT_TYPES: Any = MappingProxyType({"pdf.fonttype": 42, "ps.fonttype": 42})
-"""TrueType fonts: many publishers refuse the Type 3 fonts that Matplotlib embeds by default."""
 _SETTINGS: Any = MappingProxyType(
     {
         "font.family": "sans-serif",
@@ -107,8 +105,9 @@ _SETTINGS: Any = MappingProxyType(
         "savefig.dpi": RESOLUTION,
         # Letters as outlines, as a page fetches no font; ids that are the same every time.
         "svg.fonttype": "path",
+        # TrueType: many publishers refuse the Type 3 fonts that Matplotlib embeds by default.
+        "pdf.fonttype": 42,
         "svg.hashsalt": "ppafo",
-        **FONT_TYPES,
     }
 )
 

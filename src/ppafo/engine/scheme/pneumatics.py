@@ -276,16 +276,22 @@ def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: 
     )
 
 
-def begin_still_gas(state: PlantState, held: HeldChambers, flowing: SlopedFlows, step: float) -> StillGas:
+def begin_still_gas(
+    plant: PlantParameters,
+    state: PlantState,
+    held: HeldChambers,
+    flowing: SlopedFlows,
+    step: float,
+    *,
+    parts: ActuatorFunctions,
+) -> StillGas:
     """First stage of one step [s] with a vane at rest."""
     linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
     first = solve_stage(linear, flows)
-    return StillGas(
-        linear=linear,
-        first=first,
-        end_1=(state.mass_1 + step * first.mass_1) * held.per_mass_1,
-        end_2=(state.mass_2 + step * first.mass_2) * held.per_mass_2,
-    )
+    # Pressures as in a step with moving volumes: a locked joint has the bits of an exported plant at rest.
+    ended = state._replace(mass_1=state.mass_1 + step * first.mass_1, mass_2=state.mass_2 + step * first.mass_2)
+    end_1, end_2 = parts.held_pressures(plant, held, ended)
+    return StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2)
 
 
 def begin_moving_gas(

@@ -25,19 +25,19 @@ def groups(parts: Program) -> Groups:
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     """Set the first stage of the step for fixed volumes, or for volumes that change up to ``next_angle`` [rad]."""
+    functions = parts.functions
     if parts.keeps_volumes:
-        lane.still_gas = pneumatics.begin_still_gas(lane.state, lane.held, lane.flowing, length)
+        lane.still_gas = pneumatics.begin_still_gas(
+            lane.plant, lane.state, lane.held, lane.flowing, length, parts=functions
+        )
     elif parts.has_vane:
-        functions = parts.functions
         is_held = parts.hands_chambers_on
         held = lane.held if is_held else pneumatics.held_chambers(lane.plant, lane.state.angle, parts=functions)
         lane.moving_gas = pneumatics.begin_moving_gas(
             lane.plant, lane.state, held, next_angle, lane.flowing, length, parts=functions
         )
     else:
-        lane.moving_gas = begin_shaped_gas(
-            lane.plant, lane.state, next_angle, lane.flowing, length, parts=parts.functions
-        )
+        lane.moving_gas = begin_shaped_gas(lane.plant, lane.state, next_angle, lane.flowing, length, parts=functions)
 
 
 def moving(parts: Program, lane: Lane) -> MovingGas:
