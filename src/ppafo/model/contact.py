@@ -95,12 +95,7 @@ def landing(
     # What the angle has over what the new contact prescribes fades from there, so that the ankle does not jump.
     difference = angle - (now.ankle if keeps_gait > 0.5 else flat_angle) if falls_flat else offset
     difference = angle - now.ankle if rises else difference
-    return Landing(
-        contact=after,
-        offset=difference,
-        strikes=1.0 if strikes else 0.0,
-        leaves=1.0 if leaves else 0.0,
-    )
+    return Landing(contact=after, offset=difference, strikes=1.0 if strikes else 0.0, leaves=1.0 if leaves else 0.0)
 
 
 SETTLES = 3.0

@@ -110,13 +110,7 @@ def step_lines(
     # What the second regulator passes leaves the first line.
     left = taken_1 + passed_2
     passed_1 = regulated_mass(
-        set_1 - pressure_1,
-        left * per_mass_1,
-        per_mass_1,
-        lines.droop_1,
-        lines.largest_flow_1,
-        lines.relieving,
-        step,
+        set_1 - pressure_1, left * per_mass_1, per_mass_1, lines.droop_1, lines.largest_flow_1, lines.relieving, step
     )
     after = LineState(
         state.mass_1 + passed_1 - left, state.mass_2 + passed_2 - taken_2, state.regulated_mass + passed_1

@@ -12,12 +12,7 @@ SHUT_OFF = (
     Quantity("discharge_coefficient", "1", "discharge coefficient of the shut-off valve", 0.7, 0.01, 1.0),
     Quantity("delay", "s", "time from the alarm until the line is vented", 0.02, 0.0, 1.0),
     Quantity(
-        "silence",
-        "s",
-        "watchdog: a controller that is silent for longer shuts the valve permanently",
-        0.01,
-        0.0,
-        1.0e9,
+        "silence", "s", "watchdog: a controller that is silent for longer shuts the valve permanently", 0.01, 0.0, 1.0e9
     ),
     Quantity("mass", "kg", "mass of the shut-off valve", 0.06, 0.0, 1.0),
     Quantity(

@@ -163,7 +163,7 @@ class Correlation(StrictTable):
     """Correlation of two distributions: correlation coefficient of their normal scores (a Gaussian copula)."""
 
     between: Annotated[tuple[Text, Text], Field(strict=False, description="two paths that have distributions")]
-    coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
+    coefficient: Annotated[float, Field(ge=-1.0, le=1.0, description="1: both values at the same quantile")]
 
 
 class SamplingSection(StrictTable):

@@ -45,6 +45,8 @@ from ppafo.studies.varying import (
 from ppafo.units.shown import usual_unit
 from ppafo.wording import first_twice, nearest_name
 
+_CLOSEST = 1.0 - 1.0e-11
+"""Largest coefficient of a correlation matrix that is still positive definite; scores then differ by 5e-6."""
 STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / "library", StudyError)
 
 
@@ -250,8 +252,8 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
                 continue
             raise StudyError(
                 f"configuration '{section.name}': '{set_values[ignored]}' is set and '{entry.path}' is varied, so the "
-                "set value would be ignored; omit one of them, or restrict the [[vary]] to the other configurations "
-                "with 'only'"
+                "set value would be ignored; omit one of them (a nominal value may stand in the scenario file), or "
+                "restrict the [[vary]] to the other configurations with 'only'"
             )
 
 
@@ -353,7 +355,7 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Factor 
             raise StudyError(
                 f"correlations: between = ['{first}', '{other}'] must name two different paths, and each pair only once"
             )
-        coefficients[first, other] = pair.coefficient
+        coefficients[first, other] = min(max(pair.coefficient, -_CLOSEST), _CLOSEST)
     matrix = np.eye(len(paths))
     for (first, other), coefficient in coefficients.items():
         row, column = paths.index(first), paths.index(other)

@@ -254,11 +254,7 @@ def note_file(number: int) -> str:
 
 
 def _result(
-    study: Study,
-    part: Chunk,
-    values: dict[str, Floats],
-    threads: int | None,
-    count: Count = report_nothing,
+    study: Study, part: Chunk, values: dict[str, Floats], threads: int | None, count: Count = report_nothing
 ) -> EnsembleResult:
     """Return the results of a chunk with varied ``values`` [SI] by path; StudyError for a path that cannot vary."""
     configuration, outputs = study.configurations[part.configuration], study.outputs

@@ -108,3 +108,17 @@ def test_second_pressure_that_is_apart_stays_where_it_is() -> None:
 def test_line_of_the_readme_moves_both_chambers() -> None:
     supply = load_scenario("step-response", ["supply.pressure=70 psi_g"]).device.supply
     assert supply.dorsiflexion_pressure == supply.pressure > load_scenario("step-response").device.supply.pressure
+
+
+def test_a_correlation_of_1_varies_two_numbers_by_one_factor() -> None:
+    document = copy.deepcopy(STUDY)
+    ranges = {"friction.static_torque": ("0.7 N m", "1.3 N m"), "friction.dynamic_torque": ("0.56 N m", "1.04 N m")}
+    document["vary"] = [
+        {"path": path, "kind": "uniform", "minimum": low, "maximum": high} for path, (low, high) in ranges.items()
+    ]
+    document["correlations"] = [{"between": list(ranges), "coefficient": 1.0}]
+    loaded = load_study(document)
+    static, dynamic = drawn_values(loaded, np.arange(8)).values()
+    assert np.ptp(static) > 0.1
+    # 0.56 / 0.7 and 1.04 / 1.3.
+    assert dynamic / static == pytest.approx(np.full(8, 0.8), rel=1e-4)

@@ -142,18 +142,22 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
     # Verdicts have the number that decided, in a line of their own.
     number = of_condition.text(float(tried["metric"][index]))
     there = "" if outcome.verdicts else f": {condition.metric} is {number} there"
-    if any(is_refused for _, _, is_refused in outcome.verdicts):
-        lead = f"{path} = {kind.text(value)} is the {wanted} value that is not refused; it {meets}"
     if neighbour is None:
         return f"{lead}, at the end of the range{there}; a wider range may have a {further} value"
-    return f"{lead}{there} (bracketed to {kind.change(abs(value - neighbour), '.1g')})"
+    bracket, (reason, other) = f"(bracketed to {kind.change(abs(value - neighbour), '.1g')})", outcome.refusal
+    if reason:
+        end = kind.text(float(tried["value"][-1 if outcome.highest else 0]), ".9g")
+        add = f"; for {further} values, add {override_text([f'{other}={end}'])}" if other else ""
+        valid = f"it is the {wanted} valid value, not the limit of the condition {bracket}"
+        return f"{path} = {kind.text(value)} {meets}{follows}{there}; {valid}: {reason}{add}"
+    return f"{lead}{there} {bracket}"
 
 
 def _remarks(outcome: FindResult, kind: Kind, missed: int) -> Iterator[str]:
     """Yield remarks on runs, further intervals, noise, oscillation and failures."""
     condition, is_met, tried, runs = outcome.condition, outcome.is_met, outcome.tried, outcome.runs
     index, _ = outcome.found
-    yield from (f"at {kind.text(value, '.9g')} {said}" for value, said, _ in outcome.verdicts if said)
+    yield from (f"at {kind.text(value, '.9g')} {said}" for value, said in outcome.verdicts if said)
     yield from filter(None, [outcome.gains])
     evenly = np.count_nonzero(tried["is_of_grid"])
     met = np.count_nonzero(is_met)

@@ -1,5 +1,6 @@
 """Search for the lowest or highest value that meets a condition on a metric: grid, then bisection."""
 
+import contextlib
 import math
 import re
 from dataclasses import dataclass, replace
@@ -13,6 +14,7 @@ from ppafo.progress import Report
 from ppafo.running import simulate
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.gains import remark_on_following_gains
+from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remarks import standing_still
 from ppafo.studies.distributions import Floats
@@ -113,7 +115,8 @@ class FindResult:
     """Search result: tried values, ascending, as a structured array of ``TRIED``, and the counted ``runs``.
 
     ``gains`` is a remark on gains that follow the varied number. ``verdicts`` are values [SI] with the verdict of a run
-    of their own, for the condition that the run follows, and True for a refused value.
+    of their own, for the condition that the run follows. ``refusal`` is the reason why the outer neighbour of the value
+    found is no valid value, and the path of the number that allows it; "" for a valid neighbour.
     """
 
     scenario: str
@@ -124,7 +127,8 @@ class FindResult:
     runs: Runs
     tried: NDArray[np.void]
     gains: str = ""
-    verdicts: tuple[tuple[float, str, bool], ...] = ()
+    verdicts: tuple[tuple[float, str], ...] = ()
+    refusal: tuple[str, str] = ("", "")
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
@@ -232,21 +236,31 @@ def outermost(
             break
         search = search.with_values(base, np.linspace(value, neighbour, _PARTS + 1)[1:-1], seeds, False)
         index, neighbour = search.found
+    if neighbour is not None:
+        search = replace(search, refusal=_refusal(base, path, neighbour, high if highest else low))
     # With noise a single run does not represent the mean over the noise streams.
     if condition.text != FOLLOWS or seeds.size:
         return search
     # The value found and its outer neighbour, or else the nearest value.
     values = [search.nearest if index is None else float(search.tried["value"][index])]
-    values += [] if neighbour is None else [neighbour]
-    return replace(search, verdicts=tuple((value, *_verdict(base, f"{path.path}={value!r} {SI}")) for value in values))
+    values += [] if neighbour is None or any(search.refusal) else [neighbour]
+    verdicts = []
+    for value in values:
+        result = simulate(with_overrides(base, [f"{path.path}={value!r} {SI}"]))
+        said = result.following if result.tracking is None else result.tracking.found
+        verdicts.append((value, "; ".join(filter(None, (said, standing_still(result, result.tracking is None))))))
+    return replace(search, verdicts=tuple(verdicts))
 
 
-def _verdict(base: Scenario, override: str) -> tuple[str, bool]:
-    """Return the verdict on a run with an override, or the refusal of the value, and True for a refused value."""
+def _refusal(base: Scenario, path: VariedPath, value: float, end: float) -> tuple[str, str]:
+    """Reason why a value [SI] is refused, and path of the number that must be raised or lowered to ``end`` [SI] too."""
     try:
-        result = simulate(with_overrides(base, [override]))
+        with_overrides(base, [f"{path.path}={value!r} {SI}"])
     except (ParameterError, ScenarioError) as error:
-        return f"the value is refused: {error}", True
-    verdict = result.tracking
-    said = result.following if verdict is None else verdict.found
-    return "; ".join(filter(None, (said, standing_still(result, verdict is None)))), False
+        for other, quantity in declared_numbers(base).items():
+            if other != path.path and quantity.unit == path.quantity.unit and f" {other} = " in str(error):
+                with contextlib.suppress(ParameterError, ScenarioError):
+                    with_overrides(base, [f"{each}={end!r} {SI}" for each in (path.path, other)])
+                    return str(error), other
+        return str(error), ""
+    return "", ""

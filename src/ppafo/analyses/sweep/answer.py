@@ -118,10 +118,15 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
 
 def _useless_runs(results: StudyResults) -> list[str]:
     """Return sentences on failed runs, and by configuration on runs that oscillate or do not follow the reference."""
-    summary, runs = results.summary, results.document["runs"]
+    summary, runs, study = results.summary, results.document["runs"], results.document["study"]
+    # Two drawn numbers of which one limits the other.
+    reasons, fixed = [failure["reason"] for failure in summary["failures"][:1]], (None, "same_as", "grid", "list")
+    rows = [table["path"] for table in study.get("vary", ()) if table.get("kind") not in fixed]
+    both = [path for path in rows if any(f"{path} = " in reason for reason in reasons)]
+    tie = f"; to vary both by one factor, give proportional ranges, and [[correlations]] of {both} with coefficient = 1"
     sentences = [
         f"{runs - summary['completed']:,} of {runs:,} runs failed and have no metrics; the first is run "
-        f"{failure['run']}: {failure['reason']}"
+        f"{failure['run']}: {failure['reason']}{tie * (len(both) == 2 and not study.get('correlations'))}"
         for failure in summary["failures"][:1]
     ]
     flags = (

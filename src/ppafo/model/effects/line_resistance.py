@@ -27,11 +27,7 @@ def prepare(settings: LineSettings, device: Any) -> LineResistance:
     """Parameters of an orifice with the pressure drop of a line, for the gas of the device. Equation (6)."""
     area, gas = settings.area, device.gas
     conductance = area_conductance(
-        area,
-        settings.discharge_coefficient,
-        gas.heat_capacity_ratio,
-        gas.specific_gas_constant,
-        gas.temperature,
+        area, settings.discharge_coefficient, gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
     )
     # Without an area there is no line and no loss, and a conductance of 0 would divide by 0.
     return LineResistance(1.0 / (conductance * conductance) if area > 0.0 else 0.0)

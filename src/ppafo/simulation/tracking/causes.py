@@ -12,7 +12,7 @@ from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, error_functions
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
-from ppafo.simulation.numbers import declared_numbers, number_at
+from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause, only_opens_fully
 from ppafo.simulation.tracking.load_causes import (
@@ -328,8 +328,14 @@ def gains_of_another_device(case: Case) -> TrackingCause | None:
     default_gains = default_gain_remedies(case.scenario, case.law)
     if not default_gains:
         return None
-    # Without its integral a loop rests beside its reference with any gain.
-    others = () if case.oscillates else default_integral_remedy(case.scenario, case.law)
+    if case.oscillates:
+        # Where the default gains oscillate as well, or lag, gains of half or twice their speed may follow.
+        numbers = default_gains[-1].numbers
+        rescaled = rescaled_gains(with_numbers(case.scenario, numbers), case.law, (2.0, 0.5))
+        others = [remedy(case.scenario, {**numbers, **each.numbers}) for each in rescaled]
+    else:
+        # Without its integral a loop rests beside its reference with any gain.
+        others = default_integral_remedy(case.scenario, case.law)
     return TrackingCause("the gains do not suit this device", (*default_gains, *others))
 
 

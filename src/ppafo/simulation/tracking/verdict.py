@@ -171,7 +171,7 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         cause=cause.text,
         advice=cause.advice,
         remedies=cause.remedies,
-        others=tuple(other for other in others if other.remedies),
+        others=tuple(other for other in others if other.remedies and other.text != cause.text),
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
         at_rest=settled.rests,
         since=settled.start,

@@ -123,16 +123,32 @@ def test_runs_that_fail_count_as_not_met_and_are_said(of_curve: Callable[..., Fi
         of_curve(lambda p: np.full_like(p, np.nan))
 
 
-def test_a_neighbour_that_is_refused_is_said_beside_the_value_found() -> None:
-    # The set refuses a dynamic friction above the static one.
-    vary, changes = "friction.dynamic_torque=0.01..4 N m", ["supply.pressure=70 psi_g"]
-    task = "torque-task-proportional"
-    answer = find(task, vary=vary, such_that="follows", highest=True, grid=5, overrides=changes)
+@pytest.mark.parametrize("noise", ["0 psi_d", "0.01 psi_d"])
+def test_a_limit_of_valid_values_is_told_from_the_limit_of_the_condition(noise: str) -> None:
+    # The set refuses a dynamic friction above the static one, whose value is written in the set.
     static = ppafo.load_device("ppafo2011").friction.static_torque
+    vary, changes = (
+        "friction.dynamic_torque=0.01..4 N m",
+        ["supply.pressure=70 psi_g", f"sensors.pressure_noise={noise}"],
+    )
+    answer = find(TASK, vary=vary, such_that="follows", highest=True, grid=5, overrides=changes)
     assert answer.found.value == pytest.approx(static, rel=1e-3)
-    assert " is the highest value that is not refused; it lets the run follow its reference" in answer.said[0]
-    assert "the value is refused: " in answer.said[2]
-    assert "must be at most friction.static_torque" in answer.said[2]
+    assert "it is the highest valid value, not the limit of the condition" in answer.said[0]
+    assert "must be at most friction.static_torque = " in answer.said[0]
+    assert answer.said[0].endswith("; for higher values, add overrides=['friction.static_torque=4 N m']")
+    further = find(
+        TASK, vary=vary, such_that="follows", highest=True, grid=5, overrides=[*changes, "friction.static_torque=4 N m"]
+    )
+    assert further.found.value is not None
+    assert further.found.value > 1.01 * static
+
+
+def test_the_lower_end_of_valid_values_is_no_limit_of_a_metric() -> None:
+    dynamic = ppafo.load_device("ppafo2011").friction.dynamic_torque
+    answer = find(TASK, vary="friction.static_torque=0.01..4 N m", such_that="rms_error <= 1000 N m", grid=5)
+    assert answer.found.value == pytest.approx(dynamic, rel=1e-3)
+    assert "it is the lowest valid value, not the limit of the condition" in answer.said[0]
+    assert answer.said[0].endswith("; for lower values, add overrides=['friction.dynamic_torque=0.01 N m']")
 
 
 def test_the_lower_end_takes_the_unit_of_the_upper_one() -> None:
