@@ -158,7 +158,7 @@ def _remarks(outcome: FindResult, kind: Kind, missed: int) -> Iterator[str]:
     condition, is_met, tried, runs = outcome.condition, outcome.is_met, outcome.tried, outcome.runs
     index, _ = outcome.found
     yield from (f"at {kind.text(value, '.9g')} {said}" for value, said in outcome.verdicts if said)
-    yield from filter(None, [outcome.gains])
+    yield from filter(None, outcome.remarks)
     evenly = np.count_nonzero(tried["is_of_grid"])
     met = np.count_nonzero(is_met)
     where = "everywhere" if is_met.all() else f"at {met} of them" if met else "nowhere"

@@ -114,9 +114,10 @@ TRIED = np.dtype(
 class FindResult:
     """Search result: tried values, ascending, as a structured array of ``TRIED``, and the counted ``runs``.
 
-    ``gains`` is a remark on gains that follow the varied number. ``verdicts`` are values [SI] with the verdict of a run
-    of their own, for the condition that the run follows. ``refusal`` is the reason why the outer neighbour of the value
-    found is no valid value, and the path of the number that allows it; "" for a valid neighbour.
+    ``remarks`` are on gains that follow the varied number, and on values kept from another kind or set. ``verdicts``
+    are values [SI] with the verdict of a run of their own, for the condition that the run follows. ``refusal`` is the
+    reason why the outer neighbour of the value found is no valid value, and the path of the number that allows it; ""
+    for a valid neighbour.
     """
 
     scenario: str
@@ -126,7 +127,7 @@ class FindResult:
     noise_streams: int
     runs: Runs
     tried: NDArray[np.void]
-    gains: str = ""
+    remarks: tuple[str, ...] = ()
     verdicts: tuple[tuple[float, str], ...] = ()
     refusal: tuple[str, str] = ("", "")
 
@@ -216,8 +217,8 @@ def outermost(
     seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
     counter = RunCounter(grid * max(1, seeds.size), progress)
     runs = scenario_runs(base, with_companions([condition.metric], base), counter, (), threads)
-    gains = remark_on_following_gains(base, [path.path])
-    search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED), gains)
+    remarks = (remark_on_following_gains(base, [path.path]), base.origin.replaced)
+    search = FindResult(base.name, path, condition, highest, seeds.size, runs, np.empty(0, TRIED), remarks)
     search = search.with_values(base, np.linspace(low, high, grid), seeds, True)
     if not np.isfinite(search.tried["judged"]).any():
         ends = f"from {path.quote(low)} to {path.quote(high)}"

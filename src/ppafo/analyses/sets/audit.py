@@ -75,7 +75,7 @@ def audit(
 
     >>> import ppafo
     >>> [finding.id for finding in ppafo.audit("ppafo2011") if finding.severity == "warning"][:3]
-    ['flow-of-proportional', 'flow-of-solenoid', 'one-coefficient-proportional-solenoid']
+    ['ideal-opening', 'flow-of-proportional', 'flow-of-solenoid']
     """
     name_plugins(plugins)
     loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)

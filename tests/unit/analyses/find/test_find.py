@@ -328,3 +328,17 @@ def test_a_run_without_a_verdict_is_none_that_follows() -> None:
     assert answer.found.value == pytest.approx(1.0 / 3.0, rel=1e-3)
     assert "no verdict on the torque: " in answer.said[2]
     assert "0.5 periods of the reference" in answer.said[2]
+
+
+def test_a_gain_that_another_kind_of_controller_keeps_is_told_as_simulate_tells_it() -> None:
+    overrides = ["controller.kind=damped_proportional"]
+    answer = find(
+        "torque-task-proportional",
+        overrides=overrides,
+        vary="supply.pressure=50..60 psi_g",
+        such_that="follows",
+        grid=8,
+    )
+    kept = ppafo.load_scenario("torque-task-proportional", overrides).origin.replaced
+    assert kept.startswith("kept from pid for damped_proportional: controller.proportional_gain=")
+    assert kept in answer.found.remarks
