@@ -116,7 +116,7 @@ def _text(report: _RunReport) -> str:
 
     # The result's own text has a verdict whose remedies were not tried.
     scenario = report.result.scenario
-    # A warning before the run has told of the pair.
+    # The warning on a coarse pair was printed before the run.
     verdict = [said for said in report.verdict if said != coarse_pair(scenario)]
     head = [f"{scenario.name}: {report.result.status.kind}", *verdict, ""]
     exact = "" if report.error is None else report.error.sentence

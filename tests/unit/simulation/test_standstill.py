@@ -89,7 +89,9 @@ def test_a_free_joint_that_friction_holds_for_the_whole_run_is_said_to_stand_sti
     (said,) = held.warnings
     # The largest torque of the run, which is above the reference of 4 N m.
     most = level_text("N m", held.metrics["peak_torque"].value)
-    holds = f"the joint does not move: static friction of 20 N m holds it against at most {most} of actuator and load"
+    holds = (
+        f"the joint does not move: static friction of 20 N m exceeds the largest torque of actuator and load, {most}"
+    )
     assert said.startswith(f"{holds}; not tried: reduce ")
     # As advised: a locked joint is meant to stand still, and one with less friction moves.
     assert not simulate("torque-task-proportional", ["reference.level=4 N m"]).warnings
@@ -106,7 +108,7 @@ def test_friction_is_not_to_be_reduced_where_nothing_turns_the_joint_or_the_refe
     # The paper's actuator gives 5 N m; the reference, not the friction, is at fault.
     beyond = simulate("torque-task-proportional", [*HELD[:-1], friction, "reference.level=9 N m"])
     (still,) = [said for said in beyond.warnings if "does not move" in said]
-    assert still.endswith("static friction of 20 N m holds it against at most 5 N m of actuator and load")
+    assert still.endswith("static friction of 20 N m exceeds the largest torque of actuator and load, 5 N m")
     assert any("actuator gives at most 5 N m" in said for said in beyond.warnings)
 
 
@@ -115,7 +117,7 @@ def test_a_search_says_of_the_value_that_it_found_that_the_joint_stands_still_an
     found = ppafo.find(base, vary="friction.static_torque=10..20 N m", such_that="follows", highest=True, grid=3)
     assert found.found.value == pytest.approx(20.0)
     (at,) = [said for said in found.found.remarks if said.startswith("at 20 N m ")]
-    assert "; the joint does not move: static friction of 20 N m holds it" in at
+    assert "; the joint does not move: static friction of 20 N m exceeds " in at
     # The law of the torque knows nothing of the friction; the cascade of an angle does.
     assert "recomputed" not in str(found)
     learns = ppafo.find(

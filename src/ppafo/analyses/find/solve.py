@@ -259,7 +259,8 @@ def _refusal(base: Scenario, path: VariedPath, value: float, end: float) -> tupl
         with_overrides(base, [f"{path.path}={value!r} {SI}"])
     except (ParameterError, ScenarioError) as error:
         for other, quantity in declared_numbers(base).items():
-            if other != path.path and quantity.unit == path.quantity.unit and f" {other} = " in str(error):
+            # Only a number that limits this one makes the end of the range valid.
+            if other != path.path and quantity.unit == path.quantity.unit:
                 with contextlib.suppress(ParameterError, ScenarioError):
                     with_overrides(base, [f"{each}={end!r} {SI}" for each in (path.path, other)])
                     return str(error), other

@@ -57,11 +57,10 @@ def standing_still(result: "RecordedResult", follows: bool) -> str:
         float(scenario.device.friction.static_torque),
         float(np.abs(result.recording["torque"] - load).max()),
     )
-    holds = f"static friction of {level_text('N m', holding)} holds it against at most {level_text('N m', most)}"
-    remedy = f"; not tried: reduce `friction.static_torque`, or lock the joint ({LOCKED.text})"
-    text = f"the joint does not move: {holds} of actuator and load" + remedy * (
-        follows or scenario.controller.is_open_loop
-    )
+    exceeds = f"exceeds the largest torque of actuator and load, {level_text('N m', most)}"
+    text = f"the joint does not move: static friction of {level_text('N m', holding)} {exceeds}"
+    if follows or scenario.controller.is_open_loop:
+        text += f"; not tried: reduce `friction.static_torque`, or lock the joint ({LOCKED.text})"
     # A joint on which no torque acts is at rest without friction.
     return text if most > SMALLEST_MOVE * holding else ""
 
