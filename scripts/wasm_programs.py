@@ -33,7 +33,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from ppafo.engine.package_key import package_key
 from ppafo.exports.c_library import library_of
 from ppafo.loading import load_scenario
 from ppafo.page import wasm
@@ -91,7 +90,7 @@ def keys_of(names: Iterable[str]) -> dict[str, Any]:
     key = None
     for name in names:
         scenario = load_scenario(name)
-        key = package_key(scenario, wasm.WRITTEN_BY)
+        key = wasm.module_key(scenario)
         assert key is not None, f"{name} is made of functions of the package alone"
         library = library_of(scenario)
         composed = wasm.compose(library)

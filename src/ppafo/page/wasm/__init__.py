@@ -41,14 +41,14 @@ import json
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 from ppafo.engine.cache.texts import kept_bytes
-from ppafo.engine.package_key import COMPOSED, package_key
+from ppafo.engine.package_key import COMPOSED, Key, package_key
 from ppafo.errors import ProgramError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
@@ -98,7 +98,7 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
 
     C text and module are cached on disk.
     """
-    key = package_key(scenario, WRITTEN_BY)
+    key = module_key(scenario)
     # Stored digests of C texts, by scenario description and by outline, which are void after any change of code.
     keys, shipped = _shipped_keys(), dict[str, str]()
     if key is not None and key.files == keys["files"]:
@@ -113,6 +113,11 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
         return _PROGRAMS.joinpath(prebuilt).read_bytes()
     check_can_build()
     return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library, compose(library))))
+
+
+def module_key(scenario: Scenario) -> Key | None:
+    """Return the key of a scenario's module, the same for each duration; None if parts are not from the package."""
+    return package_key(replace(scenario, run=replace(scenario.run, duration=0.0)), WRITTEN_BY)
 
 
 @cache
