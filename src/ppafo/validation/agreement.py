@@ -183,8 +183,11 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
     if delay.is_at_limit:
         limit = settings.longest_delay
         remarks.append(f"model and measurement differ in time by more than {limit:g} s; no delay was removed")
-    if delay.correction < 0.0:
-        remarks.append("the delay is negative: the recorded signals lead the model; check the clock and the columns")
+    elif delay.value < 0.0:
+        remarks.append(
+            f"the recorded signals lead the model by {1.0e3 * -delay.value:.3g} ms; sensors lag, so this was not "
+            "removed: check the dynamics of the model (valve delay, friction, inertia), the clock and the columns"
+        )
     return RecordingAgreement(
         file=measured.file,
         sha256=measured.sha256,

@@ -108,8 +108,10 @@ _GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
 """Trial gains of a sensor [-]."""
 _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
 """Trial delays of a sensor relative to the other sensors [s]."""
-_LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
-"""Trial delays [s] of all sensors with respect to the command."""
+_LONG_DELAYS = (0.015, 0.03, 0.05, 0.08, 0.12)
+"""Trial delays [s] of all sensors with respect to the command, beyond the common delay that is removed."""
+_LEADS = (0.0005, 0.001, 0.003, 0.008, 0.015, 0.03, 0.05, 0.08, 0.12)
+"""Trial times [s] by which all sensors lead the command; none of it is removed."""
 _RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
 """Trial rates [-] of the clock of a recording."""
 
@@ -161,6 +163,13 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
         "all sensors seem to lag the command by {:.3g} ms",
         lambda delay: ModelChange(delay=delay),
         _LONG_DELAYS,
+        shown=1.0e3,
+    )
+    yield CandidateCause(
+        "lead of all sensors",
+        "all sensors seem to lead the command by {:.3g} ms",
+        lambda lead: ModelChange(delay=-lead),
+        _LEADS,
         shown=1.0e3,
     )
     yield CandidateCause(

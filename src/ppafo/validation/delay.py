@@ -49,15 +49,15 @@ class ComparedCurve:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """Delay of the measurement behind the model [s], 0 if undetectable, and flag for the search limit."""
+    """Delay of the measurement behind the model [s], below 0 if it leads, 0 if undetectable; flag of the limit."""
 
     value: float
     is_at_limit: bool
 
     @property
     def correction(self) -> float:
-        """Delay to correct [s]; 0 at the search limit, where the best fit is no longer a sensor delay."""
-        return 0.0 if self.is_at_limit else self.value
+        """Delay to correct [s]; 0 at the search limit and below 0, where the best fit is no delay of a sensor."""
+        return 0.0 if self.is_at_limit else max(self.value, 0.0)
 
 
 def estimate_delay(curves: list[ComparedCurve], limit: float) -> Delay:

@@ -5,6 +5,7 @@ samples, are fitted anew for every change.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -251,11 +252,23 @@ def _errors_from(
         readings = readings_of(record, replayed, change, delay)
         by_delay = [np.gradient(readings, axis=1)] if longest_delay > 0.0 else []
         errors = ((record.values - readings) * good).ravel()
-        if by_delay or record.starts:
-            columns = (np.stack([*by_delay, *record.starts]) * good).reshape(-1, good.size)
-            sizes = np.linalg.solve(columns @ columns.T + np.eye(len(columns)), columns @ errors)
-            errors = errors - sizes @ columns
+        columns = [(column * good).ravel() for column in (*by_delay, *record.starts)]
+        sizes = _ridge_fit(columns, errors)
+        if by_delay:
+            last, free = delay, delay - interval * float(sizes[0])
+            delay = min(max(free, 0.0), longest_delay)
+            if delay != free:
+                # At an end of its range the delay is known, and the initial values alone are fitted.
+                errors = errors - (last - delay) / interval * columns[0]
+                columns = columns[1:]
+                sizes = _ridge_fit(columns, errors)
+        errors = errors - sum(size * column for size, column in zip(sizes, columns, strict=True))
         if not by_delay:
             break
-        delay = min(max(delay - interval * float(sizes[0]), -longest_delay), longest_delay)
     return errors
+
+
+def _ridge_fit(columns: Sequence[Floats], errors: Floats) -> Floats:
+    """Return the coefficients of ``columns`` that fit ``errors``, each with a prior of 0 +- 1."""
+    matrix = np.reshape(columns, (len(columns), errors.size))
+    return np.asarray(np.linalg.solve(matrix @ matrix.T + np.eye(len(columns)), matrix @ errors))

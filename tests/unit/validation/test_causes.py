@@ -160,6 +160,15 @@ def test_a_number_of_the_set_is_named_with_those_that_do_the_same(bench: Recordi
     assert found.left**2 < 2.0
 
 
+def test_a_valve_of_the_model_that_is_too_slow_is_not_taken_out_as_sensors_that_are_early(bench: Recording) -> None:
+    slow = load_device("ppafo2011", overrides=[*SUPPLY, "valve.delay=8 ms"])
+    measured = check_recording(bench, slow, "r.csv")
+    assert not compare_recording(measured, slow, ReplaySettings()).passes
+    found = causes(bench, slow).found
+    assert found is not None
+    assert {"lead of all sensors", "valve.delay"} & {one.name for one in (found, *found.same)}
+
+
 def test_an_effect_is_named_where_no_number_does_the_same(bench: Recording) -> None:
     words = ["motion.kind=free", "run.duration=0.2 s", "effects.second_virial.share=1"]
     run = simulate(load_scenario("step-response", words)).recording

@@ -65,14 +65,16 @@ def test_recorded_commands_of_closed_loops_give_the_same_pressures_again(scenari
     assert max(shares(agreement).values()) < 1e-3
 
 
-def test_a_recording_that_leads_the_model_is_told_its_clock_and_columns_and_a_late_one_is_not(agree: Agree) -> None:
+def test_a_late_recording_is_shifted_and_one_that_leads_the_model_is_not(agree: Agree) -> None:
     task = load_scenario("torque-task-moving-ankle", ["run.duration=2 s"])
     recording = simulate(task).recording
-    said = "the delay is negative: the recorded signals lead the model; check the clock and the columns"
     for delay in (-0.004, 0.004):
         agreement = agree(late(recording, delay), task.device, motion="measured")
         assert agreement.delay.value == pytest.approx(delay, abs=5e-4)
-        assert (said in agreement.remarks) == (delay < 0.0)
+        assert agreement.delay.correction == max(agreement.delay.value, 0.0)
+        remark = next((remark for remark in agreement.remarks if "lead the model by" in remark), "")
+        assert ("check the dynamics of the model" in remark) is (delay < 0.0)
+        assert (agreement.channels[0].rms < 0.9 * agreement.channels[0].rms_unaligned) is (delay > 0.0)
 
 
 def test_a_changed_parameter_fails_and_its_channels_are_named(step: Step, agree: Agree) -> None:
