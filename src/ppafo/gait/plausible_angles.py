@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import Gait
 from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride, SignSource, other_sign
 from ppafo.signals.recording import Floats
@@ -71,21 +71,43 @@ def check_ankle_range(walk: MeanStride) -> None:
 
 def check_ankle(walk: MeanStride) -> None:
     """Raise DataError for an ankle angle that is implausible together with the shank angle."""
-    theta = np.degrees(walk.curves["ankle_angle"])
     where = f"{walk.file['ankle_angle']}: ankle_angle"
     turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
-    if turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS:
-        raise DataError(
-            f"{where} moves into plantarflexion while the shank rotates forward: the flat foot would rotate by "
-            f"{turned:.2g} deg (RMS), but only by {reversed_turned:.2g} deg with the opposite sign, so the sign is "
-            f"reversed; {other_sign(walk.signs_from, 'ankle_angle.positive', 'the opposite sign about 90 deg')}"
+    wrong: list[PpafoError] = []
+    is_reversed = turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS
+    if is_reversed:
+        wrong.append(
+            DataError(
+                f"{where} moves into plantarflexion while the shank rotates forward: the flat foot would rotate by "
+                f"{turned:.2g} deg (RMS), but only by {reversed_turned:.2g} deg with the opposite sign, so the sign is "
+                f"reversed; {other_sign(walk.signs_from, 'ankle_angle.positive', 'the opposite sign about 90 deg')}"
+            )
         )
-    foot = standing_tilt(walk.curves["shank_angle"], walk.curves["ankle_angle"])
-    if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
-        raise DataError(
-            f"{where} implies a foot tilted by {foot:.0f} deg in mid-stance (plausible: up to {REFUSED_TILT:g} deg) "
-            f"and ranges from {theta.min():.0f} to {theta.max():.0f} deg (neutral: 90 deg); {_NEUTRAL[walk.signs_from]}"
-        )
+    # A reversed sign turns the angle about 90 deg: the zero is wrong, too, where the foot is tilted even then.
+    ankle = np.pi - walk.curves["ankle_angle"] if is_reversed else walk.curves["ankle_angle"]
+    foot = standing_tilt(walk.curves["shank_angle"], ankle)
+    with noted_in(wrong):
+        _check_ankle_zero(walk, np.degrees(ankle), foot)
+    raise_noted(wrong)
+
+
+def check_ankle_alone(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle with an implausible range or zero, without a shank angle to compare."""
+    check_ankle_range(walk)
+    _check_ankle_zero(walk, np.degrees(walk.curves["ankle_angle"]), 0.0)
+
+
+def _check_ankle_zero(walk: MeanStride, theta: Floats, foot: float) -> None:
+    """Raise DataError for an ankle angle ``theta`` [deg] out of its limits, or a standing foot with a tilt [deg]."""
+    low, high = ANKLE_LIMITS
+    if abs(foot) <= REFUSED_TILT and low <= float(theta.min()) and float(theta.max()) <= high:
+        return
+    as_read = np.degrees(walk.curves["ankle_angle"])
+    tilt = f"implies a foot tilted by {foot:.0f} deg in mid-stance (plausible: up to {REFUSED_TILT:g} deg) and "
+    raise DataError(
+        f"{walk.file['ankle_angle']}: ankle_angle {tilt if foot else ''}ranges from {as_read.min():.0f} to "
+        f"{as_read.max():.0f} deg (neutral: 90 deg); {_NEUTRAL[walk.signs_from]}"
+    )
 
 
 def standing_tilt(shank: Floats, ankle: Floats) -> float:

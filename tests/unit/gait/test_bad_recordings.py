@@ -179,6 +179,21 @@ def test_what_no_leg_does_is_refused_with_the_remedy(
     assert "\n" not in str(refused.value)
 
 
+def test_an_ankle_without_a_shank_is_told_why_and_all_else_that_is_wrong(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    """A clinic's ankle angle counts dorsiflexion from neutral; its sign shows beside a shank only."""
+    ankle = {ANKLE: np.pi / 2.0 - columns[ANKLE], MOMENT: -columns[MOMENT]}
+    for curves, fragments in (
+        (ankle, ("the foot is placed by both angles", "(neutral: 90 deg)", "ankle_moment peaks at -")),
+        ({SHANK: columns[SHANK], **ankle}, ("the sign is reversed", "(neutral: 90 deg)", "ankle_moment peaks at -")),
+    ):
+        with pytest.raises(DataError) as refused:
+            import_gait([csv_of(curves)], ImportSettings(62.0))
+        assert len(refused.value.parts) == len(fragments)
+        assert all(fragment in part for fragment, part in zip(fragments, refused.value.parts, strict=True))
+
+
 HELD: dict[str, tuple[Change, str]] = {
     "shank for a second": (
         held((SHANK,), 500, 200),

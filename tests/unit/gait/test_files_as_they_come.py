@@ -409,7 +409,10 @@ def test_a_column_without_unit_is_one_that_a_gait_map_may_name(tmp_path: Path) -
     table = read_table(path)
     assert (table.units["Kraft"], np.array_equal(table.columns["Kraft"], force(TIME))) == ("", True)
     path.write_text(f"time [s],Kraft\n{''.join(f'{0.01 * k},1{chr(10)}' for k in range(30))}")
-    with pytest.raises(DataError, match=r"Kraft\); name the columns in a gait map \(columns; format"):
+    with pytest.raises(
+        DataError,
+        match=r"Kraft\); the foot is placed by both angles.*; name the columns in a gait map \(columns; format",
+    ):
         import_gait([path], PERSON)
 
 

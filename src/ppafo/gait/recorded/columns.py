@@ -8,6 +8,7 @@ from textwrap import shorten
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
+from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.mapping import setting_text
 from ppafo.gait.recorded.near_columns import nearest_column
 from ppafo.gait.recorded.table import MotionTable
@@ -19,6 +20,11 @@ LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
 _MOST_NAMES, _LONGEST_TEXT = 12, 160
 """Limits of an error message: number of column names, and characters of the names and of a remark."""
+_BOTH_ANGLES = (
+    "; the foot is placed by both angles: shank_angle (0 vertical, positive with the ankle in front of the knee; also "
+    "pelvis, hip and knee angles, or markers) and ankle_angle (90 deg neutral, growing in plantarflexion)"
+)
+"""Reason for the required curves, their conventions, and other sources of a shank angle, in an error message."""
 _COORDINATES = (".x", ".y", ".z")
 """Suffixes of the column names of a marker's coordinates."""
 
@@ -120,7 +126,10 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
     texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
     listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
     schema = f"a gait map ({setting_text('columns')}; format: 'ppafo doctor --schema gait-map')"
-    return f"{'; '.join(reasons)} ({files}: {listed}); name the columns in {schema}, or add a file that has them"
+    needed = _BOTH_ANGLES if names.keys() & set(REQUIRED) else ""
+    return (
+        f"{'; '.join(reasons)} ({files}: {listed}){needed}; name the columns in {schema}, or add a file that has them"
+    )
 
 
 def _marker(name: str) -> str:

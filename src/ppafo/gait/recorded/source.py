@@ -9,8 +9,9 @@ import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.mean_stride import SignSource
-from ppafo.gait.plausible import check_force_scale
+from ppafo.gait.mean_stride import MeanStride, SignSource
+from ppafo.gait.plausible import check_force_scale, check_moment
+from ppafo.gait.plausible_angles import check_ankle_alone
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.contacts import force_of_plates
 from ppafo.gait.recorded.footfalls import FORCE
@@ -193,6 +194,10 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     moved = [column for name, terms in used.items() if name not in LOADS for column in terms]
     tables = [fill_gaps(without_lost_markers(table, moved), names, settings.longest_gap) for table in tables]
     walk = walk_signals(tables, columns, body_mass, settings.stature, named.keys(), wrong)
+    signs_from: SignSource = "columns" if own is None else "map"
+    if any(name not in walk for name in REQUIRED):
+        _check_without_strides(walk, settings.body_mass, signs_from, wrong)
+        raise_noted(wrong)
     # The knee is one entry of a map, but two curves.
     added = {name: each.columns for name, each in walk.items() if not {name, name.partition("_")[0]} & named.keys()}
     if own is not None and added:
@@ -200,7 +205,6 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         remarks.append(f"not in the gait map, read as the {settings.side} foot by the file format: {shown}")
     if not is_usable:
         raise_noted(wrong)
-    signs_from: SignSource = "columns" if own is None else "map"
     walk, on_plates = _with_loads(walk, tables, convention, settings.body_mass, signs_from, wrong)
     remarks += [*on_plates, *convention.remarks, *(remark for _, remark in convention.curve_remarks)]
     remarks += [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
@@ -232,6 +236,20 @@ def _read_tables(
         units = {**found.units, **{name: table.units[name] for name in kept}}
         arranged.append(replace(found, columns=columns, units=units))
     return arranged
+
+
+def _check_without_strides(
+    walk: Mapping[str, Signal], body_mass: float | None, signs_from: SignSource, wrong: list[PpafoError]
+) -> None:
+    """Add to ``wrong`` what the whole recording shows of ankle angle and moment where an angle is missing."""
+    curves = {name: signal.values[np.isfinite(signal.values)] for name, signal in walk.items()}
+    whole = MeanStride({name: signal.file for name, signal in walk.items()}, curves, 0.0, 0.0, signs_from)
+    with noted_in(wrong):
+        if "ankle_angle" in walk:
+            check_ankle_alone(whole)
+    with noted_in(wrong):
+        if body_mass is not None:
+            check_moment(whole)
 
 
 def _with_loads(

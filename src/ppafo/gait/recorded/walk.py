@@ -60,7 +60,7 @@ def walk_signals(
 
     Both angles and the curves of a user's map (``required``) must have columns; the others may be absent. A motion
     starts at its first valid sample and ends at its last; a load is 0 where it was not measured.
-    Raises DataError if an angle cannot be used, with all problems in ``wrong``.
+    Raises DataError if no file has an angle, with all problems in ``wrong``.
     """
     try:
         angles = {
@@ -94,8 +94,6 @@ def walk_signals(
     with noted_in(wrong):
         knee = {} if columns.knee is None else knee_signals(columns.knee, tables, stature, "knee" not in required)
         walk |= {name: without_ends(signal) for name, signal in knee.items()}
-    if any(name not in walk for name in REQUIRED):
-        raise_noted(wrong)
     return walk
 
 
