@@ -1,6 +1,7 @@
 """Trials of the remedies that a tracking verdict names: further runs, of which the first that follows is reported."""
 
 import contextlib
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 MOST_TRIED = 16
 """Largest number of remedies simulated for a verdict."""
 _STRIDES_TRIED = 8.0
-"""Number of strides simulated for a remedy of a walk."""
+"""Number of strides in which the remedies of a walk are compared; one that suffices there is simulated to the end."""
 _LESS_ERROR = 0.5
 """Remaining error divided by the original one, below which a remedy that does not suffice is reported [-]."""
 
@@ -26,9 +27,9 @@ _LESS_ERROR = 0.5
 def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     """Return a tracking verdict with the first remedy that succeeds in a simulation.
 
-    Remedies are the overrides named in the verdict; for a walk, only the first strides are simulated. If only a
-    remedy of a less certain cause succeeds, that cause becomes the cause of the verdict. If none succeeds, the verdict
-    gets the remedy with the smallest remaining error, provided that this is less than half of the original one.
+    Remedies are the overrides named in the verdict. If only a remedy of a less certain cause succeeds, that cause
+    becomes the cause of the verdict. If none succeeds, the verdict gets the remedy with the smallest remaining error
+    (of a walk: in its first strides), provided that this is less than half of the original one.
     """
     if verdict is None or verdict.accepted:
         return verdict
@@ -37,17 +38,10 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     trials = _trials(scenario, verdict, is_of_file)
     if not trials:
         return verdict
-    from ppafo.simulation.tracking.verdict import is_undecided
-
     try:
-        results = of_loaded.simulate_many([changed for _, _, changed in trials])
+        judged = list(_judged(trials))
     except PpafoError:
         return verdict
-    judged = [
-        (cause, remedy, result.tracking)
-        for (cause, remedy, _), result in zip(trials, results, strict=True)
-        if result.status.is_completed and not is_undecided(result)
-    ]
     for cause, remedy, left in judged:
         if left is None:
             # A number that was tried is one of many; a kind is none.
@@ -57,7 +51,31 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
             text = f"{example}with {remedy.text} it follows, as a further run shows{margin}"
             return replace(verdict, cause=cause, tried=text, mended=remedy.overrides if is_of_file else ())
     of_cause = [(remedy, left.error) for cause, remedy, left in judged if left and cause == verdict.cause]
-    return replace(verdict, tried=_remainder_text(verdict, of_cause))
+    strides = "" if _first_strides(scenario) is scenario else f" in the first {_STRIDES_TRIED:.0f} strides"
+    return replace(verdict, tried=_remainder_text(verdict, of_cause, strides))
+
+
+def _judged(trials: "list[tuple[str, Remedy, Scenario]]") -> "Iterator[tuple[str, Remedy, Tracking | None]]":
+    """Yield cause, remedy and verdict of the trials up to the first that follows; not of a run without a verdict."""
+    from ppafo.simulation.tracking.verdict import is_undecided
+
+    results = of_loaded.simulate_many([_first_strides(changed) for _, _, changed in trials])
+    for (cause, remedy, changed), early in zip(trials, results, strict=True):
+        # What follows in the first strides of a walk need not follow in the later ones.
+        is_early = early.scenario.run.duration < changed.run.duration and early.tracking is None
+        result = of_loaded.simulate_many([changed])[0] if is_early else early
+        if result.status.is_completed and not is_undecided(result):
+            yield cause, remedy, result.tracking
+            if result.tracking is None:
+                return
+
+
+def _first_strides(scenario: Scenario) -> Scenario:
+    """Return a walk that ends after its first strides, a whole number of output intervals; other runs unchanged."""
+    run, duration = scenario.run, _STRIDES_TRIED * scenario.motion.stride_time
+    if scenario.follows_reference or not 0.0 < duration < run.duration:
+        return scenario
+    return replace(scenario, run=replace(run, duration=round(duration / run.output_interval) * run.output_interval))
 
 
 def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> "list[tuple[str, Remedy, Scenario]]":
@@ -70,16 +88,19 @@ def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> "list[
     for cause, remedy in causes[:MOST_TRIED]:
         with contextlib.suppress(PpafoError):
             again = reloaded(scenario, remedy.overrides) if is_of_file else with_numbers(scenario, remedy.numbers)
-            run, duration = again.run, _STRIDES_TRIED * again.motion.stride_time
-            # Of a walk the first strides: a whole number of output intervals, as the walk itself has.
-            if not again.follows_reference and 0.0 < duration < run.duration:
-                run = replace(run, duration=round(duration / run.output_interval) * run.output_interval)
-            trials.append((cause, remedy, replace(again, run=run)))
+            if not again.follows_reference:
+                # The minutes of a walk may be an argument beside its file.
+                run = replace(again.run, duration=scenario.run.duration, output_interval=scenario.run.output_interval)
+                again = replace(again, run=run)
+            trials.append((cause, remedy, again))
     return trials
 
 
-def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]") -> str:
-    """Return a sentence on the remedy with the smallest remaining error, or on remedies that do not help."""
+def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]", strides: str) -> str:
+    """Return a sentence on the remedy with the smallest remaining error, or on remedies that do not help.
+
+    ``strides`` are words for the part of a walk over which the errors are taken.
+    """
     from ppafo.simulation.tracking.remedies import change_text
     from ppafo.simulation.tracking.verdict import time_text
 
@@ -87,7 +108,7 @@ def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]") -
     if best is not None and error < _LESS_ERROR * verdict.error:
         with shown_in(verdict.units):
             left = f"an RMS error of {change_text(verdict.controlled, error)} is left{time_text(verdict.since)}"
-        return f"with {best.text} {left}, as a further run shows"
+        return f"with {best.text} {left}{strides}, as a further run shows"
     names = ", ".join(dict.fromkeys(each.partition("=")[0] for remedy in verdict.remedies for each in remedy.overrides))
     if not names:
         return verdict.tried

@@ -23,6 +23,8 @@ from ppafo.remedy_trials import tried
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import Result, simulate_many
 from ppafo.simulation.tracking import most_reversals, tracking_in
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.simulation.tracking.rule import failure_of_task
@@ -135,6 +137,22 @@ def test_a_walk_whose_pair_takes_the_torque_beyond_its_limit_is_told_with_a_valv
     (area,) = verdict.mended
     assert area.startswith("valve.area=")
     assert simulate("solenoid", [area, *changes[1:]]).tracking is None
+
+
+def test_the_remedy_of_a_walk_is_simulated_over_the_whole_walk(monkeypatch: pytest.MonkeyPatch) -> None:
+    of_file = load_scenario("solenoid", ["valve.area=60 mm^2", "supply.pressure=90 psi_g"])
+    scenario = dataclasses.replace(of_file, run=dataclasses.replace(of_file.run, duration=12.0))
+    verdict, durations = simulate(scenario).tracking, list[float]()
+
+    def simulated(scenarios: list[Scenario]) -> list[Result]:
+        durations.extend(each.run.duration for each in scenarios)
+        return simulate_many(scenarios)
+
+    monkeypatch.setattr("ppafo.simulation.simulate.simulate_many", simulated)
+    told = tried(scenario, verdict)
+    assert told is not None
+    assert told.mended
+    assert max(durations[:-1]) < durations[-1] == 12.0
 
 
 def test_a_walk_with_an_actuator_that_pushes_one_way_is_told_to_ask_for_no_dorsiflexion() -> None:

@@ -1,6 +1,5 @@
 """Verdict on a walk: benefit of the device against the same walk without it, and a remedy if it does not help."""
 
-import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -17,7 +16,7 @@ from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import remedy
 from ppafo.walking.gait_series import gait_timing
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.result import WalkResult
 from ppafo.walking.safety_events import event_lines
 from ppafo.walking.strides import PHASES
@@ -36,8 +35,8 @@ _STIFFER = (2.0, 4.0)
 """Factors on the stiffness with which a controller lifts the foot, tried if the requested torque is too small."""
 _NEARLY = 0.95
 """Ratio of a torque to its limit from which the limit counts as reached [-]."""
-_MINUTES = 0.15
-"""Duration of a walk with a remedy [min]: a few strides after the transient."""
+_FIRST_TRIAL = 9.0
+"""Duration of the first walk with a remedy [s]; one that does not suffice in it is not tried for the whole duration."""
 _AFTER_TOE_LOAD = 0.02
 """Time between toe load and the start of foot-flat that a remedy sets [strides]."""
 
@@ -97,20 +96,40 @@ def _remedied(worn: WalkResult, drags: bool) -> list[str]:
     if walk_of(worn.scenario).bottle is not None:
         return []
     cause, remedies, advice = _trials(worn, drags)
+    minutes = worn.scenario.run.duration / 60.0
     for overrides in remedies:
-        with contextlib.suppress(PpafoError):
-            again = walk(reloaded(worn.scenario, overrides), minutes=_MINUTES)
-            if not (again.status.is_completed and again.is_helped):
-                continue
-            gain = again.help_text
-            if worn.is_helped:
-                toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
-                if work <= 0.0 or (drags and toes < 0.0):
-                    continue
-                gain = f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}"
+        gain = _gain_with(worn, overrides, drags)
+        if gain:
             changes = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
-            return [f"{cause}: for example with {changes}, {gain}, simulated in another walk"]
+            return [f"{cause}: for example with {changes}, {gain}, simulated in another walk of {minutes:.3g} min"]
     return [f"{cause}, and {advice}"] if advice else []
+
+
+def _gain_with(worn: WalkResult, overrides: Sequence[str], drags: bool) -> str:
+    """Return the gain of a remedy as text, from another walk of the same duration; "" if it does not suffice."""
+    gain, whole = "", worn.scenario.run.duration
+    # Toes may sink from stride to stride: the whole walk decides. What a task sequence begins with is no sample of it.
+    is_even = walk_of(worn.scenario).task_sequence is None
+    for seconds in (_FIRST_TRIAL, whole) if is_even and whole > _FIRST_TRIAL else (whole,):
+        try:
+            again = walk(with_duration(reloaded(worn.scenario, overrides), seconds))
+        except PpafoError:
+            return ""
+        gain = _gain(again, drags, needs_work=worn.is_helped)
+        if not gain:
+            break
+    return gain
+
+
+def _gain(again: WalkResult, drags: bool, needs_work: bool) -> str:
+    """Return strides with help, or if ``needs_work`` height of the toes and work, as text; "" if not enough."""
+    if not (again.status.is_completed and again.is_helped):
+        return ""
+    if not needs_work:
+        return again.help_text
+    toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
+    is_enough = work > 0.0 and not (drags and toes < 0.0)
+    return f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}" if is_enough else ""
 
 
 def _trials(worn: WalkResult, drags: bool) -> RemedyTrials:

@@ -31,12 +31,22 @@ def test_a_walk_that_helps_says_with_which_numbers_and_against_which_walk() -> N
     ],
 )
 def test_the_remedy_of_a_walk_that_does_not_lift_the_toes_lifts_them(name: str, verdict: str, cause: str) -> None:
-    said = sentence(name)
+    said = sentence(name, minutes=0.4)
     assert said.startswith(verdict)
     assert f"; {cause}: for example with `" in said
     remedy = tuple(text.replace(" = ", "=", 1) for text in re.findall("`(.*?)`", said))
-    again = sentence(name, *remedy, minutes=0.15)
+    again = sentence(name, *remedy, minutes=0.4)
     assert again.startswith("the device helps, against the same walk without it")
+    gain = r"toes (\S+) mm over the ground and (\S+) J, simulated in another walk of 0.4 min"
+    ((toes, work),) = re.findall(gain, said)
+    assert f"toes {toes} mm over the ground" in again
+    assert f": {work} J of net work" in again
+
+
+def test_a_remedy_that_helps_in_the_first_strides_alone_is_none() -> None:
+    fault = ("faults.heel.kind=stuck", "faults.heel.time=10 s", "faults.heel.reading=0 N")
+    assert "for example with `controller.kind" in sentence("off", *fault, minutes=0.16)
+    assert sentence("off", *fault, minutes=0.5).endswith("another controller alone does not help")
 
 
 @pytest.mark.parametrize(
