@@ -149,7 +149,9 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
         case "string_pattern_mismatch":
             return f"{assignment} {_TEXT_RULES.get(detail['ctx']['pattern'], _TEXT_RULES[NAME])}"
         case "string_type":
-            return f"{assignment} must be a text in quotation marks"
+            field = key.table.model_fields.get(key.path.rpartition(".")[2]) if _is_model(key.table) else None
+            said = f": {field.description}" if field is not None and field.description else ""
+            return f"{assignment} must be a text in quotation marks{said}"
         case "model_type" | "model_attributes_type" | "dict_type":
             fields = key.value_type.model_fields if _is_model(key.value_type) else {}
             required = [name for name, field in fields.items() if field.is_required()]

@@ -236,7 +236,9 @@ class VaneLeakProblem(StrictTable):
         "orifice",
         description="flow law; an orifice in the form of the set; 'both': orifice and laminar gap in parallel",
     )
-    volume_1: Text | None = Field(None, description="volume of chamber 1 with its line, such as '40 cm^3'")
+    volume_1: Text | None = Field(
+        None, description="volume of chamber 1 with its line, '40 cm^3'; known to 5 %, or to bench.held"
+    )
     volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
 
     def volumes_of(self, context: ProcedureContext) -> tuple[float | None, float | None, float]:

@@ -18,6 +18,8 @@ FAR_FROM_SET = 5.0
 """Ratio to the value of the set above which a wrong unit is suspected: psi read as kPa makes 6.89."""
 _NEAR = 1.5
 """Largest ratio [-] of an estimate, divided by the value of the set, to the factor of a unit mistake."""
+_REACHED = 0.1
+"""Relative difference [-] of pressures that are equal, such as a full chamber and its supply."""
 _LARGE_SCATTER, _SMOOTHER = 0.01, 5.0
 """Scatter of readings from which another unit is tried, and its ratio to the scatter with that unit to report it [-].
 
@@ -35,12 +37,16 @@ def _mistake_text(names: Sequence[str], mistake: str, factor: float) -> str:
 
 
 def with_wrong_units(
-    estimates: tuple[Estimate, ...], known: Mapping[str, float | None], recordings: Sequence[Recording]
+    estimates: tuple[Estimate, ...],
+    known: Mapping[str, float | None],
+    recordings: Sequence[Recording],
+    supply: float = math.nan,
 ) -> tuple[Estimate, ...]:
     """Return the estimates, with the verdict of a wrong unit where a unit mistake in a recording explains the values.
 
     A mistake explains them if every value far from the one ``known`` of the set depends on the unit, and every value
-    that depends on the unit is off by nearly its factor: a larger device, or one worn part, is no mistake.
+    that depends on the unit is off by nearly its factor: a larger device, or one worn part, is no mistake. No angle of
+    a joint turns round, and no chamber exceeds its ``supply`` [Pa gauge], NaN if unknown.
     """
     usable = [estimate for estimate in estimates if estimate.is_usable]
     ratios = {
@@ -69,8 +75,11 @@ def with_wrong_units(
         mistakes = misread_units(si_unit, [channels[name].stated for name in names]) if far <= acted_on else []
         swings = [float(np.ptp(recording[name])) for recording in recordings for name in names if name in recording]
         for mistake, factor in mistakes:
-            # No joint turns round: an angle that would be off by this factor was no angle of one.
-            if si_unit == "rad" and max(swings) / factor > math.tau:
+            swing = max(swings)
+            turns_round = si_unit == "rad" and swing / factor > math.tau
+            # A chamber filled to its supply, as read, has its own unit.
+            is_filled = si_unit == "Pa" and abs(swing / supply - 1.0) < _REACHED
+            if turns_round or is_filled or (si_unit == "Pa" and swing / factor > (1.0 + _REACHED) * supply):
                 continue
             size = abs(math.log(factor))
             distance = max(abs(ratios[path] - size) for path in acted_on & ratios.keys())

@@ -12,6 +12,8 @@ _DIFFERENCES = {"Pa": "Pa_d"}
 """Unit of a difference by SI unit."""
 _SMALLEST, _LARGEST = 1.0e-2, 1.0e5
 """Range of magnitudes written without a power of ten."""
+_NOTHING, _NEAREST = 1.0e-6, 0.05
+"""Fraction of an error [-] that is rounding, and least distance of an end from its value that sets digits [values]."""
 _SEVERAL = {"readings", "commands"}
 """Last words of group names that are plural."""
 _SHARE, _MOST_NAMED = 0.05, 3
@@ -44,13 +46,30 @@ def with_error(value: float, error: float) -> str:
 
 
 def digits_of(number: float, error: float) -> str:
-    """Return a number rounded to two significant digits of an error, ``9.77`` for 9.7701 and an error of 0.22."""
+    """Return a number rounded to two significant digits of an error, ``9.77`` for 9.7701 and an error of 0.22.
+
+    A number that would become 0 keeps two digits of its own, unless it is rounding beside the error.
+    """
     if not (math.isfinite(number) and math.isfinite(error) and error > 0.0):
         return f"{number:.4g}"
+    if abs(number) <= _NOTHING * error:
+        return "0"
     decimals = 1 - math.floor(math.log10(error))
-    if number == 0.0 or _SMALLEST <= max(abs(number), error) < _LARGEST:
-        return f"{round(number, decimals) + 0.0:.{max(decimals, 0)}f}" if number else "0"
+    if round(number, decimals) == 0.0:
+        return f"{number:.2g}"
+    if _SMALLEST <= max(abs(number), error) < _LARGEST:
+        return f"{round(number, decimals):.{max(decimals, 0)}f}"
     return f"{number:.{max(math.floor(math.log10(abs(number))) + decimals, 1)}e}"
+
+
+def interval_texts(value: float, low: float, high: float) -> tuple[str, str, str]:
+    """Return a value and the ends of its interval as text, each end by its own distance from the value.
+
+    The value has two significant digits of the nearer end, but of 5 % of itself where a bound is nearer.
+    """
+    below, above = value - low, high - value
+    error = max(min(below, above), min(_NEAREST * abs(value), max(below, above)))
+    return digits_of(value, error), digits_of(low, max(below, error)), digits_of(high, max(above, error))
 
 
 def widened_by(fitted: Fit, name: str) -> str:

@@ -141,7 +141,7 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
         )
         yield CandidateCause(
             f"gain of {words}",
-            f"{words} {verb} to be read {{:.4g}} times too large",
+            f"{words} {verb} to read {{:.4g}} times the true value",
             partial(_sensed, channels, "gain", about),
             _GAINS,
             is_ratio=True,

@@ -183,7 +183,9 @@ def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(bot
     assert "trajectory (synthetic): 2 numbers fitted to 2 recordings" in text
     assert "foot_plate.inertia: variance from actuator.torque_constant" in text
     number = r"([\d.]+) \+- ([\d.]+) cm\^3"
-    told = re.search(rf"tolerance: actuator\.torque_constant: stated {number}, fitted {number}", text)
+    told = re.search(
+        rf"tolerance: actuator\.torque_constant: prior {number} \(the set states none\), fitted {number}", text
+    )
     assert told is not None
     stated, error, fitted, smaller = map(float, told.groups())
     assert (stated, error) == (14.51, 0.17)
@@ -192,6 +194,25 @@ def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(bot
     assert "g m^2" in text
     assert re.search(r"\b\d+ other tolerances do not affect the intervals", text)
     assert "next experiment 1: slow: gain" in text
+
+
+def test_what_the_new_set_keeps_beside_values_fitted_with_it_is_said(both: Identification) -> None:
+    assert both.trajectory is not None
+    assert "keeps its own" not in text_of(finding_of(both))
+    fit, (inertia, *_) = both.trajectory.fit, both.trajectory.fit.estimates
+    assert inertia.path == "foot_plate.inertia"
+    estimates = (replace(inertia, verdict="not identifiable"), *fit.estimates[1:])
+    written = replace(both.new_set, written=both.new_set.written[1:])
+    trajectory = replace(both.trajectory, fit=replace(fit, estimates=estimates))
+    text = text_of(finding_of(replace(both, trajectory=trajectory, new_set=written)))
+    assert "the new set keeps its own foot_plate.inertia, with which its other values were not fitted" in text
+
+
+def test_a_key_of_the_wrong_type_is_said_with_what_it_means(solve: Solve) -> None:
+    with pytest.raises(
+        PpafoError, match=r"locked = True must be a text in quotation marks: angle at which .* '75 deg'"
+    ):
+        solve(FIT.replace('scenario = "step-response"', "locked = true"))
 
 
 def test_the_fit_starts_from_what_the_bench_found_and_keeps_the_rest_of_it(solve: Solve) -> None:

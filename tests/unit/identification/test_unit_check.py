@@ -197,6 +197,28 @@ def test_an_angle_that_would_turn_round_in_the_other_unit_has_its_own(largest: f
     assert (judged[0].verdict == "unit probably wrong") == is_wrong
 
 
+@pytest.mark.parametrize(
+    ("stated", "largest", "conductance", "supply", "is_wrong"),
+    [
+        # MPa read as bar would be a chamber of 60 bar on a supply of 6 bar.
+        ("bar_g", 5.996e5, 0.109, 6.0e5, False),
+        ("bar_g", 0.5996e5, 0.109, 6.0e5, True),
+        ("bar_g", 5.996e5, 0.109, np.nan, True),
+        # Read as it is, the chamber is full.
+        ("MPa_g", 5.996e5, 9.2, 6.0e5, False),
+        ("MPa_g", 59.96e5, 9.2, 6.0e5, True),
+    ],
+)
+def test_a_chamber_has_no_unit_in_which_it_exceeds_its_supply_or_leaves_it(
+    stated: str, largest: float, conductance: float, supply: float, is_wrong: bool
+) -> None:
+    pressure = Channel(101325.0 + np.array([0.0, 0.4, 1.0]) * largest, "Pa", stated=stated)
+    recording = Recording("r", np.arange(3.0), {"pressure_1": pressure})
+    fitted = Estimate("C", conductance, "m^3/(s Pa)", 0.9 * conductance, 1.1 * conductance, "identified", "", ("r",))
+    judged = with_wrong_units((fitted,), {"C": 1.0}, [recording], supply)
+    assert (judged[0].verdict == "unit probably wrong") == is_wrong
+
+
 def test_a_flow_without_its_condition_is_told_every_key_that_its_gas_needs(tmp_path: Path) -> None:
     gas, at, procedure = ', gas = "air"', ', at = "ANR"', 'gas = "air"'
     remedy = r"give at = 'ANR' and gas = 'air'"

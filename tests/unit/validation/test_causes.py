@@ -120,7 +120,7 @@ def in_seconds(one: Recording) -> Recording:
         (with_outliers, "pressure_1 has 3 isolated outliers, the first at 0.04 s"),
         (swapped, "pressure_1 and pressure_2 seem to be swapped"),
         (reversed_command, "command seems to have the wrong sign"),
-        (read_with_gain, "pressure_1 seems to be read 1.04 times too large"),
+        (read_with_gain, "pressure_1 seems to read 1.04 times the true value"),
         (fast_clock, "the clock of the recording seems to run 1.05 times as fast"),
         (
             in_milliseconds,
@@ -431,7 +431,7 @@ def test_what_is_usual_on_a_bench_is_the_same_for_limits_causes_and_the_fit() ->
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
-        (read_with_gain, "pressure_1 seems to be read 1.04 times too large"),
+        (read_with_gain, "pressure_1 seems to read 1.04 times the true value"),
         (swapped, "pressure_1 and pressure_2 seem to be swapped"),
         (clipped, "pressure_1 is clipped"),
     ],

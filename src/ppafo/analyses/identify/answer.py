@@ -17,7 +17,7 @@ from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.identification.unit_check import FAR_FROM_SET
-from ppafo.identification.wording import digits_of, in_shown_unit, with_error
+from ppafo.identification.wording import in_shown_unit, interval_texts, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure
 from ppafo.report.finding import Finding, Section, columns_of
@@ -154,8 +154,10 @@ def finding_of(identification: Identification) -> Finding[Identification]:
                 continue
             ratio = value / entry.value
             if not 1.0 / FAR_FROM_SET < ratio < FAR_FROM_SET:
-                times = f"{ratio:.3g} times the previous value, {entry.value:.4g} {unit}".rstrip()
-                remarks.append(f"remark: {estimate.path} is {times}: check the units of the recording")
+                times = f"{ratio:.3g} times the value of the set, {entry.value:.4g} {unit}".rstrip()
+                remarks.append(
+                    f"remark: {estimate.path} is {times}; no mistaken unit of pressure, angle or torque explains this"
+                )
         remarks += [f"remark: {remark}" for remark in result.remarks]
         rows = [estimate_row(estimate, before) for estimate in result.estimates]
         heading = f"{result.procedure}{kind}: {result.summary}"
@@ -170,6 +172,14 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         count = f"{count_of(len(written), 'value')} of the set identified: {', '.join(written)}"
     fitted_text = f"; for this model only: {', '.join(fitted)}" if fitted else ""
     problem = [f"the new set is not a complete device yet: {new_set.problem}"] if new_set.problem else []
+    fitted_together = () if identification.trajectory is None else identification.trajectory.fit.estimates
+    is_new = {estimate.path: estimate.path in (*written, *fitted) for estimate in fitted_together}
+    kept = [path for path in is_new.keys() & before.declarations().keys() if not is_new[path]]
+    if kept and any(is_new.values()):
+        problem.append(
+            f"the new set keeps its own {' and '.join(sorted(kept))}, with which its other values were not fitted: fix "
+            "these by device.overrides, and fit the others again"
+        )
     # As they are remarks among others, these that prevent a pass are repeated at the end.
     of_fit = () if identification.trajectory is None else identification.trajectory.fit.remarks
     problem += [f"not passed (exit code 1): {remark}" for remark in of_fit]
@@ -234,7 +244,9 @@ def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> lis
                 for number in (value, error, 0.0)
             )
             texts.append(f"{with_error(level, upper - zero)} {unit}".rstrip(" -"))
-        text = f"tolerance: {tolerance.name}: stated {texts[0]}, fitted {texts[1]}"
+        entry = before.numbers.get(tolerance.name)
+        default = " (the set states none)" if entry is not None and not entry.uncertainty else ""
+        text = f"tolerance: {tolerance.name}: prior {texts[0]}{default}, fitted {texts[1]}"
         if tolerance.share >= _SHOWN:
             text += f"; {percentage(tolerance.share, 2)} of the variance of {tolerance.widens}"
         rows.append(text)
@@ -252,18 +264,14 @@ def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[f
 
 
 def estimate_row(estimate: Estimate, before: ParameterSet) -> tuple[str, ...]:
-    """Return path, value, interval and verdict of an estimate in the unit of the set.
-
-    Value and ends have two significant digits of the half-width.
-    """
+    """Return path, value, interval and verdict of an estimate in the unit of the set."""
     if math.isnan(estimate.value):
         return estimate.path, "no value", "", estimate.verdict
     numbers = [
         _shown(number, estimate.path, estimate.unit, before) for number in (estimate.value, estimate.low, estimate.high)
     ]
     (value, unit), (low, _), (high, _) = numbers
-    wider = max(abs(high - value), abs(value - low))
-    text, low_text, high_text = (digits_of(number, wider) for number in (value, low, high))
+    text, low_text, high_text = interval_texts(value, low, high)
     return (
         estimate.path,
         f"{text} {unit}".removesuffix(" -").rstrip(),

@@ -1,5 +1,6 @@
 """Identification of a parameter set from a problem file: recordings, procedures in order, new parameter set."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import NamedTuple
 from ppafo.analyses.identify.answer import Identification
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.estimate import WRONG_UNIT
 from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import DeviceProblem, ProblemFile
 from ppafo.identification.procedures import (
@@ -29,6 +31,7 @@ from ppafo.parameters.overrides import check_valve, read_overrides, with_overrid
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
 from ppafo.progress import Report, report_nothing
 from ppafo.signals.recording import TIME
+from ppafo.simulation.recorded.channels import SUPPLY
 from ppafo.storage.column_map import MappedChannel
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.foreign import read_trials
@@ -71,7 +74,9 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
                 tolerances=tolerances,
             )
             trajectory = _with_checked_units(solve_section(problem.trajectory, section, progress), current)
-            estimates += trajectory.fit.estimates
+            # Values fitted together belong together: without one of them the others describe no device.
+            if all(estimate.verdict != WRONG_UNIT for estimate in trajectory.fit.estimates):
+                estimates += trajectory.fit.estimates
         new_set = with_estimates(before, estimates, valve)
         identification = Identification(problem.name, results, trajectory, before, new_set)
         described = replace(new_set, parameter_set=_described_set(identification, problem))
@@ -190,7 +195,14 @@ def _with_checked_units(trajectory: TrajectoryOutcome, current: ParameterSet) ->
     }
     known = {path: value if is_near[path] else number_in_si(current, path) for path, value in fit.values.items()}
     recordings = [experiment.recording for experiment in fit.problem.experiments]
-    return replace(trajectory, fit=replace(fit, estimates=with_wrong_units(fit.estimates, known, recordings)))
+    supplies = [experiment.scenario.device.supply for experiment in fit.problem.experiments]
+    supply = max(max(item.pressure, item.dorsiflexion_pressure) - item.atmospheric_pressure for item in supplies)
+    if any(SUPPLY in recording for recording in recordings) or any(
+        item.path.startswith("supply.") for item in fit.estimates
+    ):
+        supply = math.nan
+    estimates = with_wrong_units(fit.estimates, known, recordings, supply)
+    return replace(trajectory, fit=replace(fit, estimates=estimates))
 
 
 def _used_recordings(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:

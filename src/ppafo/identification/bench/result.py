@@ -61,6 +61,8 @@ class ReportedNumber:
 
 _AT_BOUND = 1.0e-6
 """Relative distance from a bound [-] up to which an estimate counts as at its bound."""
+_NONE = 0.01
+"""Size of a part [typical magnitudes] below which it is none if its interval begins at zero."""
 
 
 def result_of(
@@ -100,6 +102,10 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
     bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
     # Not 1e-17 where 0 is meant.
     value = value if bound is None else bound
+    # A part whose interval begins at its bound of zero is none, or not told from none.
+    is_part = reported.size is not None and number.low == 0.0 >= low
+    if is_part and value < _NONE * (reported.size or 0.0):
+        value = bound = 0.0
     verdict: Verdict = "identified"
     sentence = f"{reported.text}; {widened_by(fitted, reported.path)}."
     if bound == 0.0 and reported.size is not None and width < UNKNOWN:
@@ -108,7 +114,7 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
     elif bound is not None:
         verdict = "at its bound"
         sentence = f"{sentence} The readings favour a value at or beyond {value:.4g}; the interval ends there."
-    elif width >= UNKNOWN:
+    elif width >= UNKNOWN or is_part:
         verdict, sentence = "not identifiable", f"{sentence} The interval includes zero or twice the value."
     elif fitted.conflict is not None:
         verdict = "holds for this model only"

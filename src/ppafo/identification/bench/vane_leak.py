@@ -58,6 +58,8 @@ _FEWEST_STEADY = 8
 _GAP = ReportedNumber(
     "effects.laminar_leak.coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside the orifice"
 )
+_SHARP = 0.6
+"""Discharge coefficient of a sharp-edged hole [-]."""
 _REMEDY = "{}, or give a start and an end; gas may leak elsewhere, or exchange heat with the walls"
 
 
@@ -126,7 +128,10 @@ def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumb
         text = f"Sonic conductance of the leak with the set's b = {opening.critical_ratio:g}"
         return ReportedNumber("actuator.leak.sonic_conductance", "m^3/(s Pa)", text)
     if discharge_coefficient:
-        text = f"Area of the leak with Cd = {discharge_coefficient:g}; only the product Cd A is identified"
+        text = (
+            f"Area of the leak with Cd = {discharge_coefficient:g} of the set; only the product Cd A is identified: a "
+            f"sharp-edged hole, of Cd = {_SHARP:g}, would have {discharge_coefficient / _SHARP:.3g} times this area"
+        )
         return ReportedNumber("actuator.leak.area", "m^2", text)
     return ReportedNumber("vane_leak.effective_area", "m^2", "Effective area Cd A of the leak")
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from ppafo.errors import IdentificationError
 from ppafo.identification.residuals import FitVariable
 from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, FittedExperiment, refuse_first, scenario_of
-from ppafo.model.catalog import find_effects
+from ppafo.model.catalog import VALVES, find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
+from ppafo.parameters.effects import switches_of
 from ppafo.simulation import numbers
 from ppafo.simulation.declaration import FREE, INITIAL, LEG, shank_settings
 from ppafo.simulation.numbers import other_form
@@ -203,6 +204,10 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
         (not low <= start <= high, f"start = {start:.6g} must lie between the bounds {bounds}"),
         (start == 0.0 and not has_size, "start = 0 needs bounds, which define the step size of the search"),
         (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
+        (
+            0.0 in (low, start) and not parameter.is_tolerance and _is_off_at_zero(scenarios[0], path, high),
+            "0 leaves it out of the model, so it cannot be fitted from there; give start and low, both above 0",
+        ),
         (not is_allowed, f"the bounds {bounds} exceed the allowed range, {allowed}"),
     )
     if parameter.is_logarithm:
@@ -214,6 +219,18 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     free = FitVariable(full_path(parameter.name, scenarios[0]), start, low, high, scale, parameter.deviation)
     unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
     return FitNumber(path, unit, free, parameter.recordings, parameter.is_tolerance, parameter.is_logarithm)
+
+
+def _is_off_at_zero(scenario: Scenario, path: str, value: float) -> bool:
+    """Return whether a parameter selects another model at 0 than at ``value`` [SI], such as a delay or an effect."""
+    models = []
+    for number in (0.0, value):
+        device = with_numbers(scenario, {path: number}).device
+        kind = VALVES[device.valve.kind]
+        settings = kind.settings(**device.valve.settings)
+        valve = kind.choose(settings)
+        models.append((valve, valve.command_delay(settings) > 0.0, switches_of(device)))
+    return models[0] != models[1]
 
 
 def _bounds(parameter: FreeParameter, path: str, start: float, quantity: Quantity) -> tuple[float, float]:

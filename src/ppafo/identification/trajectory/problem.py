@@ -37,17 +37,17 @@ class TrajectoryProblem:
 
 def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
     """Return all parameters of a problem with start and bounds resolved. Raises IdentificationError if inconsistent."""
-    return tuple(
-        number_of(
-            parameter,
-            [
-                experiment
-                for experiment in problem.experiments
-                if not parameter.recordings or experiment.label in parameter.recordings
-            ],
-        )
-        for parameter in problem.parameters
-    )
+    numbers, problems = list[FitNumber](), list[str]()
+    for parameter in problem.parameters:
+        labels = parameter.recordings
+        acting = [experiment for experiment in problem.experiments if not labels or experiment.label in labels]
+        try:
+            numbers.append(number_of(parameter, acting))
+        except IdentificationError as error:
+            problems.append(str(error))
+    if problems:
+        raise IdentificationError("; ".join(problems))
+    return tuple(numbers)
 
 
 def _refuse_twice(kind: str, names: list[str]) -> None:

@@ -73,6 +73,8 @@ def test_both_laws_hold_where_either_alone_or_both_flow(
         estimate = found[path]  # type: ignore[index]
         assert estimate.low <= truth <= estimate.high, estimate
         assert estimate.is_identified, estimate
+        if estimate.low == 0.0:
+            assert (estimate.value, "none" in estimate.explanation) == (0.0, True)
     assert not found.conflict  # type: ignore[attr-defined]
 
 

@@ -82,6 +82,14 @@ def test_a_problem_without_parameters_is_refused(experiment: FittedExperiment) -
         problem(experiment)
 
 
+def test_every_parameter_that_0_leaves_out_of_the_model_is_refused_before_the_fit(experiment: FittedExperiment) -> None:
+    late, spool = FreeParameter("valve.delay"), FreeParameter("valve.spool_frequency", start=30.0, low=0.0)
+    words = r"0 leaves it out of the model, so it cannot be fitted from there; give start and low, both above 0"
+    with pytest.raises(IdentificationError, match=rf"^valve\.delay: {words}; valve\.spool_frequency: {words}$"):
+        problem(experiment, late, INERTIA, spool)
+    problem(experiment, FreeParameter("valve.delay", start=0.015, low=0.001))
+
+
 @pytest.mark.parametrize("path", ["valves.proportional.delay", "valve.delay"])
 @pytest.mark.parametrize(("start", "then"), [(0.0, 0.002), (0.002, 0.0)])
 def test_a_setting_of_the_valve_that_goes_to_or_from_zero_is_named(
