@@ -99,7 +99,8 @@ def test_a_wrong_setting_is_one_line(capsys: pytest.CaptureFixture[str]) -> None
             "none)",
         ),
         ("effects.mesh.aera=1 mm^2", "did you mean 'effects.mesh.area'?"),
-        ("effects.mash.area=1 mm^2", "did you mean 'effects.mesh.area'?"),
+        ("effects.mash.area=1 mm^2", "no effect 'mash', did you mean 'mesh'?"),
+        ("effects.meshes:EFFECT.area=1 mm^2", "an effect is found by its entry point 'ppafo.effects' alone"),
         (f"{AREA}=1 mm", "unit 'mm' does not fit"),
     ):
         assert main(["simulate", "torque-task-solenoid", "--set", text]) == 2

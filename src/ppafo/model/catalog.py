@@ -68,6 +68,8 @@ def find_effects(paths: Iterable[str]) -> None:
     for path in paths:
         section, _, rest = path.partition(".")
         name = rest.partition(".")[0]
+        if section == SECTION and ":" in name:
+            raise KindError(f"effect '{one_line(name)}': an effect is found by its entry point 'ppafo.effects' alone")
         if section == SECTION and name and name not in EFFECTS.loaded():
             effect = EFFECTS.get(name)
             problem = "" if effect is None else effect_problem(effect)

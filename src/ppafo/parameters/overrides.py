@@ -11,6 +11,7 @@ from typing import NamedTuple
 from ppafo.arguments import Name, Overrides, checked
 from ppafo.errors import ParameterError, PpafoError, UnitError, refused_as
 from ppafo.model.catalog import EFFECTS, find_effects
+from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import (
     AREA_FORM,
@@ -249,6 +250,14 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
             f", did you mean '{SPECIES_PATH}={override.text}'?" if is_species else nearest_name(override.typed, allowed)
         )
         hint = hint or f"; for example {', '.join(near[:6])}"
+        section, _, rest = override.typed.partition(".")
+        name = rest.partition(".")[0]
+        if section == SECTION and name not in EFFECTS.loaded():
+            near_name = nearest_name(name, EFFECTS.loaded()) or f"; effects: {', '.join(sorted(EFFECTS.loaded()))}"
+            hint = f": no effect '{name}'{near_name}; your own needs an entry point 'ppafo.effects'"
+        elif section == SECTION:
+            own = [known for known in allowed if known.startswith(f"{section}.{name}.")]
+            hint = nearest_name(override.typed, own) or f"; it has {', '.join(own)}"
         worked = _in_conductance(override)
         raise ParameterError(
             f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}{worked}"

@@ -90,17 +90,21 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
 
 @in_units(lambda scenario, _varied: scenario.device.shown)
 def remark_on_following_gains(scenario: Scenario, varied: Collection[str]) -> str:
-    """Return a remark on gains computed anew for each value of the varied paths; empty if no gain follows them."""
-    gains = None if scenario.law is None else gains_of(scenario, scenario.law)
-    if gains is None:
+    """Return a remark on controller settings computed anew for each value of the varied paths; "" if none follows."""
+    law = scenario.law
+    if law is None or scenario.controller.is_outside:
         return ""
     paths = {form for path in varied for form in (path, *other_forms(path))}
     moved = acting(scenario.graph, paths)
-    following = [gain for gain in gains.gains if f"controller.{gain.name}" in moved]
+    # Beside the gains what a controller knows of valve and friction, such as the dead band.
+    following = [item for item in law_settings(law, scenario.controlled) if f"controller.{item.name}" in moved]
     if not following:
         return ""
-    options = override_text(f"controller.{gain.name}={written_text(gain.value, gain.unit)}" for gain in following)
-    names = ", ".join(gain.name for gain in following)
+    settings = scenario.controller.settings
+    options = override_text(
+        f"controller.{item.name}={written_text(float(settings[item.name]), item.unit)}" for item in following
+    )
+    names = ", ".join(item.name for item in following)
     return (
         f"{subject_text(scenario.name)}: {names} {'is' if len(following) == 1 else 'are'} recomputed from the "
         f"varied values, as if the controller knew them in every run; for the nominal gains give {options}"

@@ -178,4 +178,7 @@ def test_gains_that_follow_a_varied_value_are_named_with_the_nominal_ones_and_gi
     assert "surface_slope, boundary_layer are recomputed from the varied values" in remark
     assert "overrides=['controller.surface_slope=83.3333333 1/s'" in remark
     assert remark_on_following_gains(scenario, ["sensors.seed"]) == ""
+    # What a controller knows of its valve follows as well.
+    known = load_scenario("torque-task-proportional", ["controller.kind=pid", "valve.dead_band=0.02"])
+    assert "dead_band is recomputed" in remark_on_following_gains(known, ["valve.dead_band"])
     assert remark_on_following_gains(load_scenario("torque-task-proportional"), ["valve.area"]) == ""

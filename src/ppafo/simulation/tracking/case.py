@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.switching import SHUT
+from ppafo.metrics.metric import followed
+from ppafo.metrics.switching import OSCILLATION_THRESHOLD, SHUT, reversals
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import Remedy
@@ -45,6 +46,25 @@ class Case(NamedTuple):
         """True for each sample of the recording with a fully open valve."""
         command = np.abs(self.recording["command"])
         return np.asarray((command >= _FULLY_OPEN) & (command <= 1.0 + SHUT))
+
+    @property
+    def is_settling(self) -> bool:
+        """True if the mean error falls by at least 30 % from the first to the second half of the settled part."""
+        error = np.abs(self._error)
+        half = error.size // 2
+        return half > 0 and bool(np.mean(error[half:]) < 0.7 * np.mean(error[:half]))
+
+    @property
+    def is_approaching(self) -> bool:
+        """True if the value only approaches a reference at rest: its error falls throughout, and does not reverse."""
+        turns = reversals(self._error, OSCILLATION_THRESHOLD * self.settled.wanted_change)
+        return self.settled.rests and self.is_settling and turns == 0
+
+    @property
+    def _error(self) -> NDArray[np.float64]:
+        """Error of the settled part [SI]."""
+        reference, value = followed(self.recording)
+        return np.asarray((value - reference)[self.settled.samples])
 
 
 def only_opens_fully(recording: Recording) -> bool:

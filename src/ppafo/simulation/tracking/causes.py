@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ppafo.control.catalog import switching_remedy
+from ppafo.control.controllers.switching import ON_OFF
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
@@ -22,7 +23,7 @@ from ppafo.simulation.tracking.load_causes import (
     torque_at_its_limit,
     torque_beyond_reach,
 )
-from ppafo.simulation.tracking.pair_step import pair_step
+from ppafo.simulation.tracking.pair_step import pair_step, quicker_text
 from ppafo.simulation.tracking.remedies import (
     CASCADE,
     Remedy,
@@ -112,7 +113,7 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     if typical > _EDGE * band or settled.error_reversals or case.failure == "overshoots":
         return None
     known_band = float(scenario.controller.settings.get("dead_band", 0.0))
-    if known_band >= band and _is_settling(case):
+    if known_band >= band and case.is_settling:
         return None
     remedies = [remedy(scenario, {"controller.dead_band": band})] if known_band < band else []
     # A law that knows the band asks for more openings than it gets, and errs by what its gain lacks.
@@ -136,6 +137,9 @@ def oscillation(case: Case) -> TrackingCause | None:
         return None
     if law is not None and case.only_switches:
         return _step_of_valves(case, law)
+    # Valves that a Python object opens fully alone act as under the shipped on/off law.
+    if law is None and may_be_late and not late and _pair_step(case, ON_OFF)[0] > _FINE * case.settled.wanted_change:
+        return _step_of_valves(case, ON_OFF)
     if law is not None and names:
         return gains_of_another_device(case) or _fast_loop(case, law, names[0])
     name = "the user-defined controller" if law is None else f"`{law.name}`"
@@ -153,9 +157,7 @@ def oscillation(case: Case) -> TrackingCause | None:
 
 def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
     """Cause: on/off valves change the controlled quantity during their dead time, however little is requested."""
-    scenario, angle = case.scenario, case.recording["angle"][case.settled.samples]
-    step_by_gains, dead_time = pair_step(scenario, law)
-    step = step_by_gains * _loop_rate(scenario, float(np.mean(angle)))
+    scenario, (step, dead_time) = case.scenario, _pair_step(case, law)
     ratio = step / case.settled.wanted_change
     if ratio <= _FINE and not case.oscillates:
         return None
@@ -171,7 +173,15 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
     )
     # Where a valve has gradual openings, a law that uses them for an angle is the better remedy.
     gradual = (CASCADE,) if scenario.controlled == ANGLE else ()
-    return TrackingCause(text, (*gradual, *smaller_pair(scenario, ratio)), "take faster or smaller valves")
+    return TrackingCause(
+        text, (*gradual, *smaller_pair(scenario, ratio)), f"take smaller valves, or {quicker_text(scenario, dead_time)}"
+    )
+
+
+def _pair_step(case: Case, law: ControllerKind) -> tuple[float, float]:
+    """Step of on/off valves [SI] in their dead time, at the mean angle of the settled part, and that time [s]."""
+    step, dead_time = pair_step(case.scenario, law)
+    return step * _loop_rate(case.scenario, float(np.mean(case.recording["angle"][case.settled.samples]))), dead_time
 
 
 def _wide_zone(case: Case, begin: str, end: str = "") -> TrackingCause:
@@ -363,12 +373,16 @@ def _law_without_torque_loop(case: Case) -> TrackingCause | None:
     return TrackingCause(text, (CASCADE,))
 
 
-def _is_settling(case: Case) -> bool:
-    """True if the mean error falls by at least 30 % from the first to the second half of the settled part."""
-    reference, value = followed(case.recording)
-    error = np.abs((value - reference)[case.settled.samples])
-    half = error.size // 2
-    return half > 0 and bool(np.mean(error[half:]) < 0.7 * np.mean(error[:half]))
+def _still_approaching(case: Case) -> TrackingCause | None:
+    """Cause: a loop that neither swings nor rests needs longer than its reference rests, or larger gains."""
+    if case.failure != "does not follow" or not case.is_approaching:
+        return None
+    scenario, limit = case.scenario, float(case.scenario.controller.settings.get("error_limit", 0.0))
+    remedies = [remedy(scenario, {"controller.error_limit": factor * limit}) for factor in (2.0, 4.0) if limit > 0.0]
+    remedies += [remedy(scenario, {"run.duration": factor * scenario.run.duration}) for factor in (2.0, 4.0)]
+    remedies += rescaled_gains(scenario, case.law, (2.0, 4.0))
+    text = f"it is still on its way at the end, {case.settled.duration:.3g} s later"
+    return TrackingCause(text, tuple(remedies), "let the reference rest longer, or use larger gains")
 
 
 def _not_settled(case: Case) -> TrackingCause:
@@ -377,7 +391,7 @@ def _not_settled(case: Case) -> TrackingCause:
     stop = stop_of(case.scenario, case.recording["angle"][case.settled.samples])
     if stop and case.scenario.controlled == ANGLE:
         return TrackingCause(f"the joint lies on its {stop} stop", (), "check the load that moves it there")
-    if _is_settling(case):
+    if case.is_settling:
         longer = [remedy(case.scenario, {"run.duration": times * case.scenario.run.duration}) for times in (2.0, 4.0)]
         text = f"it has not settled by {case.settled.start:.3g} s"
         return TrackingCause(
@@ -404,6 +418,7 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     lambda case: small_valve(case, _MOSTLY, "this task", _LARGER_VALVES, "use a larger valve or a slower reference"),
     gains_of_another_device,
     _lag,
+    _still_approaching,
     _poor_sensors,
     _law_without_torque_loop,
     _not_settled,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.kind import ControllerKind
+from ppafo.control.torque_loop import SAMPLES_LATE
 from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.simulation.default_gains import DEAD_TIME, RATE
 from ppafo.simulation.gains import terms_of
@@ -53,6 +54,16 @@ def pair_step(scenario: Scenario, law: ControllerKind) -> tuple[float, float]:
     terms = terms_of(scenario, law)
     rate, dead_time = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
     return rate * dead_time, dead_time
+
+
+def quicker_text(scenario: Scenario, dead_time: float) -> str:
+    """Words for what reduces the dead time [s] of an on/off loop: its valves, the rate of its controller, or both."""
+    sampled = SAMPLES_LATE * scenario.controller.period
+    if not is_pair(scenario):
+        return "a higher `controller.rate`" if sampled > 0.5 * dead_time else "a faster valve"
+    # A pair accepts a command after its interval, and is told one after the samples: the longer of both counts.
+    interval = float(scenario.device.valve.settings["switching_interval"])
+    return "faster valves together with a higher `controller.rate`" if sampled > interval else "faster valves"
 
 
 def unlimited_switching(result: "RecordedResult") -> str:
@@ -124,6 +135,6 @@ def coarse_pair(scenario: Scenario, varied: Collection[str] = ()) -> str:
     smaller = "smaller valves" if scenario.motion.locked_angle is None else smaller_pair(scenario, ratio)[0].text
     return (
         f"{subject_text(scenario.name)}: the pair of valves changes the {controlled.words} by {step_text} in its dead "
-        f"time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested {wanted_text}: {smaller}, faster valves "
-        "or larger chambers reduce this step"
+        f"time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested {wanted_text}: {smaller}, "
+        f"{quicker_text(scenario, dead_time)} or larger chambers reduce this step"
     )

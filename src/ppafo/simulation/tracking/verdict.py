@@ -173,7 +173,7 @@ def tracking_in(result: "RecordedResult") -> Tracking | None:
         remedies=cause.remedies,
         others=tuple(other for other in others if other.remedies and other.text != cause.text),
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
-        at_rest=settled.rests,
+        at_rest=settled.rests and not case.is_approaching,
         since=settled.start,
         criterion=criterion if fails else "",
         worst=worst if fails else 0.0,
@@ -296,8 +296,8 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
     else:
         failure = failure_of_walk(settled, turning, limit)
     case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
-    # An error at the cut peaks of a wave reverses more often than the wave, and is no oscillation.
-    if failure == "oscillates" and turning <= 1.0 and is_task and cuts_wave(case):
+    # No oscillation: an error at the cut peaks of a wave, which reverses more often than the wave, and a slow approach.
+    if failure == "oscillates" and turning <= 1.0 and is_task and (cuts_wave(case) or case.is_approaching):
         return case._replace(failure="does not follow"), turning, reversals / recording.duration
     # A run that ends on its ramp has not yet requested its largest torque.
     beyond = float(np.max(shortfall(scenario))) if is_task and not settled.ends_on_ramp else 0.0
