@@ -20,9 +20,9 @@ WRONG_UNIT: Verdict = "unit probably wrong"
 """Verdict on a value far from the set that a common unit mistake in a recording explains; it is not used in a set."""
 _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only")
 
-UNKNOWN = 1.0
-"""Relative half-width of the confidence interval [-] from which a value is not identifiable; the interval then
-contains zero or twice the value."""
+UNKNOWN = 0.995
+"""Relative half-width of the confidence interval [-] from which a value is not identifiable, +-100 % when rounded: it
+then contains zero or twice the value."""
 _WIDE = 0.1
 """Relative half-width of the confidence interval [-] above which the verdict states the half-width."""
 

@@ -169,10 +169,12 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         low[row] = max(low[row], low[base] + runs.low[row])
     covariance = covariance + runs.base @ covariance + (covariance + runs.base @ covariance) @ runs.base.T
     jacobian, point = jacobian - jacobian @ runs.base, point + runs.base @ point
-    # Positive unknowns count relative to their estimates, because a start may be far off. After a conflict an estimate
-    # may be far too large, so the start limits it.
-    estimated = point if conflict is None else np.minimum(point, 1.0)
-    typical = np.where(((runs.low > 0.0) | runs.base.any(axis=1)) & (runs.prior == 0.0), estimated, 1.0)
+    # Unknowns count relative to their estimates, because a start may be far off; those that may be 0 or of either sign
+    # relative to the start where it is larger. After a conflict an estimate may be far too large: the start limits it.
+    estimated = np.abs(point) if conflict is None else np.minimum(np.abs(point), 1.0)
+    is_positive = runs.low > 0.0
+    is_positive |= runs.base @ is_positive > 0.0
+    typical = np.where(runs.prior > 0.0, 1.0, np.where(is_positive, estimated, np.maximum(estimated, 1.0)))
     return Fit(
         numbers=runs.numbers,
         values=point * runs.scale,

@@ -71,7 +71,10 @@ class BenchSection(StrictTable):
     ] = None
     start_of_angle: Annotated[
         Text | None,
-        Field(description="tolerance of the initial angle of each recording; default 0.05 deg if it is measured"),
+        Field(
+            description="tolerance of the initial angle of each recording, unless at a stop; default 0.05 deg if it is "
+            "read from the recording, else as zero_of_angle"
+        ),
     ] = None
     start_of_pressure: Annotated[
         Text | None,

@@ -128,13 +128,16 @@ class Friction:
 
 @dataclass(frozen=True, slots=True)
 class FootPlate:
-    """Foot plate: inertia about the ankle [kg m^2], maximum gravity torque m g l [N m]; equation (1)."""
+    """Foot plate: inertia about the ankle [kg m^2], largest gravity torque m g l [N m]; equation (1).
+
+    Above 0, gravity pulls towards 180 deg, as it does the toes; below 0 towards 0 deg, as in an elbow that flexes.
+    """
 
     inertia: Annotated[
         float, Number("kg m^2", "inertia about the ankle", minimum=0.0, maximum=1e3, minimum_allowed=False)
     ]
     gravity_torque: Annotated[
-        float, Number("N m", "maximum gravity torque about the ankle, m g l", minimum=0.0, maximum=1e4)
+        float, Number("N m", "largest gravity torque about the joint, m g l", minimum=-1e4, maximum=1e4)
     ]
 
 

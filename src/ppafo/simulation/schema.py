@@ -6,6 +6,7 @@ The layout defines the allowed keys. Numbers are checked when they are read (``r
 import functools
 import re
 from collections.abc import Container, Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, WithJsonSchema
@@ -14,7 +15,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import REFERENCE, SchemaVersion, make_schema, one_of, optional, table
 from ppafo.documents.problems import NAME
-from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
 from ppafo.simulation.document import PLAIN, kind_at
@@ -77,10 +78,21 @@ def profile_table(prescribed: Quantity, purpose: str, kind: str = "", further: d
                 f"{model_name(name)}{purpose}",
                 kind_field(name, profile.summary)
                 | (further or {})
-                | quantity_fields(declaration.profile_settings(name, prescribed)),
+                | quantity_fields(_torque_levels(name) if further else declaration.profile_settings(name, prescribed)),
             )
             for name, profile in named_or_all(kind, PROFILES.loaded()).items()
         ]
+    )
+
+
+def _torque_levels(kind: str) -> tuple[Quantity, ...]:
+    """Return the settings of a reference profile of torque; summaries name levels that other references require."""
+    required = {item.name for item in declaration.reference_settings(kind, ANGLE) if item.default is None}
+    return tuple(
+        replace(item, summary=f"{item.summary}, required unless a torque is followed")
+        if item.name in required and item.default is not None
+        else item
+        for item in declaration.reference_settings(kind, TORQUE)
     )
 
 

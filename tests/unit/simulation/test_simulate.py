@@ -376,3 +376,17 @@ def test_a_slip_in_a_controller_is_one_line_with_its_file_and_line(attribute: bo
     scenario = load_scenario("torque-task-proportional", ["run.duration=0.1 s"])
     with pytest.raises(SimulationError, match=rf"test_simulate\.py, line \d+: WithASlip: {said}"):
         simulate(scenario.controlled_by(WithASlip(attribute)))
+
+
+def test_a_weight_below_0_pulls_the_other_way() -> None:
+    swing = ("motion.kind=free", "controller.command=0", "actuator.torque_constant=0.001 cm^3", "device.valve=solenoid")
+    stops = ("actuator.angle_min=20 deg", "actuator.angle_max=160 deg", "run.duration=0.3 s")
+    foot, elbow = (
+        simulate("step-response", overrides=[*swing, *stops, angle, weight]).recording["angle"]
+        for angle, weight in (
+            ("motion.angle=120 deg", "foot_plate.gravity_torque=0.6 N m"),
+            ("motion.angle=60 deg", "foot_plate.gravity_torque=-0.6 N m"),
+        )
+    )
+    assert foot[-1] - foot[0] > math.radians(20.0)
+    np.testing.assert_allclose(elbow, math.pi - foot, atol=1e-3)

@@ -76,7 +76,7 @@ class CascadeParameters(NamedTuple):
         Number("rad", "angle change that counts as motion of the joint", None, 1.0e-9, 1.0, follows=(REST_DISTANCE,)),
     ]
     gravity_torque: Annotated[
-        float, Number("N m", "believed largest gravity torque, 0 for none", None, 0.0, 1.0e4, follows=(GRAVITY,))
+        float, Number("N m", "believed largest gravity torque, 0 for none", None, -1.0e4, 1.0e4, follows=(GRAVITY,))
     ]
     static_torque: Annotated[
         float, Number("N m", "believed static friction, 0 for none", None, 0.0, 1.0e4, follows=(STATIC_FRICTION,))

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_half_width
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as fit_residuals
-from ppafo.identification.residuals import ResidualBlock
+from ppafo.identification.residuals import FitVariable, ResidualBlock
 from ppafo.identification.trajectory.numbers import ZERO_OF, FitNumber, broken_rule, full_path, reach_of, with_numbers
 from ppafo.identification.trajectory.problem import TrajectoryProblem, numbers_of
 from ppafo.identification.trajectory.runs import (
@@ -126,24 +127,38 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     free = [number.free for number in numbers]
     start = np.array([number.start for number in free])
     rows = {(item.path, item.recordings): row for row, item in enumerate(numbers) if not item.is_tolerance}
+    sought = list(free)
     for (path, labels), row in rows.items():
-        dynamic, given = rows.get((_DYNAMIC, labels)), problem.parameters[row]
-        is_free = given.low is None and given.high is None and math.isinf(given.deviation)
-        if path == _STATIC and dynamic is not None and is_free:
-            # Friction at rest is at least friction in motion, so that the excess is sought.
-            base, excess = free[dynamic], max(free[row].start - free[dynamic].start, 0.0)
-            free[row] = replace(free[row], start=excess, low=0.0, scale=base.scale, base=base.name)
+        dynamic = rows.get((_DYNAMIC, labels))
+        if path == _STATIC and dynamic is not None and math.isinf(free[row].deviation):
+            sought[row] = _excess(free[row], free[dynamic])
     runs = []
     for experiment in problem.experiments:
         reach = reach_of([number for number in numbers if number.acts_in(experiment.label)])
         runs.append(prepare(experiment, numbers_in(experiment.label, numbers, start), reach))
     report(Progress(f"trajectory fit: {len(free)} numbers, {len(runs)} recordings"))
     blocks = blocks_of(runs, numbers, start)
-    fitted = fit_residuals(
-        lambda points: residuals_of(runs, numbers, points), free, blocks, problem.confidence, report, is_motion=True
-    )
+    residuals = partial(residuals_of, runs, numbers)
+    for variables in (sought, free):
+        fitted = fit_residuals(residuals, variables, blocks, problem.confidence, report, is_motion=True)
+        # Bounds of friction at rest that its excess does not keep are kept by a search within them.
+        excesses = [row for row, variable in enumerate(variables) if variable.base]
+        if all(free[row].low <= fitted.values[row] <= free[row].high for row in excesses):
+            break
     outliers = _outlier_remarks(fitted, blocks, {run.label: run.time for run in runs})
     return _result(problem, numbers, runs, fitted, tuple(outliers))
+
+
+def _excess(static: FitVariable, dynamic: FitVariable) -> FitVariable:
+    """Return friction at rest as the excess over friction in motion, since it is at least as large."""
+    low, high = max(static.low - dynamic.high, 0.0), static.high - dynamic.low
+    if not low < high:
+        raise IdentificationError(
+            f"{static.name}: high = {static.high:.6g} N m must be above low = {dynamic.low:.6g} N m of {dynamic.name}, "
+            "for friction at rest is at least friction in motion"
+        )
+    start = min(max(static.start - dynamic.start, low), high)
+    return replace(static, start=start, low=low, high=high, scale=dynamic.scale, base=dynamic.name)
 
 
 def _result(
@@ -294,7 +309,10 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
     """Return the estimate of one parameter with its verdict and explanation."""
     value, low, high = (float(column[row]) for column in (fitted.values, fitted.low, fitted.high))
     name, free = number.free.name, fitted.numbers[row]
-    bounds = [fitted.by_name.get(free.base, 0.0) + end for end in (free.low, free.high)]
+    base = fitted.by_name.get(free.base, 0.0)
+    bounds = [max(base + free.low, number.free.low), min(base + free.high, number.free.high)]
+    if free.base:
+        low, high = max(low, number.free.low), min(high, number.free.high)
     bound = next(
         (end for end in bounds if abs(value - end) <= max(_AT_BOUND * abs(end or 1.0), _NEAR * (high - low))), None
     )
@@ -326,7 +344,7 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
         cut = [
             bound for bound, end in zip(bounds, (low, high), strict=True) if abs(end - bound) <= _AT_BOUND * abs(end)
         ]
-        if free.base and low <= bounds[0]:
+        if free.base and low <= base:
             text += f"; the interval contains its bound, {free.base}"
         elif cut:
             end, unit = in_shown_unit(cut[0], number.unit)

@@ -143,7 +143,9 @@ def _of_run(tolerances: Tolerances, experiment: FittedExperiment) -> dict[str, t
     # Where the vane lies at a stop, the stop says where it starts.
     if free is not None and ANGLE not in inputs and not any(math.isclose(free.angle, stop) for stop in stops):
         stated = tolerances.start_of_angle
-        usual = math.hypot(_START_OF_ANGLE, _read_error(recording, ANGLE)) if is_read else 0.0
+        read = math.hypot(_START_OF_ANGLE, _read_error(recording, ANGLE)) if is_read else 0.0
+        # The angle of a scenario was set by a sensor, whose zero is known to this limit.
+        usual = read or deviation_of_limit(tolerances.zero_of_angle)
         found["motion.angle"] = usual if stated is None else deviation_of_limit(stated)
     for name in ("pressure_1", "pressure_2"):
         noise = _read_error(recording, name) if is_read else 0.0

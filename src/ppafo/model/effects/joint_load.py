@@ -14,7 +14,16 @@ class _JointLoad(NamedTuple):
 
     drag: Annotated[float, Number("N m s^2/rad^2", "drag torque per square of the rate", 0.0, 0.0, 1.0e3)]
     stiffness: Annotated[float, Number("N m/rad", "stiffness of a spring", 0.0, 0.0, 1.0e4)]
-    weight: Annotated[float, Number("N m", "largest torque of the weight of a link", 0.0, 0.0, 1.0e3)]
+    weight: Annotated[
+        float,
+        Number(
+            "N m",
+            "largest torque of a weight towards 180 deg; towards 0 deg: foot_plate.gravity_torque below 0",
+            0.0,
+            0.0,
+            1.0e3,
+        ),
+    ]
     rest_angle: Annotated[
         float, Number("rad", "angle at which the spring rests", 0.5 * math.pi, -math.pi, 2.0 * math.pi)
     ]
