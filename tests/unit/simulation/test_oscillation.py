@@ -106,7 +106,7 @@ def test_a_walk_says_it_and_meters_count_what_its_recording_shows() -> None:
     verdict = alone.tracking
     assert verdict is not None
     assert verdict.per == "stride"
-    assert "the gains do not suit this device; not tried: overrides=['controller.torque_gain=" in verdict.sentence
+    assert "; to try, the more promising one first: overrides=['controller.torque_gain=" in verdict.sentence
 
 
 def test_find_counts_what_oscillates_as_not_met() -> None:

@@ -145,8 +145,8 @@ def test_a_loop_within_a_cascade_that_is_too_fast_is_the_one_that_is_named() -> 
     assert quick is not None
     # The default gain, then twice this gain.
     gains = ("4.09", "8.17")
-    remedies = " or ".join(f"overrides=['controller.torque_gain={gain} 1/(N m)']" for gain in gains)
-    assert quick.sentence.endswith(f"; not tried: {remedies}")
+    remedies = "; ".join(f"overrides=['controller.torque_gain={gain} 1/(N m)']" for gain in gains)
+    assert quick.sentence.endswith(f"; to try, the more promising one first: {remedies}")
     pressed = [*given, "motion.external_torque=8 N m"]
     on_stop = simulate(scenario_from_dict(document("angle", "95 deg", "cascade", **FREE), pressed)).tracking
     assert on_stop is not None

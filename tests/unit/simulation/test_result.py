@@ -52,7 +52,7 @@ def test_a_stored_result_is_shown_as_its_run_was(tmp_path: Path, capsys: pytest.
     words = ["simulate", "torque-task-proportional", "--set", "controller.proportional_gain=5 1/(N m)", "--out"]
     main([*words, str(tmp_path / "told")])
     printed = capsys.readouterr().out.splitlines()
-    assert "; not tried: " not in printed[1]
+    assert "; to try" not in printed[1]
     assert repr(ppafo.read_result(tmp_path / "told")).splitlines()[1] == printed[1]
 
 

@@ -54,7 +54,7 @@ def test_loops_that_move_and_those_that_want_nothing_are_left_alone() -> None:
                 "controller.integral_gain=0 1/(Pa s)",
                 "valve.dead_band=0.05",
             ),
-            "opens the valve beyond `valve.dead_band = 0.05`; not tried: overrides=['controller.proportional_gain=",
+            "opens the valve beyond `valve.dead_band = 0.05`; to try, the more promising one first: overrides=[",
         ),
     ],
     ids=["no gain", "dead band"],

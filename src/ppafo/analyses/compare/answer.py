@@ -59,7 +59,9 @@ class ConfigurationResult:
     @property
     def word(self) -> str:
         """End of the nominal run in words; not recommended if the run does not follow its reference."""
-        return self.tracking.kind if self.tracking is not None and not self.follows else self.status.kind
+        if self.tracking is None:
+            return self.status.kind
+        return "beyond reach" if self.follows else self.tracking.kind
 
     @property
     def follows(self) -> bool:
@@ -216,11 +218,11 @@ def _paired(comparison: ComparisonResult, task: TaskComparison, name: str) -> li
         base, other = (task.case(configuration).value(pair.metric) for configuration in (comparison.baseline, name))
         # Nothing is a percentage of what is zero within the accuracy of a run.
         scale = abs(display_difference(base, kind.quantity))
-        nominal.append(_percent(display_difference(other - base, kind.quantity) / scale) if scale else "")
+        nominal.append(_percent(display_difference(other - base, kind.quantity) / scale) if scale else "-")
         quantiles = f"{_percent(pair.change)} ({_percent(pair.change_low)} to {_percent(pair.change_high)})"
-        spread.append(quantiles if math.isfinite(pair.change) and scale else "")
+        spread.append(quantiles if math.isfinite(pair.change) and scale else "-")
     better = [
-        "" if pair.better is None else "equal in all" if pair.equal == 1.0 else _PROBABILITY.interval(pair.better)
+        "-" if pair.better is None else "equal in all" if pair.equal == 1.0 else _PROBABILITY.interval(pair.better)
         for pair in pairs
     ]
     differences = [kind.change_interval(pair.difference) for kind, pair in zip(kinds, pairs, strict=True)]

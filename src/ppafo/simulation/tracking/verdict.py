@@ -97,8 +97,9 @@ class Tracking:
     @in_units(lambda tracking: tracking.units)
     def sentence(self) -> str:
         """Verdict in one line."""
-        remedies = " or ".join(remedy.text for remedy in self.remedies[:2])
-        untried = f"not tried: {remedies}" if remedies else self.advice
+        remedies = [remedy.text for remedy in self.remedies[:2]]
+        order = ", the more promising one first" if len(remedies) > 1 else ""
+        untried = f"to try{order}: {'; '.join(remedies)}" if remedies else self.advice
         last = f"intended: {self.accepted}" if self.accepted else self.tried or untried
         return "; ".join(filter(None, (self.found, self.cause, last)))
 
