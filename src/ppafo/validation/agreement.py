@@ -175,11 +175,21 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
     replayed = replay_together([request])[0]
     if isinstance(replayed, PpafoError):
         raise replayed
+    return agreement_of(request, replayed, settings)
+
+
+def agreement_of(
+    request: Replay, replayed: Replayed, settings: ReplaySettings, known_delay: float | None = None
+) -> RecordingAgreement:
+    """Return the comparison of a recording with its replay; a ``known_delay`` [s] takes the place of the estimate."""
+    measured = request.measured
     curves = _curves(measured, replayed, request.device, settings)
     # Sums and multiples of two others do not count twice.
     sensed = [curve for curve in curves if curve.channel in (ANGLE, PRESSURE_1, PRESSURE_2)]
-    delay = estimate_delay(sensed or curves[:1], settings.longest_delay)
-    remarks = [*measured.remarks, *_remarks(measured, device, settings)]
+    delay = Delay(known_delay or 0.0, is_at_limit=False)
+    if known_delay is None:
+        delay = estimate_delay(sensed or curves[:1], settings.longest_delay)
+    remarks = [*measured.remarks, *_remarks(measured, request.device, settings)]
     if delay.is_at_limit:
         limit = settings.longest_delay
         remarks.append(f"model and measurement differ in time by more than {limit:g} s; no delay was removed")

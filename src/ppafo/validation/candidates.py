@@ -110,8 +110,8 @@ _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
 """Trial delays of a sensor relative to the other sensors [s]."""
 _LONG_DELAYS = (0.015, 0.03, 0.05, 0.08, 0.12)
 """Trial delays [s] of all sensors with respect to the command, beyond the common delay that is removed."""
-_LEADS = (0.0005, 0.001, 0.003, 0.008, 0.015, 0.03, 0.05, 0.08, 0.12)
-"""Trial times [s] by which all sensors lead the command; none of it is removed."""
+_SHIFTS = (0.0005, 0.001, 0.003, 0.008, 0.015, 0.03, 0.05, 0.08, 0.12)
+"""Trial times [s] by which all sensors lead the command, of which none is removed, and delays of a valve with none."""
 _RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
 """Trial rates [-] of the clock of a recording."""
 
@@ -169,7 +169,7 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
         "lead of all sensors",
         "all sensors seem to lead the command by {:.3g} ms",
         lambda lead: ModelChange(delay=-lead),
-        _LEADS,
+        _SHIFTS,
         shown=1.0e3,
     )
     yield CandidateCause(
@@ -212,6 +212,14 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
             change = partial(_scaled, path, value)
             usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
             yield CandidateCause(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
+    if "valve.delay" in declared and number_at(scenario, "valve.delay") == 0.0:
+        yield CandidateCause(
+            "valve.delay",
+            "valve.delay seems to be above 0",
+            lambda delay: ModelChange(numbers={"valve.delay": delay}),
+            tuple(delay for delay in _SHIFTS if delay <= declared["valve.delay"].maximum),
+            unit="s",
+        )
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
     atmosphere = request.device.supply.atmospheric_pressure
 

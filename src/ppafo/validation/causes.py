@@ -54,8 +54,8 @@ _TRIED_IN_LONG_RECORDINGS = (
     "numbers of the set and effects)"
 )
 
-_AS_NEAR = 1.05
-"""Largest ratio of the errors left by two causes [-] at which the second cause is as near as the first."""
+_AS_NEAR, _MOST_NAMED = 1.3, 3
+"""Largest ratio of the errors left by two causes [-] at which both are near, and largest number of near causes."""
 
 _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 """Trial initial values of a channel whose first samples are wrong, as fractions of its range [-].
@@ -72,7 +72,7 @@ class ResidualCause:
     ``left`` is the largest RMS error of any channel divided by its noise [-] under the cause. ``numbers`` has the
     changed parameters by path, each a value with its SI unit. ``is_usual`` is true if the error is within the usual
     error of sensors. ``is_of_samples`` is true for faulty samples, which are visible without a model. ``same`` are
-    other causes that the recordings cannot distinguish from this one; of the nearest cause those that are as near.
+    other causes that the recordings cannot distinguish from this one; of the nearest cause two that are as near.
     """
 
     name: str
@@ -248,21 +248,29 @@ def _explained(
 def _unexplained(search: CauseSearch, tried: Sequence[SizedCause], kinds: str) -> Diagnosis:
     """Return the diagnosis without a cause, with the best of the causes ``tried``, of the ``kinds`` in words."""
     # What is wrong with samples is seen in them, whatever else is wrong; a misread unit is no hint beside other faults.
+    hinting = [
+        cause
+        for cause in tried
+        if not cause.candidate.is_of_unit and (cause.gain > 0.0 or cause.candidate.is_of_samples)
+    ]
     hints = sorted(
-        (_cause_of([cause], search.penalty) for cause in tried if not cause.candidate.is_of_unit),
-        key=lambda cause: (cause.is_of_samples, cause.gain),
-        reverse=True,
+        (
+            replace(_cause_of([cause], search.penalty), left=left)
+            for cause, left in zip(hinting, search.left_by(hinting), strict=True)
+        ),
+        # Of those that leave the same, numbers of the set come first.
+        key=lambda cause: (not cause.is_of_samples, float(f"{cause.left:.2g}"), not cause.numbers, cause.left),
     )
     if not hints:
         return Diagnosis(tried=len(tried), kinds=kinds)
     nearest, *others = hints
-    same = (
+    near = [
         other
         for other in others
-        if other.is_of_samples == nearest.is_of_samples
-        and (other.left <= _AS_NEAR * nearest.left or other.gain > nearest.gain - search.penalty)
-    )
-    return Diagnosis(nearest=replace(nearest, same=tuple(same)), tried=len(tried), kinds=kinds)
+        if other.is_of_samples == nearest.is_of_samples and other.left <= _AS_NEAR * nearest.left
+    ]
+    same = tuple(near[: _MOST_NAMED - 1])
+    return Diagnosis(nearest=replace(nearest, same=same), tried=len(tried), kinds=kinds)
 
 
 def _in_other_unit(

@@ -22,8 +22,9 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded.channels import COMMAND
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
-from ppafo.validation.agreement import replay_of
+from ppafo.validation.agreement import agreement_of, replay_of
 from ppafo.validation.change import SWAPPED, CandidateCause, ModelChange, joined
+from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.record import (
     ONLY_NOISE,
     STEPS,
@@ -174,6 +175,26 @@ class CauseSearch:
                 trials = self._improved([cause for cause in best.values() if cause.candidate.has_size])
         return [cause for cause in best.values() if cause.is_inside or not cause.candidate.has_size]
 
+    def left_by(self, causes: Sequence[SizedCause]) -> list[float]:
+        """Return the largest RMS error of any channel that each cause leaves, divided by its noise [-].
+
+        It is what a validation finds once the cause is mended, with its rule for the common delay: none at its limit.
+        """
+        requests = [self._request(record, cause.change) for cause in causes for record in self.records]
+        results, left = iter(replay_together([request for request in requests if request is not None])), list[float]()
+        for number, cause in enumerate(causes):
+            change, errors = cause.change, list[float]()
+            for request in requests[number * len(self.records) : (number + 1) * len(self.records)]:
+                result = None if request is None else next(results)
+                if request is not None and isinstance(result, Replayed):
+                    corrected = replace(request, measured=_in_step(request.measured, change))
+                    agreement = agreement_of(corrected, result, self.settings, abs(change.delay) or None)
+                    errors += [channel.in_noise for channel in agreement.channels]
+            # Wrong samples are left out of the errors of the search alone.
+            is_seen = change.start is not None or not errors
+            left.append(math.sqrt(float(cause.residuals.squares.max())) if is_seen else max(errors))
+        return left
+
     def _gain(self, residuals: ScaledResiduals, none: ScaledResiduals) -> float:
         """Return the gain G [-] of a change without the penalty for its fitted magnitude."""
         counts = np.concatenate([np.full(len(record.channels), record.values.shape[1]) for record in self.records])
@@ -294,6 +315,16 @@ class CauseSearch:
                 if is_larger and explained > of_engine + threshold * noise * noise:
                     return True
         return False
+
+
+def _in_step(measured: MeasuredRecording, change: ModelChange) -> MeasuredRecording:
+    """Return a recording without the delays of single sensors that a change supposes."""
+    recording = measured.recording
+    for name, sensor in change.sensors.items():
+        if sensor.delay and name in recording:
+            values = np.interp(recording.time + sensor.delay, recording.time, recording[name])
+            recording = recording.with_channel(name, values, recording.unit(name))
+    return replace(measured, recording=recording)
 
 
 def _bounded(slopes: Sequence[_Slope], errors: Floats) -> list[float]:

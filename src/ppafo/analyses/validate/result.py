@@ -6,6 +6,7 @@ from typing import Any
 from ppafo.parameters.device import Device
 from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind
+from ppafo.simulation.recorded.usual_errors import PRESSURE_ERRORS
 from ppafo.units.shown import quantity_of_unit
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import RecordingAgreement
@@ -82,12 +83,24 @@ def verdict(validation: Validation) -> str:
         motion = argument_text("motion", "leg")
         motion_remedy = f"if the device was on a leg, locked or driven, give {motion}, locked or measured first"
     texts = ("nothing but noise is left",) if causes.is_noise else (size, motion_remedy, why)
-    explanation = "; ".join(filter(None, texts))
+    explanation = "; ".join(filter(None, (*texts, _removed_delay(validation))))
     if not validation.passes:
         return f"{name} does not agree: {failed}; {explanation}"
     wide = f" ({worst.channel}: {100 * worst.limit:.3g} %, which is wider than the noise and may hide a wrong number)"
     limit = f"every RMS error is within its limit{'' if causes.is_noise else wide}"
     return f"{name} agrees with {count_of(count, 'recording')}: {limit}; {explanation}"
+
+
+def _removed_delay(validation: Validation) -> str:
+    """Return what was removed as common delay, if it is longer than usual of sensors: a valve may be late as well."""
+    removed = max(agreement.delay.correction for agreement in validation.recordings)
+    if removed <= PRESSURE_ERRORS.delay:
+        return ""
+    delay = validation.device.valve.settings.get("delay")
+    of_valve = (
+        "" if delay is None else f", of the sensors or of the valve (valve.delay = {1.0e3 * (delay + removed):.3g} ms)"
+    )
+    return f"a delay of {1.0e3 * removed:.3g} ms was removed{of_valve}"
 
 
 def _why(causes: Diagnosis, without: float, passes: bool) -> str:
