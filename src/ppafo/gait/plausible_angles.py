@@ -92,9 +92,10 @@ def check_ankle(walk: MeanStride) -> None:
 
 
 def check_ankle_alone(walk: MeanStride) -> None:
-    """Raise DataError for an ankle angle with an implausible range or zero, without a shank angle to compare."""
-    check_ankle_range(walk)
-    _check_ankle_zero(walk, np.degrees(walk.curves["ankle_angle"]), 0.0)
+    """Raise DataError for an ankle angle, if there is one, whose range or zero is implausible beside any shank."""
+    if "ankle_angle" in walk.curves:
+        check_ankle_range(walk)
+        _check_ankle_zero(walk, np.degrees(walk.curves["ankle_angle"]), 0.0)
 
 
 def _check_ankle_zero(walk: MeanStride, theta: Floats, foot: float) -> None:

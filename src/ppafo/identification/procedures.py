@@ -6,6 +6,7 @@ must be known to be closed.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
@@ -13,12 +14,18 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.documents.models import StrictTable, Text
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
+from ppafo.identification.bench.chamber_decay import CHANNELS as CHAMBER_PRESSURES
+from ppafo.identification.bench.checks import check_channels
+from ppafo.identification.bench.decay import ANGLE
 from ppafo.identification.bench.flow import GasAt, Law
 from ppafo.identification.bench.free_decay import free_decay
+from ppafo.identification.bench.open_valve_flow import CHANNELS as OPEN_VALVE_CHANNELS
 from ppafo.identification.bench.open_valve_flow import open_valve_flow
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.bench.static_torque import static_torque
+from ppafo.identification.bench.torque_readings import FORCE, TORQUE
+from ppafo.identification.bench.valve_map import CHANNELS as VALVE_MAP_CHANNELS
 from ppafo.identification.bench.valve_map import valve_map
 from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
@@ -317,6 +324,24 @@ FlowProblem = OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | FlowProblem
 
 
+_NEEDED = {
+    "static-torque": (TORQUE, "pressure_difference", "direction"),
+    "free-decay": (ANGLE,),
+    "open-valve-flow": OPEN_VALVE_CHANNELS,
+    "valve-map": VALVE_MAP_CHANNELS,
+    "vane-leak": CHAMBER_PRESSURES,
+}
+"""Channels that every recording of a procedure needs."""
+
+
+def check_needed_channels(where: str, problem: ProcedureProblem, read: Sequence[str]) -> None:
+    """Raise IdentificationError for channels that a procedure needs beside those ``read``; a force is a torque."""
+    needed = [
+        FORCE if name == TORQUE and FORCE in read and TORQUE not in read else name for name in _NEEDED[problem.kind]
+    ]
+    check_channels(where, problem.kind, needed, read)
+
+
 def run_procedure(
     sources: tuple[RecordingSource, ...], problem: ProcedureProblem, context: ProcedureContext
 ) -> BenchResult:
@@ -324,6 +349,14 @@ def run_procedure(
 
     Raises IdentificationError, with the name of the recording or the label of the procedure first.
     """
+    wrong: list[PpafoError] = []
+    for source in sources:
+        with noted_in(wrong):
+            check_needed_channels(source.name, problem, source.recording.names)
+    if isinstance(problem, FlowProblem):
+        with noted_in(wrong):
+            context.gas(problem, sources)
+    raise_noted(wrong)
     try:
         result = problem.run(sources, context)
     except IdentificationError as error:

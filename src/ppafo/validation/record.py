@@ -259,8 +259,7 @@ def _errors_from(
             delay = min(max(free, 0.0), longest_delay)
             if delay != free:
                 # At an end of its range the delay is known, and the initial values alone are fitted.
-                errors = errors - (last - delay) / interval * columns[0]
-                columns = columns[1:]
+                errors, columns = errors - (last - delay) / interval * columns[0], columns[1:]
                 sizes = _ridge_fit(columns, errors)
         errors = errors - sum(size * column for size, column in zip(sizes, columns, strict=True))
         if not by_delay:

@@ -325,6 +325,23 @@ def test_a_mistake_is_one_line_that_says_where(solved: Solve, text: str, message
     assert "\n" not in str(caught.value)
 
 
+def test_what_a_column_map_has_wrong_and_what_it_lacks_are_one_refusal(bench: Path, solved: Solve) -> None:
+    (bench / "meter.csv").write_text("t,Q,p1\n" + "".join(f"{k},{10 + k},{1 + k}\n" for k in range(20)))
+    mapped = '[columns.rig.channels]\ntime = {column = 1, unit = "s"}\nupstream_pressure = {column = 3, unit = "bar_g"}\n'
+    problem = f"{FLOW.replace('flow.csv', 'meter.csv')}columns = 'rig'\n{mapped}"
+    for flow, fragment in (
+        ('unit = "NL/min"', "which is a mass flow only with a reference condition and a gas"),
+        ('unit = "L/min", at = "ANR", gas = "air"', "is a flow of air, 0.02897 kg/mol, but the gas of"),
+    ):
+        with pytest.raises(PpafoError) as refused:
+            solved(f'{problem}mass_flow = {{column = "Q", {flow}}}\n')
+        assert len(refused.value.parts) == 2
+        assert fragment in str(refused.value)
+        assert "needs a channel 'downstream_pressure [Pa]', absolute downstream pressure; channels read: " in str(
+            refused.value
+        )
+
+
 def test_a_problem_without_a_device_is_refused() -> None:
     with pytest.raises(PpafoError, match=r"p\.toml: .*device"):
         parse_problem(b'schema_version = 1\nname = "a"\n', "p.toml")

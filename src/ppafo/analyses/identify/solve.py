@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ppafo.analyses.identify.answer import Identification
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.estimate import WRONG_UNIT
 from ppafo.identification.new_set import with_estimates
@@ -17,6 +17,7 @@ from ppafo.identification.procedures import (
     FlowProblem,
     ProcedureContext,
     ProcedureProblem,
+    check_needed_channels,
     run_procedure,
     window_of,
 )
@@ -161,7 +162,17 @@ def _tasks_in_order(reader: _RecordingReader) -> list[_Task]:
         row_time, gas = _ROW_TIMES.get(procedure.kind), procedure.gas if isinstance(procedure, FlowProblem) else None
         sources = list[RecordingSource]()
         for recording in procedure.recordings:
-            sources += reader.read(recording, procedure.columns, row_time, gas)
+            wrong: list[PpafoError] = []
+            with noted_in(wrong):
+                sources += reader.read(recording, procedure.columns, row_time, gas)
+            if wrong and procedure.columns is not None:
+                # What the map lacks is said with what is wrong in it.
+                with noted_in(wrong):
+                    mapped = reader.problem.columns[procedure.columns]
+                    derived = {} if mapped.direction is None else {"direction": None}
+                    names = [name for name in mapped.channels | derived if name != TIME]
+                    check_needed_channels(recording, procedure, names)
+            raise_noted(wrong)
         tasks.append(_Task(procedure, tuple(sources), f"{reader.file}: procedure {number}, {procedure.kind}"))
     return sorted(tasks, key=lambda task: PROCEDURES.index(task.procedure.kind))
 

@@ -196,7 +196,12 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     walk = walk_signals(tables, columns, body_mass, settings.stature, named.keys(), wrong)
     signs_from: SignSource = "columns" if own is None else "map"
     if any(name not in walk for name in REQUIRED):
-        _check_without_strides(walk, settings.body_mass, signs_from, wrong)
+        # Without a stride, the whole recording still shows the range of the ankle and the sign of its moment.
+        curves = {name: signal.values[np.isfinite(signal.values)] for name, signal in walk.items()}
+        whole = MeanStride({name: signal.file for name, signal in walk.items()}, curves, 0.0, 0.0, signs_from)
+        for check in (check_ankle_alone, check_moment) if settings.body_mass else (check_ankle_alone,):
+            with noted_in(wrong):
+                check(whole)
         raise_noted(wrong)
     # The knee is one entry of a map, but two curves.
     added = {name: each.columns for name, each in walk.items() if not {name, name.partition("_")[0]} & named.keys()}
@@ -236,20 +241,6 @@ def _read_tables(
         units = {**found.units, **{name: table.units[name] for name in kept}}
         arranged.append(replace(found, columns=columns, units=units))
     return arranged
-
-
-def _check_without_strides(
-    walk: Mapping[str, Signal], body_mass: float | None, signs_from: SignSource, wrong: list[PpafoError]
-) -> None:
-    """Add to ``wrong`` what the whole recording shows of ankle angle and moment where an angle is missing."""
-    curves = {name: signal.values[np.isfinite(signal.values)] for name, signal in walk.items()}
-    whole = MeanStride({name: signal.file for name, signal in walk.items()}, curves, 0.0, 0.0, signs_from)
-    with noted_in(wrong):
-        if "ankle_angle" in walk:
-            check_ankle_alone(whole)
-    with noted_in(wrong):
-        if body_mass is not None:
-            check_moment(whole)
 
 
 def _with_loads(

@@ -38,19 +38,7 @@ def check_sources(
         raise IdentificationError(f"{procedure}: no recording was given")
     for source in sources:
         recording = source.recording
-        for name in channels:
-            if name not in recording:
-                known = CHANNELS[name]
-                hint = nearest_name(name, [other for other in recording.names if other not in channels])
-                zero = ', or { constant = "0 kPa_g" } at atmospheric pressure' if known.unit == "Pa" else ""
-                unit = "kPa_g" if known.unit == "Pa" else known.unit
-                derived = ', or derive it: direction.of = "pressure_difference", with a threshold and a window'
-                raise IdentificationError(
-                    f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
-                    f"channels read: {', '.join(recording.names) or 'only time'}; a column map must list every channel "
-                    f'to be read: {name} = {{ column = "HEADER", unit = "{unit}" }}'
-                    f"{zero}{derived if name == 'direction' else ''}"
-                )
+        check_channels(source.name, procedure, channels, recording.names)
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
             worst = int(np.argmax(np.abs(values)))
             if abs(values[worst]) > _LARGEST_NUMBER:
@@ -74,6 +62,27 @@ def check_sources(
                     "kPa_g"
                 )
             check_not_alone(source, procedure, name)
+
+
+def check_channels(where: str, procedure: str, needed: Sequence[str], read: Sequence[str]) -> None:
+    """Raise IdentificationError with all channels that a procedure needs and a recording or column map lacks."""
+    spare, asked, maps = [name for name in read if name not in needed], list[str](), list[str]()
+    for name in needed:
+        if name in read:
+            continue
+        known = CHANNELS[name]
+        asked.append(f"a channel '{name} [{known.unit}]', {known.summary}{nearest_name(name, spare)}")
+        unit, others = known.unit, ""
+        if unit == "Pa":
+            unit, others = "kPa_g", ', or { constant = "0 kPa_g" } at atmospheric pressure'
+        elif name == "direction":
+            others = ', or derive it: direction.of = "pressure_difference", with a threshold and a window'
+        maps.append(f'{name} = {{ column = "HEADER", unit = "{unit}" }}{others}')
+    if asked:
+        raise IdentificationError(
+            f"{where}: {procedure} needs {' and '.join(asked)}; channels read: {', '.join(read) or 'only time'}; a "
+            f"column map must list every channel to be read: {'; '.join(maps)}"
+        )
 
 
 def check_moves(source: RecordingSource, procedure: str, name: str) -> None:
