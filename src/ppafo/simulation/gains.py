@@ -111,7 +111,8 @@ def remark_on_following_gains(scenario: Scenario, varied: Collection[str]) -> st
     )
 
 
-def warn_of_following_gains(scenario: Scenario, varied: Collection[str]) -> None:
-    """Log the remark on gains that follow varied values, if there is one."""
-    if remark := remark_on_following_gains(scenario, varied):
+def warn_of_gains(scenario: Scenario, varied: Collection[str]) -> None:
+    """Log the remarks on gains that follow varied values, and on numbers kept from another kind or set, if any."""
+    kept = scenario.origin.replaced and f"{subject_text(scenario.name)}: {scenario.origin.replaced}"
+    for remark in filter(None, (remark_on_following_gains(scenario, varied), kept)):
         logger.warning("ppafo: %s", remark)

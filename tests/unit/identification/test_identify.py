@@ -327,7 +327,9 @@ def test_a_mistake_is_one_line_that_says_where(solved: Solve, text: str, message
 
 def test_what_a_column_map_has_wrong_and_what_it_lacks_are_one_refusal(bench: Path, solved: Solve) -> None:
     (bench / "meter.csv").write_text("t,Q,p1\n" + "".join(f"{k},{10 + k},{1 + k}\n" for k in range(20)))
-    mapped = '[columns.rig.channels]\ntime = {column = 1, unit = "s"}\nupstream_pressure = {column = 3, unit = "bar_g"}\n'
+    mapped = (
+        '[columns.rig.channels]\ntime.column = 1\ntime.unit = "s"\nupstream_pressure = {column = 3, unit = "bar_g"}\n'
+    )
     problem = f"{FLOW.replace('flow.csv', 'meter.csv')}columns = 'rig'\n{mapped}"
     for flow, fragment in (
         ('unit = "NL/min"', "which is a mass flow only with a reference condition and a gas"),

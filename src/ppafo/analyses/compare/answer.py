@@ -260,6 +260,8 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
             with said_of_configuration(case.configuration):
                 remarks.append(coarse_pair(case.scenario))
                 remarks.append(remark_on_following_gains(case.scenario, comparison.varied))
+                if kept := case.scenario.origin.replaced:
+                    remarks.append(f"{where}: {kept}")
                 if case.tracking is not None and not case.follows:
                     remarks.append(f"{where}: {case.tracking.sentence}; not counted among the best")
             if not case.status.is_completed:

@@ -121,6 +121,10 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
     )
 
 
+_SETTLED = "RMS error in the second half of the hold"
+"""Number that decides in place of the error of one instant, for a loop that swings."""
+
+
 def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
     """Return a sentence on the value found, or on the nearest value if none meets the condition."""
     path, condition, tried = outcome.path.path, outcome.condition, outcome.tried
@@ -132,6 +136,7 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
     if index is None:
         # The nearest one says whether a wider range could.
         row = int(np.searchsorted(tried["value"], outcome.nearest))
+        nearest = f"{_SETTLED} of " if tried["judged"][row] > tried["metric"][row] else nearest
         there = "" if outcome.verdicts else f"{nearest}{of_condition.text(tried['judged'][row])} at "
         ends = f"from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}"
         return f"no {path} {ends} {meets}; the nearest is {there}{kind.text(tried['value'][row])}"
@@ -140,8 +145,10 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
     follows = " and follows its reference" if missed else ""
     lead = f"{path} = {kind.text(value)} is the {wanted} value that {meets}{follows}"
     # Verdicts have the number that decided, in a line of their own.
-    number = of_condition.text(float(tried["metric"][index]))
+    number, judged = (of_condition.text(float(tried[name][index])) for name in ("metric", "judged"))
     there = "" if outcome.verdicts else f": {condition.metric} is {number} there"
+    if there and tried["judged"][index] > tried["metric"][index]:
+        there += f", and the {_SETTLED}, which decides, {judged}"
     if neighbour is None:
         return f"{lead}, at the end of the range{there}; a wider range may have a {further} value"
     bracket, (reason, other) = f"(bracketed to {kind.change(abs(value - neighbour), '.1g')})", outcome.refusal
@@ -150,7 +157,12 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
         add = f"; for {further} values, add {override_text([f'{other}={end}'])}" if other else ""
         valid = f"it is the {wanted} valid value, not the limit of the condition {bracket}"
         return f"{path} = {kind.text(value)} {meets}{follows}{there}; {valid}: {reason}{add}"
-    return f"{lead}{there} {bracket}"
+    beyond, why = tried[index + (1 if outcome.highest else -1)], ""
+    if beyond["oscillating"]:
+        why = "; beyond it the loop oscillates"
+    elif not is_verdict and condition.is_kept(beyond["judged"]):
+        why = "; beyond it the reference is not followed"
+    return f"{lead}{there} {bracket}{why}"
 
 
 def _remarks(outcome: FindResult, kind: Kind, missed: int) -> Iterator[str]:

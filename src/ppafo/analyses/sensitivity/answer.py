@@ -44,8 +44,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         sentences.append(
             f"in {influences.not_following:,} runs the reference is not followed; the indices include these runs"
         )
-    if influences.gains:
-        sentences.append(influences.gains)
+    sentences += filter(None, influences.gains)
     figure = Section(
         "Indices and their convergence",
         panels=partial(_panels, influences),

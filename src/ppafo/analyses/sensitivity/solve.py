@@ -99,7 +99,7 @@ class Influences:
     ``paths``: paths of the uncertain values
     ``runs``, ``failed``: number of runs, and of failed runs
     ``not_following``: number of completed runs that do not follow their reference
-    ``gains``: remark on controller gains that follow the uncertain values, empty if none does
+    ``gains``: remarks on controller gains that follow the uncertain values or are kept from another kind; or empty
     """
 
     study: str
@@ -111,7 +111,7 @@ class Influences:
     not_following: int
     policy: str
     metrics: list[MetricSensitivity]
-    gains: str = ""
+    gains: tuple[str, ...] = ()
 
 
 _POLICY = "above the maximum fraction refused; below, every block with a failed run is left out"
@@ -173,7 +173,9 @@ def analyse(
         not_following=int(off),
         policy=_POLICY,
         metrics=[_metric_sensitivity(name, rows[name], evaluated, method, settings) for name in requested],
-        gains="" if scenario is None else remark_on_following_gains(scenario, uncertainty.paths),
+        gains=()
+        if scenario is None
+        else (remark_on_following_gains(scenario, uncertainty.paths), scenario.origin.replaced),
     )
 
 

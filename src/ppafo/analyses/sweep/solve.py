@@ -29,7 +29,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
-from ppafo.simulation.gains import warn_of_following_gains
+from ppafo.simulation.gains import warn_of_gains
 from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 from ppafo.storage.files import temporary_folder
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
@@ -249,7 +249,7 @@ def sweep(
         varied = [path for path in {*chosen.paths, *chosen.same} if chosen.varies(path, configuration.name)]
         with said_of_configuration(configuration.name):
             warn_of_coarse_pairs([configuration.scenario], varied)
-            warn_of_following_gains(configuration.scenario, varied)
+            warn_of_gains(configuration.scenario, varied)
     report = progress or report_nothing
     store = StudyStore.claim(chosen, folder, agreed, threads, report)
     _compute_missing_chunks(store, threads, progress)

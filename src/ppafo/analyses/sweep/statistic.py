@@ -20,7 +20,7 @@ from ppafo.errors import at_fault
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
-from ppafo.simulation.gains import warn_of_following_gains
+from ppafo.simulation.gains import warn_of_gains
 from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, drawn_in
 from ppafo.studies.intervals import floored_interval, noise_interval
@@ -105,7 +105,7 @@ def estimate(
     target = target_width(parsed, metric, width_text)
     rule = StoppingRule(*target, first_draws, draws, confidence, maximum_failed)
     warn_of_coarse_pairs([base.scenario])
-    warn_of_following_gains(base.scenario, uncertainty.paths)
+    warn_of_gains(base.scenario, uncertainty.paths)
     runs = scenario_runs(base.scenario, metrics, RunCounter(rule.first, progress), uncertainty.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
         seed = chosen.sample.seed if seed is None else seed

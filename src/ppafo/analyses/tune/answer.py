@@ -275,8 +275,7 @@ def remarks_of(
         f"candidates, {runs:,} runs; {settled} of {len(starts)} converged before the maximum number of "
         "generations"
     ]
-    if coarse := coarse_pair(problem.scenario, problem.before):
-        remarks.append(coarse)
+    remarks += filter(None, (coarse_pair(problem.scenario, problem.before), problem.scenario.origin.replaced))
     for path, bound in reached.items():
         remarks.append(
             f"{path} ended at its {bound}: a better value may lie beyond; widen the bounds if the device allows it"

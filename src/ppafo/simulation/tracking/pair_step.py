@@ -1,6 +1,7 @@
 """Smallest change of the controlled quantity by a pair of on/off valves: the change during their dead time."""
 
 import logging
+import math
 from collections.abc import Callable, Collection, Iterable
 from typing import TYPE_CHECKING
 
@@ -13,12 +14,11 @@ from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.case import only_opens_fully
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
 from ppafo.simulation.tracking.rule import (
     REVERSALS,
     is_pair,
-    only_switches,
+    most_reversals,
 )
 from ppafo.simulation.tracking.settled import smallest_change
 from ppafo.units import without_exponent
@@ -72,10 +72,8 @@ def unlimited_switching(result: "RecordedResult") -> str:
     Without data the limit is the switching frequency that the paper reports of its solenoid valves.
     """
     scenario = result.scenario
-    # The recorded commands say whether a Python object that controls a walk only switches.
-    is_python = scenario.law is None and not scenario.follows_reference
-    may_switch = only_switches(scenario, scenario.law) or (is_python and only_opens_fully(result.recording))
-    if not may_switch or REVERSALS not in result.metrics:
+    # A law that asks for gradual openings and reverses them is said to oscillate.
+    if math.isfinite(most_reversals(scenario)) or REVERSALS not in result.metrics:
         return ""
     often = result.metrics[REVERSALS].value / max(result.recording.duration, 1.0)
     valve = scenario.device.valve.settings

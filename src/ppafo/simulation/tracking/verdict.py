@@ -214,6 +214,8 @@ def following_text(result: "RecordedResult") -> str:
         is_widened = case.only_switches and scenario.follows_reference and number == 0
         reason = ", because the valves are either open or shut" if is_widened else ""
         error_text, limit_text = _error_and_limit(controlled.name, error, limit)
+        if name == "swing" and case.only_switches:
+            error_text += f", {100.0 * error / settled.wanted_change:.0f} % of the requested change"
         errors.append(f"{name} {error_text}" + ("" if math.isinf(limit) else f" ({limit_text} allowed{reason})"))
     # The interval stands before the errors: metrics of the same names cover the whole run.
     verdict = f"the {controlled.words} follows its reference;{time_text(settled.start)}: {', '.join(errors)}"

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -250,6 +251,28 @@ def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_erro
     (tried,) = (each for each in found.tried if each.value == pytest.approx(101325.0 + 84.0 * 6894.757293168361))
     assert tried.metric == pytest.approx(final_error)
     assert tried.judged == pytest.approx(there) or math.isnan(tried.judged)
+
+
+def test_the_error_that_decides_is_named_beside_the_metric_and_so_is_what_ends_the_range() -> None:
+    said = find(
+        "torque-task-solenoid",
+        overrides=["reference.level=3 N m"],
+        vary="valve.area=2..30 mm^2",
+        such_that="final_error <= 0.5 N m",
+        highest=True,
+        grid=15,
+    ).said[0]
+    assert re.search(r"final_error is 0.\d+ N m there, and the RMS error in .*, which decides, 0.3\d+ N m", said)
+    unstable = ["sensors.delay=20 ms", "reference.level=3 N m"]
+    gain = find(
+        TASK,
+        overrides=unstable,
+        vary="controller.proportional_gain=0.1..3 1/(N m)",
+        such_that="final_error <= 0.05 N m",
+        highest=True,
+        grid=8,
+    )
+    assert gain.said[0].endswith("; beyond it the loop oscillates")
 
 
 def test_one_instant_of_a_loop_that_settles_is_its_error() -> None:
