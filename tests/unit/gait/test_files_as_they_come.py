@@ -9,6 +9,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.gait import Gait, load_gait, walk_recording
+from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.cycle import wrap_cycle
@@ -371,8 +372,7 @@ def test_all_faults_of_a_mean_stride_over_percent_are_in_one_refusal_and_their_r
         import_gait([path], ImportSettings(low_pass=0.5))
     said = (
         "a low pass at 0.5 Hz",
-        "first column must be 'time', not 'percent'; a mean stride over percent of the stride cannot be imported: "
-        "give 3 strides over time with vertical_force",
+        r"first column must be 'time', not 'percent'; or give one mean stride .* duration, such as stride_time=1\.1$",
         "does not state the body mass",
         "shank_angle: there is no column 'shank_angle' .* or add a file that has them",
     )
@@ -384,6 +384,37 @@ def test_all_faults_of_a_mean_stride_over_percent_are_in_one_refusal_and_their_r
         rows = np.column_stack([TIME, np.degrees(curve(name, TIME))]).tolist()
         file.write_text(f"time [s],{name} [deg]\n" + "".join(f"{time!r},{angle!r}\n" for time, angle in rows))
     assert import_gait([ankle, shank], PERSON).gait.origin == "imported"
+
+
+@pytest.mark.parametrize("names", [(*REQUIRED, "vertical_force"), REQUIRED], ids=["force", "shank"])
+def test_a_mean_stride_over_percent_is_one_stride_of_the_given_duration(tmp_path: Path, names: tuple[str, ...]) -> None:
+    gait, path, phases = load_gait(), tmp_path / "percent.csv", np.linspace(0.0, 1.0, 101)
+    units = {"vertical_force": "-"}
+    columns = [gait.curve(name).values_at(phases) for name in names]
+    shown = [values if name in units else np.degrees(values) for name, values in zip(names, columns, strict=True)]
+    head = ",".join(f"{name} [{units.get(name, 'deg')}]" for name in names)
+    rows = np.column_stack([100.0 * phases, *shown]).tolist()
+    path.write_text(f"cycle [%],{head}\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows))
+    mean = import_gait([path], replace(PERSON, stride_time=1.2))
+    assert (mean.gait.strides, mean.gait.stride_time_deviation, mean.gait.title) == (1, 0.0, "Mean stride, right foot")
+    assert mean.gait.stride_time == pytest.approx(1.2)
+    assert any("the variation between strides is unknown" in remark for remark in mean.remarks)
+    # The same stride six times over time is the same gait.
+    repeated = [[1.2 * (turn + 0.01 * row[0]), *row[1:]] for turn in range(6) for row in rows[:-1]]
+    path.write_text(f"time [s],{head}\n" + "".join(",".join(map(repr, row)) + "\n" for row in repeated))
+    over_time = import_gait([path], PERSON)
+    assert mean.gait.stance_share == pytest.approx(over_time.gait.stance_share, abs=1e-4)
+    for name in names:
+        assert mean.curves[name].mean == pytest.approx(over_time.curves[name].mean, abs=2e-3)
+    # A column that is no percent, and a duration beside a time.
+    path.write_text(
+        f"frame,{head}\n" + "".join(",".join(map(repr, [7.0 + k, *row[1:]])) + "\n" for k, row in enumerate(rows))
+    )
+    with pytest.raises(DataError, match="the first column must be 'time', not 'frame'"):
+        import_gait([path], replace(PERSON, stride_time=1.2))
+    path.write_text(f"time [s],{head}\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows))
+    with pytest.raises(DataError, match="stride_time is for a file over percent of the stride"):
+        import_gait([path], replace(PERSON, stride_time=1.2))
 
 
 def test_a_map_of_the_ankle_alone_leaves_the_shank_to_the_form_of_the_file(tmp_path: Path) -> None:

@@ -61,6 +61,7 @@ def gait_import(
     stature: Length | None = None,
     low_pass: Frequency | None = None,
     minimum_strides: Count | None = None,
+    stride_time: Time | None = None,
     form: Annotated[str, Word("FORM")] = "",
     start: Time | None = None,
     end: Time | None = None,
@@ -79,6 +80,7 @@ def gait_import(
     stature: stature of the wearer, such as '1.75 m'; gives the thigh length that OpenSim files lack
     low_pass: cutoff of a low-pass filter, such as '6 Hz'; default: none
     minimum_strides: minimum number of whole strides; default 2, overground 1
+    stride_time: duration of a mean stride over percent, such as '1.1 s'
     form: form of the files, such as opensim; default: what they look like
     start: leave out what is before, such as '1.2 s'
     end: leave out what is after, such as '3.4 s'
@@ -103,6 +105,7 @@ def gait_import(
         walking_speed=speed,
         low_pass=low_pass,
         least_strides=minimum_strides,
+        stride_time=stride_time,
         name=name,
         title=title,
         stature=stature,

@@ -82,6 +82,9 @@ def find_footfalls(
     walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, given_least: int | None
 ) -> Footfalls:
     """Return the strides of a walk: from the force if it shows enough, otherwise from the source with more strides."""
+    if any(table.is_mean_stride for table in tables):
+        turned = _of_walk(walk, (), side, 1)
+        return replace(turned, strides=usable_strides(walk, turned.strides)[:1], is_one_cycle=True)
     least = given_least or LEAST_STRIDES
     footfalls = _of_walk(walk, tables, side, least)
     usable = usable_strides(walk, footfalls.strides)

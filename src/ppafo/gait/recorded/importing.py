@@ -177,7 +177,7 @@ def _gait(
     times, shares = ([getattr(stride, name) for stride in strides.taken] for name in ("time", "stance_share"))
     return Gait(
         name=settings.name,
-        title=settings.title or f"Mean of {count} strides, {settings.side} foot",
+        title=settings.title or f"{_strides_text(source, count)}, {settings.side} foot",
         origin=origin,
         source=f"imported from {files}, {settings.side} foot; strides from the {events.replace('_', ' ')}",
         body_mass=settings.body_mass or 0.0,
@@ -190,3 +190,10 @@ def _gait(
         strides=count,
         **curves,
     )
+
+
+def _strides_text(source: GaitSource, count: int) -> str:
+    """Return words for the strides of a gait: a table over percent does not state the number of its strides."""
+    if any(table.is_mean_stride for table in source.tables):
+        return "Mean stride"
+    return f"Mean of {count} strides" if count > 1 else "One stride"

@@ -231,6 +231,7 @@ class ImportSettings:
     - ``longest_gap``: longest gap that is filled [s]
     - ``ankle_neutral``: reading [rad] with the foot perpendicular to the shank; it overrides map and convention
     - ``form``: name of the file format, detected if empty
+    - ``stride_time``: duration [s] of the mean stride in a file over percent of the stride
     """
 
     body_mass: float | None = None
@@ -247,6 +248,7 @@ class ImportSettings:
     longest_gap: float = 0.0
     ankle_neutral: float | None = None
     form: str = ""
+    stride_time: float | None = None
 
 
 _OPTIONS = {"columns": "--map", "least_strides": "--minimum-strides", "longest_gap": "--fill-gaps"}
@@ -283,6 +285,8 @@ def check_settings(settings: ImportSettings) -> None:
         wrong.append(f"the start, {settings.start:g} s, must be before the end, {settings.end:g} s")
     if re.fullmatch(NAME, settings.name) is None:
         wrong.append(f"name {settings.name!r} must consist of lower-case letters, digits, '-' and '_'")
+    if settings.stride_time is not None and not 0.2 <= settings.stride_time <= 10.0:
+        wrong.append(f"a stride time of {settings.stride_time:g} s is not plausible; allowed is 0.2 to 10 s")
     if settings.least_strides is not None and settings.least_strides < 1:
         wrong.append(f"the minimum number of strides must be 1 or more, not {settings.least_strides}")
     raise_noted([DataError(text) for text in wrong])

@@ -19,7 +19,7 @@ from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.markers import convention_of_map
 from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, Side, column_names, setting_text
 from ppafo.gait.recorded.signal import Signal
-from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps, without_lost_markers
+from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps, mean_stride_table, without_lost_markers
 from ppafo.gait.recorded.walk import walk_signals
 from ppafo.kinds import Kinds
 from ppafo.plugins import nearest_kind
@@ -233,6 +233,11 @@ def _read_tables(
             read.append(read_table(path, settings.longest_gap, start, end, settings.form))
     if len(read) < len(files):
         raise_noted(wrong)
+    if settings.stride_time is not None:
+        read = [mean_stride_table(each, settings.stride_time) if each.problem else each for each in read]
+        if not any(each.is_mean_stride or each.problem for each in read):
+            given = setting_text("stride_time")
+            wrong.append(DataError(f"{given} is for a file over percent of the stride, in its first column; omit it"))
     wrong += [DataError(table.problem) for table in read if table.problem]
     arranged = []
     for table in read:

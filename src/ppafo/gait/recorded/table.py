@@ -47,7 +47,8 @@ class MotionTable:
 
     ``form`` is the name of the file format, set by the caller of the reader. ``kind`` is ``measured`` or ``synthetic``.
     ``remarks`` describe repairs, ``trial`` holds data on subject and events. ``problem`` is a fault of the file that
-    leaves its columns readable; the import refuses the file after it has checked them.
+    leaves its columns readable; the import refuses the file after it has checked them. ``is_mean_stride`` is true for a
+    mean stride that was repeated.
     """
 
     file: str
@@ -59,6 +60,27 @@ class MotionTable:
     remarks: tuple[str, ...] = ()
     trial: TrialData | None = None
     problem: str = ""
+    is_mean_stride: bool = False
+
+
+_TURNS = 3
+"""Number of repetitions of a mean stride: one whole stride lies within, wherever its table begins."""
+_ENDS_OF_STRIDE = 5.0
+"""Largest distance of the first and the last row of a mean stride to 0 and 100 % [%]."""
+
+
+def mean_stride_table(table: MotionTable, stride_time: float) -> MotionTable:
+    """Return a mean stride over percent, in its first column, over time, repeated; unchanged without such a column."""
+    percent = next(iter(table.columns.values()))
+    steps, ends = np.diff(percent), np.abs(percent[[0, -1]] - [0.0, 100.0])
+    if not (np.all(steps > 0.0) and np.all(ends < _ENDS_OF_STRIDE) and percent[0] >= 0.0 and percent[-1] <= 100.0):
+        return table
+    # 100 % is 0 % of the next stride.
+    kept = percent < 100.0
+    time = (np.arange(_TURNS)[:, None] + percent[kept] / 100.0).ravel() * stride_time
+    columns = {name: np.tile(values[kept], _TURNS) for name, values in table.columns.items()}
+    remark = f"one mean stride, closed to {stride_time:.4g} s as given; the variation between strides is unknown"
+    return replace(table, time=time, columns=columns, remarks=(*table.remarks, remark), problem="", is_mean_stride=True)
 
 
 _LARGEST_JUMP = 3.0

@@ -23,7 +23,6 @@ _TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
 _COUNTERS = ("", "index", "frame", "frame#", "framenumber", "frame number", "sample")
 """Column names of row counters, in lower case; the first is pandas' index."""
 
-_NO_TIME = "a mean stride over percent of the stride cannot be imported: give 3 strides over time with vertical_force"
 _LONGEST_SHOWN = 40
 """Largest number of characters of a name in a message."""
 
@@ -67,7 +66,11 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     at = next((place for place, name in enumerate(names) if name.lower() in _TIMES), 0)
     at = at if all(name.lower() in _COUNTERS for name in names[:at]) else 0
     clock = names[at] if names[at].lower() in _TIMES else ""
-    problem = f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; {_NO_TIME}"
+    duration = setting_text("stride_time", 1.1, "1.1 s")
+    problem = (
+        f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; or give one mean "
+        f"stride over 0 to 100 percent with its duration, such as {duration}"
+    )
     if "" in names[at:]:
         raise DataError(f"{path}: a column has no name; name every column")
     # A decimal comma shows only where commas do not separate the cells.
