@@ -363,4 +363,6 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
             # Without the dashes, which all have in common and which would make strangers look alike.
             names = [option.removeprefix("--") for option in known if option.startswith("--")]
             hint = nearest_name(name.strip("-"), names).replace("'", "'--", 1)
+            if name == "--set" and "design" in words[:1]:
+                hint = ": write overrides = ['PATH=VALUE'] into the design file"
             raise UsageError(f"there is no option '{name}'{hint}; available: {', '.join(known)}")

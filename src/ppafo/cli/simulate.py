@@ -29,7 +29,8 @@ def simulate(
 
     Exit code 1 where it diverged, or a check finds it numerically sensitive, or its reference not followed.
 
-    check: run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated
+    check: run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated;
+        exit code 1 if one cannot, or if the reference is not followed
     out: result folder with the report; default out/NAME of the scenario
 
     >>> print(simulate("step-response", out=Path("step")).text.splitlines()[0])

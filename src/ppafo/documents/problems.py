@@ -55,7 +55,10 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
             continue
         key = _key_at(detail["loc"], model)
         if is_gap(detail):
-            missing.append(f"{key.path}{_MISSING[detail['type']]}")
+            # Of a table that is missing its required keys are named, which the next refusal would ask for.
+            fields = key.value_type.model_fields if _is_model(key.value_type) else {}
+            required = [f"{key.path}.{name}" for name, field in fields.items() if field.is_required()]
+            missing += required or [f"{key.path}{_MISSING[detail['type']]}"]
         else:
             problems.setdefault(key.path, (key, detail))
     ordered = sorted(problems.values(), key=lambda problem: problem[1]["type"] != "extra_forbidden")

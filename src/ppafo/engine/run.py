@@ -188,17 +188,15 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     return batches
 
 
+_GROUPS_OF_RUN = ("plant", "thermal", "valve", "controller", "reference", "path", "sensors")
+"""Groups of parameters that every run has as a field of this name."""
+
+
 def _parameters_of(run: Run, timing: LaneTiming) -> dict[str, Any]:
     """Return the groups of parameters of a run, by name."""
     return {
         "timing": timing,
-        "plant": run.plant,
-        "thermal": run.thermal,
-        "valve": run.valve,
-        "controller": run.controller,
-        "reference": run.reference,
-        "path": run.path,
-        "sensors": run.sensors,
+        **{name: getattr(run, name) for name in _GROUPS_OF_RUN},
         **({} if run.walk is None else run.walk.parameters),
         **({} if run.lines is None else {"lines": run.lines.parameters}),
         **({} if run.leg is None else {"load": run.leg.load, "shank": run.leg.shank}),

@@ -96,8 +96,18 @@ class Actuator:
     displacement_per_radian: float
     angle_min: Annotated[float, Number("rad", "lower stop, where chamber 1 is smallest", minimum=-10.0, maximum=10.0)]
     angle_max: Annotated[float, Number("rad", "upper stop, where chamber 1 is largest", minimum=-10.0, maximum=10.0)]
-    dead_volume_1: Annotated[float, Number("m^3", "line and clearance of chamber 1", minimum=SMALLEST_VOLUME)]
-    dead_volume_2: Annotated[float, Number("m^3", "line and clearance of chamber 2", minimum=SMALLEST_VOLUME)]
+    dead_volume_1: Annotated[
+        float,
+        Number(
+            "m^3", "line and clearance of chamber 1, added to its swept or tabulated volume", minimum=SMALLEST_VOLUME
+        ),
+    ]
+    dead_volume_2: Annotated[
+        float,
+        Number(
+            "m^3", "line and clearance of chamber 2, added to its swept or tabulated volume", minimum=SMALLEST_VOLUME
+        ),
+    ]
     restitution: float
     leak: Orifice | SonicOrifice
     kind: str = VANE

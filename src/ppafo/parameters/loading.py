@@ -144,15 +144,11 @@ def _parameter_set(parsed: Any, file: str, folder: Path) -> ParameterSet:
     """Return the set of a validated file, whose entries are now keyed by dotted path."""
     entries = dict(_entries(parsed, ""))
     actuator = parsed.actuator
+    stated = ("name", "title", "citation", "notes", "completed_by", "default_valve")
     return ParameterSet(
         file=file,
-        name=parsed.name,
-        title=parsed.title,
-        citation=parsed.citation,
-        notes=parsed.notes,
-        completed_by=parsed.completed_by,
+        **{name: getattr(parsed, name) for name in stated},
         parent=beside(parsed.parent, folder, list_sets()) if parsed.parent else "",
-        default_valve=parsed.default_valve,
         valve_kinds={name: valve.kind for name, valve in parsed.valves.items()},
         actuator_kind=VANE if actuator is None else actuator.kind,
         actuator_file=getattr(actuator, "file", ""),

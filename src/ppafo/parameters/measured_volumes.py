@@ -24,6 +24,7 @@ from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.actuators.table import MOST_ANGLES, MOST_PRESSURES
 from ppafo.signals.recording import Floats
 from ppafo.units import number_text, to_si
+from ppafo.units.shown import counted_from, shown_in, shown_text
 from ppafo.wording import nearest_name, one_line, reason, said_missing
 
 
@@ -79,17 +80,21 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
         raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start} is invalid)") from error
     except (OSError, ValueError) as error:
         raise ParameterError(f"{file}: cannot be read: {reason(error)}") from error
-    columns, digits = _columns(text, file)
+    columns, digits, units = _columns(text, file)
     angles, pressures = np.unique(columns["angle"]), np.unique(columns["pressure"])
-    _check_grid(columns["angle"], columns["pressure"], file)
+    # Refusals are in the units of the table.
+    shown = counted_from({COLUMNS[name].unit: unit for name, unit in units.items()}, 0.0)
+    with shown_in(shown):
+        _check_grid(columns["angle"], columns["pressure"], file)
     order = np.lexsort((columns["pressure"], columns["angle"]))
     volumes = {
         name: column[order].reshape(angles.size, pressures.size)
         for name, column in columns.items()
         if name.startswith("volume")
     }
-    for name in sorted(volumes):
-        _check_volume(name, volumes[name], angles, pressures, digits[name], file)
+    with shown_in(shown):
+        for name in sorted(volumes):
+            _check_volume(name, volumes[name], angles, pressures, digits[name], file)
     return MeasuredVolumes(
         angles=angles,
         pressures=pressures,
@@ -100,8 +105,8 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
     )
 
 
-def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]:
-    """Return the columns of a file by name, each (lines,), and their rounding steps, in SI units.
+def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float], dict[str, str]]:
+    """Return the columns of a file by name, each (lines,), their rounding steps, in SI units, and their units.
 
     Pressures are gauge pressures.
     """
@@ -131,7 +136,7 @@ def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]
         columns[name] = column
         step = _step([Decimal(number_text(cells[index])) for _, cells in below])
         digits[name] = abs(to_si(step, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
-    return columns, digits
+    return columns, digits, units
 
 
 def _step(numbers: Sequence[Decimal]) -> float:
@@ -200,12 +205,12 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
     if angles.size < 2:
         raise ParameterError(f"{file}: has one angle only; at least 2 angles are needed")
     if pressures[0] <= -STANDARD_ATMOSPHERE:
-        raise ParameterError(f"{file}: pressure = {pressures[0] / 1e3:.4g} kPa_g is below a perfect vacuum")
+        raise ParameterError(f"{file}: pressure = {shown_text(pressures[0], 'Pa_a')} is below a perfect vacuum")
     if pressures.size > 1 and 0.0 not in pressures:
         nearest = pressures[int(np.argmin(np.abs(pressures)))]
         raise ParameterError(
-            f"{file}: has no volumes of the vented actuator; add lines at 0 kPa_g (nearest pressure: "
-            f"{nearest / 1e3:.4g} kPa_g)"
+            f"{file}: has no volumes of the vented actuator; add lines at {shown_text(0.0, 'Pa_a')} (nearest pressure: "
+            f"{shown_text(nearest, 'Pa_a')})"
         )
     _check_spacing("angle", angles, MOST_ANGLES, _NEAREST_ANGLES * float(np.ptp(angles)), file)
     _check_spacing("pressure", pressures, MOST_PRESSURES, _NEAREST_PRESSURES, file)
@@ -239,15 +244,16 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
     if volume.min() < 0.0:
         row, column = np.unravel_index(int(np.argmin(volume)), volume.shape)
         point = _point_text(angles[row], pressures[column])
-        raise ParameterError(f"{file}: {name} = {volume.min() * 1e6:.6g} mL at {point} is negative; correct the volume")
+        least = shown_text(float(volume.min()), "m^3")
+        raise ParameterError(f"{file}: {name} = {least} at {point} is negative; correct the volume")
     falls = np.argwhere(np.diff(volume, axis=1) < -unseen)
     if falls.size:
         row, column = falls[0]
-        fall = 1e6 * (volume[row, column] - volume[row, column + 1])
+        fall = -float(np.diff(volume, axis=1)[row, column])
         raise ParameterError(
             f"{file}: {name} decreases with pressure at {_point_text(angles[row], pressures[column + 1])}, by "
-            f"{fall:.3g} mL; at most the last digit, {1e6 * resolution:.3g} mL, is allowed: correct the volume, or "
-            "round the volumes to the resolution of the measurement"
+            f"{shown_text(fall, 'm^3', '.3g')}; at most the last digit, {shown_text(resolution, 'm^3', '.3g')}, is "
+            "allowed: correct the volume, or round the volumes to the resolution of the measurement"
         )
     sign, direction = (1.0, "grow") if name == "volume_1" else (-1.0, "shrink")
     wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= -unseen)
@@ -256,9 +262,9 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
     if wrong.size:
         raise ParameterError(
             f"{file}: {name} must {direction} with the angle at the highest pressure, but does not at "
-            f"{math.degrees(angles[wrong[0] + 1]):.6g} deg"
+            f"{shown_text(angles[wrong[0] + 1], 'rad')}"
         )
 
 
 def _point_text(angle: float, pressure: float) -> str:
-    return f"{math.degrees(angle):.6g} deg and {pressure / 1e3:.6g} kPa_g"
+    return f"{shown_text(angle, 'rad')} and {shown_text(pressure, 'Pa_a')}"

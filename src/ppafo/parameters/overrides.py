@@ -242,22 +242,21 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
         allowed = [*declared, SPECIES_PATH, RELIEVING_PATH]
         if override.typed.startswith(CHOSEN_VALVE):
             allowed = [one_path(known, path.split(".")[1]) for known in allowed]
-        # Nothing is spelt alike: values of the same section stand for what there is.
-        near = [name for name in allowed if name.startswith(f"{override.typed.partition('.')[0]}.")] or allowed
-        # A gas is given by the name of its species, whatever the value was called.
-        is_species = "gas" in override.typed.split(".") and override.text in SPECIES
-        hint = (
-            f", did you mean '{SPECIES_PATH}={override.text}'?" if is_species else nearest_name(override.typed, allowed)
-        )
-        hint = hint or f"; for example {', '.join(near[:6])}"
         section, _, rest = override.typed.partition(".")
         name = rest.partition(".")[0]
-        if section == SECTION and name not in EFFECTS.loaded():
+        if section == SECTION and name in EFFECTS.loaded():
+            section = f"{section}.{name}"
+        # Compared without their section, which all values in it have in common and which makes strangers look alike.
+        near = [known.removeprefix(f"{section}.") for known in allowed if known.startswith(f"{section}.")]
+        hint = nearest_name(override.typed.removeprefix(f"{section}."), near).replace("'", f"'{section}.", 1)
+        # Nothing is spelt alike: values of the same section stand for what there is.
+        hint = hint or (f"; '{section}' has {', '.join(near)}" if near else nearest_name(override.typed, allowed))
+        # A gas is given by the name of its species, whatever the value was called.
+        if "gas" in override.typed.split(".") and override.text in SPECIES:
+            hint = f", did you mean '{SPECIES_PATH}={override.text}'?"
+        if section == SECTION:
             near_name = nearest_name(name, EFFECTS.loaded()) or f"; effects: {', '.join(sorted(EFFECTS.loaded()))}"
             hint = f": no effect '{name}'{near_name}; your own needs an entry point 'ppafo.effects'"
-        elif section == SECTION:
-            own = [known for known in allowed if known.startswith(f"{section}.{name}.")]
-            hint = nearest_name(override.typed, own) or f"; it has {', '.join(own)}"
         worked = _in_conductance(override)
         raise ParameterError(
             f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}{worked}"

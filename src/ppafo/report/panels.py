@@ -103,8 +103,8 @@ _MARKUP = re.compile(r"\\[a-z]+|[${}_^]")
 """Pattern of the markup in a title, which takes no space on the page."""
 _SMALLEST_PLAIN, _LARGEST_PLAIN = 1.0e-4, 1.0e7
 """Limits of a logarithmic axis whose tick labels are written without an exponent."""
-_FEW_DECADES = 100.0
-"""Ratio of the ends of a logarithmic axis below which 2 and 5 of every decade have a label too."""
+_ONE_DECADE, _FEW_DECADES = 10.0, 100.0
+"""Ratio of the ends of a horizontal and of any logarithmic axis below which 2 and 5 of every decade have a label."""
 _TITLE_LINE = 0.2
 """Line height of the title [inches]."""
 _OF_LEGEND: Mapping[str, Any] = {
@@ -345,7 +345,9 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
         if axis.get_scale() == "log":
             low, high = sorted(axis.get_view_interval())
             if high < _FEW_DECADES * low:
-                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                # Labels side by side take more room than labels above each other.
+                is_narrow = axis is axes.xaxis and high >= _ONE_DECADE * low
+                axis.set_major_locator(LogLocator(subs=(1.0, 3.0) if is_narrow else (1.0, 2.0, 5.0)))
             axis.set_major_formatter(_logarithmic_ticks(axis))
             axis.set_minor_formatter(NullFormatter())
     return mapped

@@ -16,10 +16,10 @@ from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import (
     ACTUAL,
+    BLACK,
     CHAMBER_1,
     CHAMBER_2,
     GREY,
-    ORANGE,
     REFERENCE,
     REFERENCE_2,
     DrawingStyle,
@@ -85,7 +85,7 @@ _QUANTITIES = (
         kind=Kind("Gas since the start", "kg", "gas mass"),
         lines={
             "supplied_mass": ("supplied", ACTUAL),
-            "vented_mass": ("vented", DrawingStyle(ORANGE)),
+            "vented_mass": ("vented", DrawingStyle(BLACK, "-.")),
             "leaked_mass": ("leaked between the chambers", DrawingStyle(GREY, "--")),
         },
         smallest_span=1.0e-5,

@@ -51,7 +51,7 @@ def read_result(folder: str | Path) -> StoredResult:
     stored = read_stored(folder)
     file = stored.folder / RUN_FILE
     metrics = Metrics()
-    for name, stated in _under(file, stored.document, "metrics").items():
+    for name, stated in table_at(file, stored.document, "metrics").items():
         try:
             # JSON has no nan, which a metric without a value has.
             value = math.nan if stated["value"] is None else float(stated["value"])
@@ -63,7 +63,7 @@ def read_result(folder: str | Path) -> StoredResult:
     said = stored.document.get("verdict", [_ending(file, stored.document)])
     if not (isinstance(said, list) and all(isinstance(each, str) for each in said)):
         raise _other_form(file, "verdict", said, "a list of texts")
-    kind = one_line(_under(file, stored.document, "status").get("kind", ""))[:_LONGEST_SHOWN]
+    kind = one_line(table_at(file, stored.document, "status").get("kind", ""))[:_LONGEST_SHOWN]
     with shown_in(stated_units(file, stored.document, device=("scenario", "device"))):
         text = "\n".join([kind, *filter(None, map(one_line, said)), "", *metrics_lines(metrics), ""])
     return replace(stored, metrics=metrics, atmosphere=atmosphere, drawn_by=draw_stored_result, text=text)
@@ -75,11 +75,11 @@ def draw_stored_result(stored: StoredResult, width: float | str | None = None) -
     Raises DataError that names the invalid key of ``run.json``.
     """
     file, document = stored.folder / RUN_FILE, stored.document
-    title = _under(file, document, "scenario").get("name", "")
+    title = table_at(file, document, "scenario").get("name", "")
     if not isinstance(title, str):
         raise _other_form(file, "scenario.name", title, "a text")
-    valve = str(_under(file, document, "scenario", "device", "valve").get("kind", ""))
-    words = _under(file, document, "scenario", "device", "joint")
+    valve = str(table_at(file, document, "scenario", "device", "valve").get("kind", ""))
+    words = table_at(file, document, "scenario", "device", "joint")
     joint = {name: words.get(name, getattr(ANKLE, name)) for name in ("name", "positive", "negative")}
     for name, word in joint.items():
         if not isinstance(word, str):
@@ -99,7 +99,7 @@ def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recordi
     part = f"the last {_END_OF_WALK:g} s of {end:.4g} s" if recording.duration > _END_OF_WALK else ""
     remark = "; ".join(text for text in (_ending(file, document), part) if text)
     shown = recording.between(end - _END_OF_WALK, end)
-    valve = str(_under(file, document, "configuration", "device", "valve").get("kind", ""))
+    valve = str(table_at(file, document, "configuration", "device", "valve").get("kind", ""))
     with shown_in(stated_units(file, document, device=("configuration", "device"))):
         return recording_figure(shown, recording.label, remark, valve)
 
@@ -113,7 +113,7 @@ def stated_units(
     kind, and for an invalid value, with its key.
     """
     # The device itself says from which pressure gauge ones count.
-    stated = {key: unit for key, unit in _under(file, document, *keys, "shown").items() if key != GAUGE_ZERO}
+    stated = {key: unit for key, unit in table_at(file, document, *keys, "shown").items() if key != GAUGE_ZERO}
     for si_unit, unit in stated.items():
         try:
             conversion(str(unit), si_unit)
@@ -125,7 +125,7 @@ def stated_units(
 def _stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> float:
     """Return the atmosphere of the device at some keys of a document [Pa absolute], standard if it is missing."""
     path = (*device, "supply", "atmospheric_pressure")
-    atmosphere = _under(file, document, *path[:-1]).get(path[-1], STANDARD_ATMOSPHERE)
+    atmosphere = table_at(file, document, *path[:-1]).get(path[-1], STANDARD_ATMOSPHERE)
     # JSON has true and false, which Python takes for 1 and 0.
     is_number = isinstance(atmosphere, int | float) and not isinstance(atmosphere, bool)
     if not is_number or not 0.0 < atmosphere < _LARGEST:
@@ -135,12 +135,12 @@ def _stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) ->
 
 def _ending(file: Path, document: Mapping[str, Any]) -> str:
     """Return the reason for an early stop of a run; empty for a completed run."""
-    status = _under(file, document, "status")
+    status = table_at(file, document, "status")
     message = one_line(status.get("message", ""))[:_LONGEST_REMARK]
     return "" if status.get("kind", "completed") == "completed" else message
 
 
-def _under(file: Path, document: Mapping[str, Any], *keys: str) -> Mapping[str, Any]:
+def table_at(file: Path, document: Mapping[str, Any], *keys: str) -> Mapping[str, Any]:
     """Return the table at some keys of a document, empty if it is missing."""
     for depth, key in enumerate(keys, start=1):
         below = document.get(key, {})

@@ -150,10 +150,13 @@ def without_exponent(value: float, form: str) -> str:
     ('2640', '2e+07', '0.123')
     >>> without_exponent(0.0, "+.3g"), without_exponent(0.0, ".1e"), without_exponent(-0.0, ".2f")
     ('0', '0', '0.00')
+    >>> without_exponent(-0.3, ".0f")
+    '0'
     """
     if value == 0.0:
         return "0" if form[-1:] == "e" else f"{0.0:{form.removeprefix('+')}}"
     text = f"{value:{form}}"
+    text = text if text.strip("-0.") else text.removeprefix("-")
     is_long = "e+0" in text and form[-1:] == "g" and abs(value) < _LARGEST_WITHOUT_EXPONENT
     return f"{float(text):{form.partition('.')[0]}.0f}" if is_long else text
 

@@ -105,7 +105,8 @@ def test_a_misspelt_path_names_the_nearest() -> None:
             "valve.aera=1mm^2",
             "override 'valve.aera=1mm^2': ppafo2011 has no value 'valve.aera', did you mean 'valve.area'",
         ),
-        ("valve.zzzzzzzz=1", "has no value 'valve.zzzzzzzz'; for example valve."),
+        ("valve.zzzzzzzz=1", "has no value 'valve.zzzzzzzz'; 'valve' has area, "),
+        ("actuator.stroke=80mm", "has no value 'actuator.stroke'; 'actuator' has torque_constant, "),
         ("valve.area=3mm", "override 'valve.area=3mm': unit 'mm' does not fit"),
     ],
 )

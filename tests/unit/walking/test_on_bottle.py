@@ -41,14 +41,13 @@ def test_mass_and_energy_close(small: WalkResult) -> None:
     assert balance.given_up + balance.ice + balance.room == pytest.approx(balance.delivered, rel=1e-12)
 
 
-def test_the_band_of_the_line_is_narrow_beside_the_pressure_of_the_regulator(small: WalkResult) -> None:
+def test_the_band_of_the_line_is_seen_beside_the_pressure_of_the_regulator(small: WalkResult) -> None:
     behind = bottle_figure(small).axes[0]
     (band,) = behind.collections
     heights = band.get_paths()[0].vertices[:, 1]
     lowest, highest = behind.get_ylim()
-    assert lowest == 0.0
-    # Within a stride the line loses a few of its 50 psi.
-    assert np.ptp(heights) < 0.2 * (highest - lowest)
+    # Within a stride the line loses less than 1 of its 50 psi, of which an axis from 0 would show a hair.
+    assert np.ptp(heights) > 0.1 * (highest - lowest)
 
 
 def test_the_temperatures_of_the_figure_are_means_of_strides_without_the_ripple_of_the_pulses(

@@ -22,6 +22,7 @@ from ppafo.units.shown import in_units, pressure_units
 from ppafo.version import __version__
 from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.bottle.course import duration_text, strides_text
+from ppafo.walking.bottle.supply import SET_PRESSURE
 
 FORMAT = "ppafo bottle"
 _TITLE = "How long the bottle lasts"
@@ -218,6 +219,7 @@ def _facts(endurance: Endurance) -> list[tuple[str, str]]:
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, room)
     heat = heat_to_warm(bottle.fluid.table, content, room, bottle.regulator.set_pressure)
     counted, repeated = _counted(endurance), "recording" if endurance.is_of_recording else "task sequence"
+    of_device = ", the supply pressure of the device" * (bottle.entries[SET_PRESSURE].origin == "derived")
     use = "of use" if endurance.is_of_recording else "of walking"
     rows = [
         ("run time", f"{duration_text(result.walking_time)} {use}, {duration_text(result.total_time)} in total"),
@@ -226,6 +228,7 @@ def _facts(endurance: Endurance) -> list[tuple[str, str]]:
             f"{counted}s without cooling",
             f"{strides_text(endurance.strides_when_warm)} (a bottle that stays at room temperature)",
         ),
+        ("regulator set to", _PRESSURE.text(bottle.regulator.set_pressure) + of_device),
         ("ended", result.ending.message),
         (
             "gas",

@@ -1,5 +1,6 @@
 """Simulation of the discharge of a full bottle until it no longer maintains the supply pressure."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -63,15 +64,18 @@ def flow_limit(bottle: Bottle, pressure: float, temperature: float) -> float:
     return regulator_flow_limit(bottle.regulator, pressure, temperature, bottle.heat_capacity_ratio, gas_constant)
 
 
-def smallest_mass_when_warm(bottle: Bottle, draw: GasDemand) -> float:
-    """Return the smallest mass of gas [kg] with which the bottle maintains the supply pressure at room temperature."""
+def smallest_mass_when_warm(bottle: Bottle, draw: GasDemand, enough: float = math.inf) -> float:
+    """Return the smallest mass of gas [kg] with which the bottle maintains the supply pressure at room temperature.
+
+    ``enough`` is a pressure in the bottle [Pa absolute] that was seen to suffice.
+    """
     table, room = bottle.fluid.table, bottle.room_temperature
     low, high = 0.0, min(bottle.mass, bottle.volume * densest_gas(table, room))
     # Halved until nothing is left to halve: the reserve grows with the mass, though not smoothly where liquid begins.
     for _ in range(60):
         middle = 0.5 * (low + high)
         pressure = bottle_content(table, middle, bottle.volume, room).pressure
-        if min(reserves(bottle, draw, pressure, room)) < 0.0:
+        if min(reserves(bottle, draw, pressure, room)) < 0.0 and pressure < enough:
             low = middle
         else:
             high = middle

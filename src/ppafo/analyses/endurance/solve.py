@@ -1,9 +1,10 @@
 """Duration of a bottle for a gas demand from given numbers, from a recording, or from a walk."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
@@ -16,17 +17,18 @@ from ppafo.model.gas import SPECIES
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.parameters.declaration import SPECIES_PATH
 from ppafo.parameters.overrides import read_overrides
+from ppafo.parameters.parameter_set import SOURCE
 from ppafo.report.kind import Kind
-from ppafo.report.stored_figure import stated_units
+from ppafo.report.stored_figure import stated_units, table_at
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.owned_folder import read_json
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import RUN_FILE
-from ppafo.units.shown import shown_text
+from ppafo.units.shown import shown_in, shown_text, written_text
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle.coupling import Schedule
-from ppafo.walking.bottle.supply import BOTTLE_NAME, is_of_bottle, other_pressure
+from ppafo.walking.bottle.supply import BOTTLE_NAME, SET_PRESSURE, is_of_bottle, other_pressure
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life, silent
@@ -78,8 +80,9 @@ def endurance_of_gas_use(
     elif isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
         gas = read_walk_gas(Path(use))
     else:
-        full = load_bottle(PAPER_BOTTLE if bottle is None else bottle, overrides)
-        return _endurance_of_recording(use, stride_time, full, schedule)
+        return _endurance_of_recording(
+            use, stride_time, PAPER_BOTTLE if bottle is None else bottle, schedule, tuple(overrides)
+        )
     if stride_time is not None:
         stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"
         argument = argument_text("stride_time")
@@ -104,28 +107,37 @@ def _check_no_gas_override(name: str, overrides: Iterable[str]) -> None:
 
 
 def _endurance_of_recording(
-    use: str | Path | Recording, stride_time: float | None, full: Bottle, schedule: Schedule
+    use: str | Path | Recording,
+    stride_time: float | None,
+    bottle: str | Path,
+    schedule: Schedule,
+    overrides: tuple[str, ...],
 ) -> Endurance:
     """Return the duration of a full bottle for a recording, its file or its result folder, which is repeated.
 
-    ``stride_time`` is the time of a stride [s]; by default the whole recording is repeated. Raises DataError for the
-    result folder of a device with another gas than the bottle contains.
+    ``stride_time`` is the time of a stride [s]; by default the whole recording is repeated. The regulator of a bottle
+    of the package has the supply pressure that a result folder states, unless an override sets it. Raises DataError
+    for the result folder of a device with another gas than the bottle contains.
     """
+    full = load_bottle(bottle, overrides)
     if isinstance(use, Recording):
         recording, units = use, {}
     else:
         recording, run = read_recording(Path(use)), Path(use) / RUN_FILE
         document = read_json(run) if run.is_file() else {}
         units = dict(stated_units(run, document)) if document else {}
-        molar_mass: Any = document
-        for key in ("scenario", "device", "gas", "molar_mass"):
-            molar_mass = molar_mass.get(key) if isinstance(molar_mass, dict) else None
+        of_device = partial(table_at, run, document, "scenario", "device")
+        molar_mass, pressure = of_device("gas").get("molar_mass"), of_device("supply").get("pressure")
         if isinstance(molar_mass, float) and not is_of_bottle(molar_mass, full):
             raise DataError(
                 f"{run}: the device uses gas of {1000.0 * molar_mass:.4g} g/mol, but bottle '{full.name}' contains "
                 f"{full.fluid.name}; choose a bottle with the gas of the device (ppafo bottle --list), or simulate the "
                 f"device with gas.species={full.fluid.name}"
             )
+        is_own = Path(bottle).suffix == ".toml" or full.entries[SET_PRESSURE].source == SOURCE
+        if isinstance(pressure, float) and not is_own and not math.isclose(pressure, full.regulator.set_pressure):
+            with shown_in(units):
+                full = load_bottle(bottle, [*overrides, f"{SET_PRESSURE}={written_text(pressure, 'Pa_a')}"])
     endurance = follow_bottle(full, demand_of_recording(recording, stride_time), schedule)
     return replace(endurance, is_of_recording=stride_time is None, device_units=units)
 
@@ -183,12 +195,15 @@ def endurance_of_walk_gas(
         "pressure; on the bottle the pressure at the valve falls with each draw, and the gas is colder and denser)"
     )
     demand = GasDemand(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
-    usable = supply.mass - smallest_mass_when_warm(supply.bottle, demand)
+    ended = discharge_of_life(life, demand)
+    # A walk goes on below the pressure that its regulator needs, as long as the torque suffices: warm as cold.
+    lowest = float(ended.recording["bottle_pressure"][-1])
+    usable = supply.mass - smallest_mass_when_warm(supply.bottle, demand, lowest)
     return Endurance(
         bottle=supply.bottle,
         draw=demand,
         schedule=schedule,
-        discharge=discharge_of_life(life, demand),
+        discharge=ended,
         strides_when_warm=usable / demand.mass_per_stride,
         is_of_task_sequence=bool(gas.task_sequence),
         device_units=gas.scenario.device.shown,
@@ -209,7 +224,7 @@ def _check_gas_of_walk(name: str, scenario: Scenario, duration: float, bottle: s
         changes.append(f"{BOTTLE_NAME}={bottle}")
     pressure = other_pressure(str(bottle), full, device)
     if pressure is not None:
-        room, unit = device.supply.atmospheric_pressure, full.entries["regulator.set_pressure"].unit
+        room, unit = device.supply.atmospheric_pressure, full.entries[SET_PRESSURE].unit
         changes.append(f"supply.pressure={shown_text(pressure, 'Pa_a', atmosphere=room, unit=unit)}")
     problem = f"walk '{name}' uses {species}, and cannot be repeated on bottle '{full.name}' of {full.fluid.name}"
     with refused_as(DataError, problem, PpafoError):

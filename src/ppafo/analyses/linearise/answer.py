@@ -141,6 +141,7 @@ _STEPS_CAPTION = (
 def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model as a finding with sentences, tables and panels."""
     when = "in its steady state" if model.time is None else f"at {model.time:g} s"
+    title = f"Linear model of {model.scenario.name}, {when}"
     validity = Section(
         "Range of validity",
         panels=partial(steps_panels, model),
@@ -148,6 +149,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         caption=_STEPS_CAPTION,
         across=2,
         size=(3.0, 2.8),
+        title=title,
     )
     counts = (("state", model.states), ("input", model.inputs), ("output", model.outputs))
     size = ", ".join(count_of(len(signals), noun) for noun, signals in counts)
@@ -185,12 +187,12 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     return Finding(
         name="linearise",
         kicker="Linear model",
-        title=f"Linear model of {model.scenario.name}, {when}",
+        title=title,
         said=sentences,
         parts=[
             _point(model),
             Section("Side of the kink", facts(model.sides.items()), remarks=remarks),
-            _poles(model),
+            _poles(model, title),
             _loop(model),
             *matrices,
             *([validity] if can_step(model) else []),
@@ -228,10 +230,10 @@ def _point(model: LinearModel) -> Section:
     return Section("The point", columns_of(("", "name", "unit in the model", "at the point"), rows), left=3)
 
 
-def _poles(model: LinearModel) -> Section:
+def _poles(model: LinearModel, title: str) -> Section:
     """Return the table of poles with time constants; a complex pair is one row with frequency and damping.
 
-    The frequency response is drawn if the command has any effect.
+    The frequency response, under ``title``, is drawn if the command has any effect.
     """
     rows: list[tuple[str | float | None, ...]] = []
     for pole in model.poles.tolist():
@@ -252,6 +254,7 @@ def _poles(model: LinearModel) -> Section:
         name="frequency-response" if responds else "",
         caption=_FREQUENCY_CAPTION,
         size=(5.4, 2.2),
+        title=title,
     )
 
 

@@ -28,13 +28,8 @@ class Parts:
             "catalogue": self.catalogue.name,
             "parts": [
                 {
-                    "name": part.name,
-                    "group": part.group,
+                    **{name: getattr(part, name) for name in ("name", "group", "maker", "model", "document", "note")},
                     "kind": part.kind or None,
-                    "maker": part.maker,
-                    "model": part.model,
-                    "document": part.document,
-                    "note": part.note,
                     "figures": {name: figure.model_dump(mode="json") for name, figure in part.figures.items()},
                     "values": dict(part.values),
                     "unknown": list(part.unknown),

@@ -19,12 +19,14 @@ def part_titles(parts: Iterable[Part]) -> finding.Section:
 def parts_to_check(doubtful: Iterable[tuple[Part, str]], used: Iterable[Part]) -> list[finding.Section]:
     """Return the sections on figures to check before buying: unknown ones of the ``used`` parts, and doubtful ones.
 
-    A line for each unknown figure says that the part counts as ideal: no delay, no dead band, no pressure limit. The
+    A line for each part names the unknown figures that count as ideal: no delay, no dead band, no pressure limit. The
     table of doubtful figures has a row for each part; the page also has the reason for each of these figures.
     """
-    unknown = []
-    for part in {(part.group, part.name): part for part in used}.values():
-        unknown += [f"{part.name}: {name.replace('_', ' ')} unknown, taken as ideal" for name in part.ideal]
+    unknown = [
+        f"{part.name}: {', '.join(part.ideal).replace('_', ' ')} unknown, taken as ideal"
+        for part in {(part.group, part.name): part for part in used}.values()
+        if part.ideal
+    ]
     sections = [finding.Section("Unknown data of the parts", remarks=unknown)] if unknown else []
     pairs = tuple(doubtful)
     if not pairs:

@@ -251,22 +251,14 @@ class JudgedClaim:
         entry = self.claim.entry
         return {
             "study": study,
-            "id": entry.id,
-            "statement": entry.statement,
+            **{name: getattr(entry, name) for name in ("id", "statement", "direction", "own", "unit", "computation")},
+            **{name: getattr(self, name) for name in ("published", "value", "verdict", "note")},
             "paper": entry.published,
-            "published": self.published,
-            "direction": entry.direction,
-            "own": entry.own,
-            "value": self.value,
-            "unit": entry.unit,
             "agrees_from": entry.at_least,
             "agrees_to": entry.at_most,
-            "verdict": self.verdict,
-            "computation": entry.computation,
             "arguments": dict(entry.arguments),
             "assumptions": list(entry.assumed),
             "source": self.claim.source,
-            "note": self.note,
         }
 
 

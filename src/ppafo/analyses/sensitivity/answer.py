@@ -54,6 +54,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         ),
         across=2,
         size=(3.0, max(2.5, 0.9 + _INCHES_OF_A_BAR * len(influences.paths))),
+        title=f"Sensitivity of {influences.study}",
         is_detail=True,
     )
     return Finding(

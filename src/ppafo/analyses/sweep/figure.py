@@ -26,8 +26,8 @@ FIGURE = "figure"
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
 MOST_CONFIGURATIONS = len(COLOURS)
 """Largest number of configurations in a figure: as many as distinguishable colours."""
-MOST_METRICS = 9
-"""Largest number of metrics in a figure."""
+MOST_METRICS, MOST_COMPARED = 4, 2
+"""Largest number of metrics in a figure, and with a panel for each configuration: more would be too low to read."""
 MAXIMUM_DRAWN = 4_000_000
 """Largest number of runs in a figure, spread evenly over all; printed statistics use all runs."""
 _COLUMNS = 2
@@ -62,7 +62,6 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
     ]
     differing = _differing(results, with_values) or with_values[:1] or all_metrics
     constant = ", ".join(metric for metric in with_values if metric not in differing)
-    metrics = differing[:MOST_METRICS]
     # No more configurations than distinguishable colours.
     names = results.configurations[:MOST_CONFIGURATIONS]
     # The value of a seed has no meaning.
@@ -70,6 +69,13 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
     grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED]
     # Over two paths each configuration has a panel of each metric, a map or points; else all share one panel.
     is_mapped = 2 in (len(grid), len(varied))
+    # Panels over two paths of several configurations have a row for each metric.
+    is_compared = is_mapped and len(names) > 1
+    most = MOST_COMPARED if is_compared else MOST_METRICS
+    # Metrics of a part of the run, such as rms_error_ramp, come after those of the whole run.
+    of_part = {metric for metric in differing for whole in differing if metric.startswith(f"{whole}_")}
+    metrics = sorted(differing, key=of_part.__contains__)[:most]
+    left_out = ", ".join(metric for metric in differing if metric not in metrics)
     # A map of the verdict, if some runs follow their reference and others do not.
     if is_mapped and "not_following" in results.summary:
         verdicts = np.concatenate(list(results.thin(FOLLOWS, MAXIMUM_DRAWN).values()))
@@ -81,15 +87,15 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
         labels = [label if label[:2].isupper() else label[:1].lower() + label[1:] for label in labels]
         more = f" and {len(varied) - _NAMED} more" if len(varied) > _NAMED else ""
         title += f" over {len(varied)} values: {', '.join(labels)}{more}"
-    # Panels over two paths of several configurations have a row for each metric.
-    is_compared = is_mapped and len(names) > 1
     count = len(metrics) + len(study["outputs"].get("bands", ()))
     return Section(
         said=sentences,
         remarks=remarks,
         panels=partial(_panels, results, metrics, names, varied, grid),
         name=FIGURE,
-        caption=_CAPTION + (f" Not drawn, because without a difference in the runs: {constant}." if constant else ""),
+        caption=_CAPTION
+        + f" Not drawn, because without a difference in the runs: {constant}." * bool(constant)
+        + f" Not drawn either, unless outputs.metrics names at most {most}: {left_out}." * bool(left_out),
         across=len(names) if is_compared else min(_COLUMNS, max(1, count)),
         size=_COMPARED_PANEL if is_compared else _PANEL,
         title=title,

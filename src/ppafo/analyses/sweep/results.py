@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.errors import DataError, StudyError
+from ppafo.errors import DataError, StudyError, UnitError, refused_as
 from ppafo.report.kind import Kind, of_stored_metric
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, column_names, matrix_of, read_parquet
 from ppafo.study.folder import StudyFolder
 from ppafo.study.runs import joined
 from ppafo.study.store import FOLLOWS, check_types, chunk_file, stored_rows, trace_column
-from ppafo.wording import nearest_name
+from ppafo.units import from_si
+from ppafo.wording import known_names, nearest_name
 
 if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
     import pyarrow as pa
 
 SUMMARY = "summary.json"
@@ -77,12 +79,34 @@ class StudyResults:
 
         Channels over time are not part of the table; ``trajectories`` returns them.
         """
-        if columns is None:
-            # All chunks have the columns of the first.
-            first = chunk_file(0)
-            traces = {trace_column(name) for name in CHANNELS}
-            columns = [name for name in column_names(self.folder.open(first), first) if name not in traces]
+        # All chunks have the columns of the first.
+        first = chunk_file(0)
+        known = column_names(self.folder.open(first), first)
+        for name in columns or ():
+            if name not in known:
+                raise StudyError(f"the study has no column '{name}'{known_names(name, known)}")
+        traces = {trace_column(name) for name in CHANNELS}
+        columns = columns or [name for name in known if name not in traces]
         return joined([as_numpy(part) for part in self.chunks(columns)])
+
+    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+        """Return the rows of all runs, like ``table``, in SI or in ``units``, such as ``{"supply.pressure": "bar_g"}``.
+
+        ``attrs["units"]`` has the unit of each column. Gauge pressures are relative to the standard atmosphere.
+        """
+        from pandas import DataFrame
+
+        frame = DataFrame(self.table())
+        schema = next(self.chunks(list(frame))).schema
+        shown = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in schema}
+        for name, unit in (units or {}).items():
+            values = self.table([name])[name]
+            with refused_as(UnitError, f"column '{name}' in '{unit}'", UnitError):
+                # Units are affine, so that two values decide all.
+                zero, one = (from_si(number, unit, shown[name]) for number in (0.0, 1.0))
+            frame[name] = zero + (one - zero) * values
+        frame.attrs = {"title": self.name, "units": shown | dict(units or {})}
+        return frame
 
     def by_configuration(self, column: str) -> dict[str, np.ndarray[Any, Any]]:
         """Return a column of all runs, by name of the configuration.

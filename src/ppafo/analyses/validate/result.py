@@ -165,6 +165,10 @@ def kind_of_channel(channel: ChannelAgreement) -> Kind:
     return Kind("", "", COMPARED[channel.channel].quantity)
 
 
+_OF_CHANNEL = ["noise", "passes", "full_range", "variation", "rms_unaligned", "bias", "largest", "largest_time"]
+"""Errors of a channel that its data has under the names of the fields."""
+
+
 def _recording_data(agreement: RecordingAgreement) -> dict[str, Any]:
     """Return the errors of a recording as plain data in SI."""
     return {
@@ -186,15 +190,8 @@ def _recording_data(agreement: RecordingAgreement) -> dict[str, Any]:
                 "unit": channel.unit,
                 "rms": channel.rms,
                 "rms_share": channel.fraction,
-                "noise": channel.noise,
                 "limit_share": channel.limit,
-                "passes": channel.passes,
-                "full_range": channel.full_range,
-                "variation": channel.variation,
-                "rms_unaligned": channel.rms_unaligned,
-                "bias": channel.bias,
-                "largest": channel.largest,
-                "largest_time": channel.largest_time,
+                **{name: getattr(channel, name) for name in _OF_CHANNEL},
                 # In the unit that people are shown.
                 "shown": {
                     "unit": kind_of_channel(channel).shown_unit,

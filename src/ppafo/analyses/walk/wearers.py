@@ -98,11 +98,7 @@ def wearers_data(population: Population) -> dict[str, Any]:
         "units": UNITS,
         "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
         "wearers": population.count,
-        "diverged": population.diverged,
-        "vented": population.vented,
-        "paused": population.paused,
-        "minutes": population.minutes,
-        "seed": population.seed,
+        **{name: getattr(population, name) for name in ("diverged", "vented", "paused", "minutes", "seed")},
         "varied": {
             "body_mass": MASS_VARIATION,
             "stature": STATURE_VARIATION,

@@ -251,13 +251,8 @@ class Bench:
         self._has_diverged = not all(map(math.isfinite, measured))
         if self._has_diverged:
             return self._sample
-        values = {
-            "reference": plant.reference,
-            "angle": measured.angle,
-            "pressure_1": measured.pressure_1,
-            "pressure_2": measured.pressure_2,
-            "torque": measured.torque,
-        }
+        read = ("angle", "pressure_1", "pressure_2", "torque")
+        values = {"reference": plant.reference, **{name: getattr(measured, name) for name in read}}
         return wire.WireSample(
             flags=flags | (wire.VENTED if self.answers.vent_reason else 0) | wire.COMPUTED,
             run=self.answers.run,

@@ -88,7 +88,7 @@ class Figure(StrictTable):
     source: Annotated[
         str, Field(min_length=1, description="where to look it up; for an assumed one, the basis of the assumption")
     ]
-    note: Annotated[str, Field(description="reason or remark; needed where it is derived or assumed")] = ""
+    note: Annotated[str, Field(description="reason or remark")] = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +206,11 @@ DEFAULT = "parts"
 _FILE = TomlKind(
     "catalogue of parts", "parts", resources.files("ppafo.parameters.parts") / "catalogues", ParameterError
 )
-FOR_A_CYLINDER = "search supply.pressure by 'ppafo find' with controller.kind=damped_proportional"
+FOR_A_CYLINDER = (
+    "search supply.pressure by 'ppafo find' with controller.kind=damped_proportional, or for a wearer try 'ppafo walk "
+    "proportional' with device.set, wearer.body_mass, supply.pressure, controller.peak_torque and "
+    "controller.largest_torque"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,16 +255,26 @@ def parse_catalogue(content: bytes, file: str) -> Catalogue:
 
     Raises ParameterError if the catalogue is not usable.
     """
+    document, wrong = _FILE.parse(content, file), list[PpafoError]()
+    parsed: Any = None
     try:
-        parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
+        parsed = validate(CATALOGUE_FILE, document, file, ParameterError)
     except ParameterError as error:
-        if "unknown key 'actuators." in str(error):
-            own = "write a cylinder as a parameter set ('ppafo new set NAME --from cylinder-lever') and"
-            raise ParameterError(f"{error}; 'ppafo design' sizes vanes only: {own} {FOR_A_CYLINDER}") from error
-        raise
-    wrong: list[PpafoError] = []
+        own = "'ppafo design' sizes vanes only: write a cylinder as a parameter set ('ppafo new set NAME --from "
+        cylinder = f"; {own}cylinder-lever') and {FOR_A_CYLINDER}" * ("unknown key 'actuators." in str(error))
+        wrong.append(ParameterError(f"{error}{cylinder}"))
+    valves = document.get("valves")
+    for name, valve in valves.items() if isinstance(valves, dict) else ():
+        if not isinstance(valve, dict):
+            continue
+        given = [[number.name for number in form if number.name in valve] for form in (AREA_FORM, SONIC_FORM)]
+        # Half a form of an orifice is as unusable as two forms at once.
+        if sorted(map(len, given)) != [0, 2]:
+            needs = "needs either area and discharge_coefficient or sonic_conductance and critical_ratio, but has"
+            has = ", ".join(given[0] + given[1]) or "none of them"
+            wrong.append(ParameterError(f"{file}: valves.{name}: {needs} {has}"))
     groups = {
-        group: {name: _part(file, group, name, table, wrong) for name, table in getattr(parsed, group).items()}
+        group: {name: _part(file, group, name, table, wrong) for name, table in getattr(parsed, group, {}).items()}
         for group in GROUPS
     }
     raise_noted(wrong)
@@ -279,18 +293,9 @@ def _part(file: str, group: str, name: str, parsed: Any, wrong: list[PpafoError]
             wrong.append(ParameterError(f"{where}.unknown: {text}"))
         if key in figures:
             wrong.append(ParameterError(f"{where}.unknown: '{key}' has a value in this part; omit it from unknown"))
-    forms_given = [[quantity.name for quantity in form if quantity.name in figures] for form in (AREA_FORM, SONIC_FORM)]
-    # Half a form of an orifice is as unusable as two forms at once.
-    if group == "valves" and sorted(map(len, forms_given)) != [0, 2]:
-        needs = "needs either area and discharge_coefficient or sonic_conductance and critical_ratio, but has"
-        wrong.append(ParameterError(f"{where}: {needs} {', '.join(forms_given[0] + forms_given[1]) or 'none of them'}"))
     values = {}
     for key, figure in figures.items():
         shown = f"{where}.{key} = {figure.value:g} {figure.unit}"
-        # A guess without its reason cannot be checked by the next reader.
-        if figure.origin in ("derived", "assumed") and not figure.note.strip():
-            reason = f"give the reason for a value with origin '{figure.origin}'"
-            wrong.append(ParameterError(f"{where}.{key}.note is missing; {reason}"))
         # Data sheets give gauge pressures at sea level.
         with noted_in(wrong):
             values[key] = allowed_number(shown, figure, declared[key])

@@ -31,7 +31,7 @@ LEAST_TORQUE = Quantity(
     "least_torque", "1", "torque below which the walk ends, as a fraction of the torque at set pressure", 0.9, 0.0, 1.0
 )
 COUPLING = Quantity("coupling", "s", "time between two exchanges of bottle and device", 0.1, 1.0e-3, 1.0)
-_SET_PRESSURE = "regulator.set_pressure"
+SET_PRESSURE = "regulator.set_pressure"
 BOTTLE_OVERRIDES = {path if path.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{path}": path for path in PATHS}
 """Values of the bottle file that overrides may set, such as ``bottle.volume`` or ``bottle.regulator.area``, by path."""
 
@@ -142,9 +142,9 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
             f"{reading.file}: '{BOTTLE_NAME}' is missing: give the name of a bottle, or the path of its file"
         )
     own = section.get("overrides", ())
-    if any(text.partition("=")[0].strip() == _SET_PRESSURE for text in own):
+    if any(text.partition("=")[0].strip() == SET_PRESSURE for text in own):
         raise ScenarioError(
-            f"{reading.file}: {BOTTLE}.{_SET_PRESSURE}: not allowed in a walk, where supply.pressure sets "
+            f"{reading.file}: {BOTTLE}.{SET_PRESSURE}: not allowed in a walk, where supply.pressure sets "
             "the regulator of the bottle; set supply.pressure instead"
         )
     with refused_as(ParameterError, f"{reading.file}: [{BOTTLE}]", ParameterError):
@@ -160,15 +160,15 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
         wrong.append(reading.refusal(BOTTLE_NAME, f"contains {species}, but the device uses {fed}: {choice}"))
     if own_pressure is not None:
         room = device.supply.atmospheric_pressure
-        own_text = shown_text(own_pressure, "Pa_a", atmosphere=room, unit=bottle.entries[_SET_PRESSURE].unit)
-        problem = f"{name} sets {_SET_PRESSURE} to {own_text}, but supply.pressure is"
+        own_text = shown_text(own_pressure, "Pa_a", atmosphere=room, unit=bottle.entries[SET_PRESSURE].unit)
+        problem = f"{name} sets {SET_PRESSURE} to {own_text}, but supply.pressure is"
         problem += f" {shown_text(pressure, 'Pa_a', atmosphere=room)}: set supply.pressure={own_text}"
         wrong.append(ScenarioError(f"{reading.file}: {BOTTLE_NAME}: {problem}"))
     raise_noted(wrong)
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
     entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
     regulator = bottle.regulator._replace(set_pressure=pressure)
-    bottle = replace(bottle, regulator=regulator, entries={**bottle.entries, _SET_PRESSURE: entry})
+    bottle = replace(bottle, regulator=regulator, entries={**bottle.entries, SET_PRESSURE: entry})
     numbers = _numbers(reading, section, bottle)
     line = isobar(bottle.fluid.table, bottle.regulator.set_pressure)
     supply = BottleSupply(
@@ -209,7 +209,7 @@ def other_pressure(name: str | Path, bottle: Bottle, device: Device) -> float | 
 
     A bottle of the package is set to the paper's pressure, which does not apply to other devices: None.
     """
-    pressure, stated = device.supply.pressure, bottle.entries[_SET_PRESSURE]
+    pressure, stated = device.supply.pressure, bottle.entries[SET_PRESSURE]
     # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
     own = to_si(stated.value, stated.unit, "Pa_a", device.supply.atmospheric_pressure)
     return own if Path(name).suffix == ".toml" and abs(own - pressure) > _SAME_PRESSURE * pressure else None

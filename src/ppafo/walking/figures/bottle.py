@@ -67,7 +67,7 @@ def bottle_figure(result: WalkResult) -> "Figure":
     )
     return draw_panels(
         [
-            panel(Kind("Pressure behind the regulator", "Pa_a", "pressure"), behind, largest=float(np.max(delivered))),
+            panel(Kind("Pressure behind the regulator", "Pa_a", "pressure"), behind),
             panel(
                 Kind("Pressure in the bottle", "Pa_a", "pressure"),
                 [

@@ -192,6 +192,16 @@ def test_a_run_on_another_gas_than_the_bottle_holds_is_refused(tmp_path: Path) -
     assert ppafo.bottle(tmp_path / "task", bottle="air-48ci-3000psi").found.discharge.walking_time > 0.0
 
 
+def test_the_regulator_of_a_bottle_is_set_to_the_supply_pressure_of_a_run_unless_it_is_stated(tmp_path: Path) -> None:
+    ppafo.simulate("torque-task-proportional", ["supply.pressure=6 bar_g"]).save(tmp_path / "task")
+    found = ppafo.bottle(tmp_path / "task")
+    assert found.found.bottle.regulator.set_pressure == pytest.approx(701325.0)
+    assert found.found.discharge.recording["bottle_pressure"][-1] >= 701325.0
+    assert "(values changed: regulator.set_pressure=6 bar_g)" in str(found)
+    stated = ppafo.bottle(tmp_path / "task", overrides=["regulator.set_pressure=5 bar_g"]).found
+    assert stated.bottle.regulator.set_pressure == pytest.approx(601325.0)
+
+
 def test_a_walk_on_another_gas_than_the_bottle_holds_is_told_the_command_that_feeds_it_so() -> None:
     walked = ppafo.walk("proportional", minutes=0.1, overrides=["controller.vent_time=0.1 s"])
     with pytest.raises(DataError, match="the device uses CO2, but bottle 'air-48ci-3000psi' contains air") as caught:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.endurance.answer import Endurance
+from ppafo.analyses.endurance.answer import Endurance, finding_of
 from ppafo.analyses.endurance.gas_demand import largest_flow
 from ppafo.analyses.endurance.question import bottle as endurance
 from ppafo.analyses.endurance.solve import endurance_of_walk
@@ -147,6 +147,18 @@ def test_the_gas_on_a_bottle_differs_by_its_regulator_and_its_cold() -> None:
     alone = ppafo.walk("solenoid", overrides=causes, minutes=0.2).metrics["gas"].value
     assert alone == pytest.approx(draw.mass_per_stride, rel=0.01)
     assert alone < 0.97 * walked.metrics["gas"].value
+
+
+def test_a_warm_bottle_ends_as_the_walk_does_and_gives_no_fewer_strides() -> None:
+    walked = walk("solenoid", overrides=["gas.species=air"], minutes=0.1)
+    found = endurance(walked, bottle="air-48ci-3000psi", overrides=["bottle.volume=100 cm^3"]).found
+    assert isinstance(found, Endurance)
+    assert found.discharge.ending.kind == "empty"
+    # The walk goes on below the pressure that the regulator needs, with less torque.
+    regulator = found.bottle.regulator
+    assert found.discharge.recording["bottle_pressure"][-1] < regulator.set_pressure + regulator.pressure_margin
+    assert found.discharge.strides <= found.strides_when_warm <= 1.05 * found.discharge.strides
+    assert "regulator set to                 50 psi_g, the supply pressure of the device" in str(finding_of(found))
 
 
 def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,7 +10,7 @@ import pytest
 from ppafo.analyses.sweep.answer import finding_of, load_study_results
 from ppafo.analyses.sweep.results import StudyResults
 from ppafo.analyses.sweep.solve import describe, sorted_quantiles, sweep
-from ppafo.errors import ArgumentError, DataError, StudyError
+from ppafo.errors import ArgumentError, DataError, PpafoError, StudyError, UnitError
 from ppafo.report.style import render_figure
 
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.777, 0.95, 1.0)
@@ -55,6 +55,20 @@ def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: St
     for most, step in ((1000, 1), (11, 3), (7, 5)):
         for name, values in small_results.thin("rms_error", most).items():
             np.testing.assert_array_equal(values, whole[name][::step])
+
+
+def test_rows_are_a_data_frame_in_si_or_in_units(small_results: StudyResults) -> None:
+    frame, rows = small_results.to_dataframe(), small_results.table()
+    assert list(frame) == list(rows)
+    assert frame.attrs["units"]["supply.pressure"] == "Pa_a"
+    gauge = small_results.to_dataframe({"supply.pressure": "bar_g", "rms_error": "mN m"})
+    np.testing.assert_allclose(gauge["supply.pressure"], (rows["supply.pressure"] - 101325.0) / 1e5)
+    np.testing.assert_allclose(gauge["rms_error"], 1e3 * rows["rms_error"])
+    assert gauge.attrs["units"]["supply.pressure"] == "bar_g"
+    with pytest.raises(UnitError, match="column 'rms_error' in 'psi_g': unit 'psi_g' does not fit"):
+        small_results.to_dataframe({"rms_error": "psi_g"})
+    with pytest.raises(PpafoError, match="rms_eror"):
+        small_results.to_dataframe({"rms_eror": "N m"})
 
 
 def test_results_load_again_from_their_folder(small_results: StudyResults) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.analyses.design.profile.problem import SizingProblem
-from ppafo.analyses.design.profile.search import LIMITS, Limit, ceiling
+from ppafo.analyses.design.profile.search import LAGS, LIMITS, Limit, ceiling
 from ppafo.analyses.design.wearer.requirements import REACHED
 from ppafo.analyses.parts.sections import doubts_data, part_titles, parts_to_check
 from ppafo.control.catalog import CONTROLLERS
@@ -48,6 +48,7 @@ _HEAD = (
     "bottle",
     ("mass", _MASS),
     "limited by",
+    "lag unknown",
 )
 _WHOLE_PEAK = 0.005
 """Largest fraction of the peak torque that may be cut off without a word [-]: half of the last digit of a pressure."""
@@ -64,7 +65,7 @@ _CAPTION = (
 )
 _READING = (
     "The chosen pressure is the lowest with which the lightest bottle suffices; the table also has the lowest pressure "
-    "that keeps the error limit.",
+    "that keeps the error limit. Of a valve whose lag is unknown, that lag counts as 0: its error is a lower bound.",
     "Error margin: RMS error below its limit. Torque margin: torque at this pressure above the largest torque of the "
     "profile; below 0 the peak is cut off, as far as the error limit allows. "
     "Flow margin: possible reduction of the opening at a gauge pressure 10 % higher. Gas margin: usable gas in the "
@@ -156,44 +157,31 @@ class Sizing:
     def json_document(self) -> dict[str, Any]:
         """Return the sized valves and the suggestion as plain data in SI."""
         problem = self.problem
+        stated = ("name", "description", "file", "repetitions", "hours", "reserve", "largest_error")
+        found = ("works", "pressure", "lowest_pressure", "error", "gas_in_all", "mass", "remark")
         return {
             "format": "ppafo sizing",
             "schema_version": 1,
-            "name": problem.name,
-            "description": problem.description,
-            "file": problem.file,
+            **{name: getattr(problem, name) for name in stated},
             "units": "SI; pressures absolute, errors in N m, gas and mass in kg, margins as fractions",
             "scenario": problem.scenario.name,
             "profile": {
-                "kind": problem.profile.kind,
-                "period": problem.profile.period,
-                "largest": problem.profile.largest,
-                "table_error": problem.profile.table_error,
+                **{name: getattr(problem.profile, name) for name in ("kind", "period", "largest", "table_error")},
                 "times": problem.profile.knot_times.tolist(),
                 "torques": problem.profile.knot_values.tolist(),
             },
-            "repetitions": problem.repetitions,
-            "hours": problem.hours,
-            "reserve": problem.reserve,
-            "largest_error": problem.largest_error,
             "suggested": None if self.choice is None else self.choice.valve.name,
             "summary": suggestion_sentence(self),
             "valves": [
                 {
                     "valve": sized.valve.name,
-                    "works": sized.works,
-                    "pressure": sized.pressure,
-                    "lowest_pressure": sized.lowest_pressure,
+                    **{name: getattr(sized, name) for name in found},
                     "gains": dict(sized.gains),
-                    "error": sized.error,
                     "gas_per_repetition": sized.gas,
-                    "gas_in_all": sized.gas_in_all,
                     "bottle": None if sized.bottle is None else sized.bottle.name,
-                    "mass": sized.mass,
                     "margins": None if sized.margins is None else asdict(sized.margins),
                     "limited_by": sized.limit,
                     "limit": LIMITS[sized.limit],
-                    "remark": sized.remark,
                 }
                 for sized in self.valves
             ],
@@ -330,12 +318,13 @@ def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
     units = {f"controller.{quantity.name}": quantity.unit for quantity in quantities}
     for sized in sizing.valves:
         name = sized.valve.name
+        ideal = ", ".join(figure.replace("_", " ") for figure in sized.valve.ideal if figure in LAGS) or "none"
         if not sized.works:
-            rows.append((name, None, None, f"{TORQUE.number(sized.error)} at best", *(None,) * 4, sized.limit))
+            rows.append((name, None, None, f"{TORQUE.number(sized.error)} at best", *(None,) * 4, sized.limit, ideal))
             continue
         bottle, lowest = "none" if sized.bottle is None else sized.bottle.name, sized.lowest_pressure or sized.pressure
         gas = (sized.gas, sized.gas_in_all)
-        rows.append((name, sized.pressure, lowest, sized.error, *gas, bottle, sized.mass, sized.limit))
+        rows.append((name, sized.pressure, lowest, sized.error, *gas, bottle, sized.mass, sized.limit, ideal))
         gains = (
             f"{path.rpartition('.')[2].replace('_', ' ')} {value:.3g} {units[path]}"
             for path, value in sized.gains.items()
@@ -360,7 +349,9 @@ def suggestion_sentence(sizing: Sizing) -> str:
     if choice is None or recording is None:
         working = [sized for sized in sizing.valves if sized.works]
         kept = "valves keep the error limit, but no bottle lasts for the requested use"
-        reasons = [kept if working else "no valve keeps the error limit at any of the pressures"]
+        near = min(sizing.valves, key=lambda sized: np.nan_to_num(sized.error, nan=np.inf))
+        nearest = f"{TORQUE.text(near.error)} with {near.valve.name} at {PRESSURE.text(near.pressure)}"
+        reasons = [kept if working else f"no valve keeps the error limit; the smallest error is {nearest}"]
         reasons += [f"{each.valve.name}{cut}" for each in working or sizing.valves if (cut := _cut_peak(sizing, each))]
         return f"no suggestion: {'; '.join(reasons)}"
     bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.profiles import KNOTS
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts
@@ -284,54 +285,70 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
 
     ``file`` is the name used in error messages; paths are relative to ``folder``.
     """
-    catalogue = load_catalogue(beside(document.catalogue, folder))
-    profile = read_profile(document.profile, folder, file)
-    scenario = _scenario(document, profile, folder, file)
     parts, wrong = document.parts, list[PpafoError]()
     # A part that is named twice is one choice, but two regulators that are carried.
     named = {"valves": tuple(dict.fromkeys(parts.valves)), "bottles": tuple(dict.fromkeys(parts.bottles))}
     named |= {"regulators": parts.regulators, "actuators": () if parts.actuator is None else (parts.actuator,)}
     chosen: dict[str, list[Part]] = {group: [] for group in named}
-    for group, name in [(group, name) for group, names in named.items() for name in names]:
-        with noted_in(wrong):
-            # A catalogue that lacks a group is completed by that of the package.
-            source = catalogue if catalogue.groups[group] else load_catalogue()
-            chosen[group].append(source.part(group, name))
-    kind = scenario.device.valve.kind
-    wrong += [
-        StudyError(
-            f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{scenario.name}' "
-            f"needs a {kind} valve; name it in a second file, with scenario = 'torque-task-"
-            f"{valve.kind.partition('_')[0]}' and overrides = ['device.valve={valve.kind}']"
-        )
-        for valve in chosen["valves"]
-        if valve.kind != kind
-    ]
+    with noted_in(wrong):
+        catalogue = load_catalogue(beside(document.catalogue, folder))
+        for group, name in [(group, name) for group, names in named.items() for name in names]:
+            with noted_in(wrong):
+                # A catalogue that lacks a group is completed by that of the package.
+                source = catalogue if catalogue.groups[group] else load_catalogue()
+                chosen[group].append(source.part(group, name))
+    atmosphere, largest, pressures = STANDARD_ATMOSPHERE, 1.0, []
+    with noted_in(wrong):
+        profile = read_profile(document.profile, folder, file)
+        largest = profile.largest
+    with noted_in(wrong):
+        plain = load_scenario(beside(document.scenario, folder), document.overrides)
+        atmosphere, kind = plain.device.supply.atmospheric_pressure, plain.device.valve.kind
+        wrong += [
+            StudyError(
+                f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{plain.name}' "
+                f"needs a {kind} valve; name it in a second file, with scenario = 'torque-task-"
+                f"{valve.kind.partition('_')[0]}' and overrides = ['device.valve={valve.kind}']"
+            )
+            for valve in chosen["valves"]
+            if valve.kind != kind
+        ]
+        plain.device.check_torque_constant("the size of a device", f"; {FOR_A_CYLINDER}")
+        if plain.controller.is_open_loop:
+            raise StudyError(
+                f"{file}: scenario '{plain.name}' has no reference (controller.kind = "
+                f"'{plain.controller.kind}'); choose a scenario with a reference"
+            )
+    with noted_in(wrong):
+        for key, text in (("lowest", document.pressure.lowest), ("highest", document.pressure.highest)):
+            with refused_as(StudyError, f"{file}: pressure.{key} = '{text}'", UnitError):
+                pressures.append(parse_quantity(text, "Pa_a", atmosphere))
+        if not atmosphere < pressures[0] < pressures[1]:
+            raise StudyError(
+                f"{file}: pressure.lowest = '{document.pressure.lowest}': must be above atmospheric pressure and below "
+                f"pressure.highest = '{document.pressure.highest}'"
+            )
+    use, limit = document.use, document.limits.rms_error
+    if (use.repetitions is None) == (use.hours is None):
+        wrong.append(StudyError(f"{file}: [use]: give either repetitions or hours"))
+    with noted_in(wrong), refused_as(StudyError, f"{file}: limits.rms_error = '{limit}'", UnitError):
+        relative = split_quantity(limit)[1] in ("%", "percent")
+        largest_error = parse_quantity(limit, "") * largest if relative else parse_quantity(limit, _TORQUE)
+        if largest_error <= 0.0:
+            raise UnitError("must be above 0; write '0.5 N m' or '5 %'")
     raise_noted(wrong)
+    # The least common multiple of both times: the run then ends with a sample of the controller and of the output.
+    a, b = (
+        Fraction(interval).limit_denominator(_LARGEST_DENOMINATOR)
+        for interval in (plain.controller.period, plain.run.output_interval)
+    )
+    least = math.lcm(a.numerator * b.denominator, b.numerator * a.denominator)
+    grain = Fraction(least, a.denominator * b.denominator)
+    count = math.ceil(Fraction(document.simulated * profile.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
+    scenario = reloaded(plain, (*profile.overrides(), f"run.duration={float(count * grain)!r} s"))
     # The settings that multiply a torque error.
     quantities = CONTROLLERS[scenario.controller.kind].quantities
     gains = tuple(f"controller.{quantity.name}" for quantity in quantities if "(N m" in quantity.unit)
-    atmosphere, pressures = scenario.device.supply.atmospheric_pressure, []
-    for key, text in (("lowest", document.pressure.lowest), ("highest", document.pressure.highest)):
-        with refused_as(StudyError, f"{file}: pressure.{key} = '{text}'", UnitError):
-            pressures.append(parse_quantity(text, "Pa_a", atmosphere))
-    lowest, highest = pressures
-    if not atmosphere < lowest < highest:
-        raise StudyError(
-            f"{file}: pressure.lowest = '{document.pressure.lowest}': must be above atmospheric pressure and below "
-            f"pressure.highest = '{document.pressure.highest}'"
-        )
-    use = document.use
-    if (use.repetitions is None) == (use.hours is None):
-        raise StudyError(f"{file}: [use]: give either repetitions or hours")
-    limit = document.limits.rms_error
-    try:
-        relative = split_quantity(limit)[1] in ("%", "percent")
-        largest_error = parse_quantity(limit, "") * profile.largest if relative else parse_quantity(limit, _TORQUE)
-    except UnitError as error:
-        raise StudyError(f"{file}: limits.rms_error = '{limit}': {error}; write '0.5 N m' or '5 %'") from error
-    if largest_error <= 0.0:
-        raise StudyError(f"{file}: limits.rms_error = '{limit}': must be above 0")
     return SizingProblem(
         name=document.name,
         description=document.description,
@@ -346,30 +363,8 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
         bottles=tuple(chosen["bottles"]),
         actuator=next(iter(chosen["actuators"]), None),
         regulators=tuple(chosen["regulators"]),
-        lowest_pressure=lowest,
-        highest_pressure=highest,
+        lowest_pressure=pressures[0],
+        highest_pressure=pressures[1],
         gains=gains,
         gain_factors=tuple(sorted(set(document.gain_factors))) if gains else (1.0,),
     )
-
-
-def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file: str) -> Scenario:
-    """Load the scenario with the profile as its reference; it ends with a whole controller and output sample."""
-    name = beside(document.scenario, folder)
-    plain = load_scenario(name, document.overrides)
-    plain.device.check_torque_constant("the size of a device", f"; {FOR_A_CYLINDER}")
-    if plain.controller.is_open_loop:
-        raise StudyError(
-            f"{file}: scenario '{plain.name}' has no reference (controller.kind = "
-            f"'{plain.controller.kind}'); choose a scenario with a reference"
-        )
-    # The least common multiple of both times: the run then ends with a sample of the controller and of the output.
-    a, b = (
-        Fraction(interval).limit_denominator(_LARGEST_DENOMINATOR)
-        for interval in (plain.controller.period, plain.run.output_interval)
-    )
-    least = math.lcm(a.numerator * b.denominator, b.numerator * a.denominator)
-    grain = Fraction(least, a.denominator * b.denominator)
-    count = math.ceil(Fraction(document.simulated * profile.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
-    duration = f"run.duration={float(count * grain)!r} s"
-    return reloaded(plain, (*profile.overrides(), duration))

@@ -14,18 +14,20 @@ from ppafo.analyses.design.wearer.requirements import (
     SizedDevice,
     WearerSizing,
 )
+from ppafo.analyses.design.wearer.strides import of_wearer
 from ppafo.analyses.parts.sections import part_titles, parts_to_check
 from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.gains import gains_of
 from ppafo.units.reference import with_condition
+from ppafo.units.shown import written_text
 from ppafo.walking.bottle.course import duration_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import who_walks
-from ppafo.wording import argument_text
+from ppafo.wording import argument_text, override_text
 
 _HEAD = ("valve", "actuator", ("push-off peak", TORQUE), ("lowest toes", CLEARANCE))
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
@@ -55,9 +57,10 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     ]
     remarks = ["toes below 0 would drag"] if any(tried.toes < 0.0 for tried in sizing.tried) else []
     if device is None and not any(requirements.is_reached_by(tried.torque) for tried in sizing.tried):
-        remarks.append(
-            "only vanes are sized; a cylinder walks with: ppafo walk proportional --set device.set=cylinder-lever"
-        )
+        torque, supply = written_text(requirements.torque, "N m"), written_text(requirements.pressure, "Pa_a")
+        numbers = (f"supply.pressure={supply}", *(f"controller.{name}_torque={torque}" for name in ("peak", "largest")))
+        cylinder = override_text(["device.set=cylinder-lever", *of_wearer(requirements), *numbers])
+        remarks.append(f"only vanes are sized; a cylinder walks with: ppafo walk proportional {cylinder}")
     table = finding.Section(
         "Parts that were tried in a walk",
         columns_of((*_HEAD, ("gas", flow), ("mass of both", MASS)), rows),
@@ -98,7 +101,7 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
     walked = device.walked
     share = device.torque / requirements.torque
     # A device is granted from 95 % of the request on, so how far it fell short is said.
-    short = f" ({100.0 * share:.0f} % of the request)" if share < 1.0 else ""
+    short = f" ({100.0 * share:.3g} % of the request)" if share < 0.9995 else ""
     duration, lasts = duration_text(requirements.seconds), duration_text(device.life.discharge.walking_time)
     last = TORQUE.text(float(walked.peak_torques[-1]))
     rows = (

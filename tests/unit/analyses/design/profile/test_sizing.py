@@ -394,6 +394,21 @@ def test_every_part_that_the_catalogue_lacks_is_in_one_refusal_and_a_regulator_c
     assert [part.name for part in carried] == ["festo-lrma-qs-4", "festo-lrma-qs-4", "smc-crb2bw40-90d"]
 
 
+def test_every_fault_of_a_design_file_is_in_one_refusal(tmp_path: Path) -> None:
+    faulty = FILE.replace("enfield-ls-v05s", "no-valve").replace('"4 N m", "4 N m"', '"4 N m"')
+    faulty = faulty.replace("task-proportional", "task-proportionel").replace("repetitions = 100", "")
+    faulty = faulty.replace('"0.4 N m"', '"0.4 Pa"') + '\n[pressure]\nlowest = "5 deg"\n'
+    (tmp_path / "faulty.toml").write_text(faulty)
+    with pytest.raises(PpafoError) as caught:
+        load_design(tmp_path / "faulty.toml")
+    named = ("no-valve", "torque has 4;", "task-proportionel", "pressure.lowest", "[use]", "limits.rms_error")
+    assert [word in part for word, part in zip(named, caught.value.parts, strict=True)] == [True] * 6
+    # The keys of a table that is missing altogether are asked for at once.
+    (tmp_path / "faulty.toml").write_text(FILE.partition("[limits]")[0])
+    with pytest.raises(PpafoError, match=r"'limits\.rms_error', 'parts\.valves' and 'parts\.bottles' are missing"):
+        load_design(tmp_path / "faulty.toml")
+
+
 def test_runs_that_all_fail_are_said_in_one_line(folder: Path) -> None:
     late = FILE.replace(
         "simulated = 1", 'simulated = 1\noverrides = ["actuator.dead_volume_1=1e-6 mm^3", "motion.angle=20 deg"]'
@@ -523,7 +538,8 @@ def test_a_cut_peak_is_told_without_a_bottle_and_without_a_pressure_that_suffice
     # 20 psi give 137.9 kPa x 14.51 cm^3 = 2.001 N m: half of the peak.
     assert sized.pressure == pytest.approx(ATMOSPHERE + 20.0 * 6894.757)
     assert suggestion_sentence(weak) == (
-        "no suggestion: no valve keeps the error limit at any of the pressures; festo-vovg-5v-pair, with "
+        "no suggestion: no valve keeps the error limit; the smallest error is "
+        f"{sized.error:.3g} N m with festo-vovg-5v-pair at 20 psi_g; festo-vovg-5v-pair, with "
         "50 % of the peak cut off (at most 2 N m of 4 N m; the whole peak statically needs "
         "pressure.lowest = '40 psi_g' and a higher pressure.highest)"
     )

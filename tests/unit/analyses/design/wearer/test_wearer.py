@@ -211,11 +211,11 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
     assert requirements.height == pytest.approx(math.sqrt(60.0 / 22.0))
     said = text_of(finding_of(WearerSizing(requirements, 0.0052, tuple(found), None, ())))
     assert "1.651 m (assumed: a body mass index of 22 kg/m^2; give stature)" in said
-    # The valve of the paper has no data sheet: each figure that is missing is said, once.
+    # The valve of the paper has no data sheet: the figures that are missing are said, once.
     unknown = [line for line in said.splitlines() if line.endswith(" unknown, taken as ideal")]
-    figures = ("dead band", "delay", "spool frequency", "slew limit", "largest pressure")
-    parts = [(valve.name, figure) for figure in figures] + [(actuator.name, "largest pressure")]
-    assert unknown == [f"{name}: {figure} unknown, taken as ideal" for name, figure in parts]
+    parts = [(valve.name, "dead band, delay, spool frequency, slew limit, largest pressure")]
+    parts.append((actuator.name, "largest pressure"))
+    assert unknown == [f"{name}: {figures} unknown, taken as ideal" for name, figures in parts]
     assert "(g/s)" in said
     # A catalogue of one's own that states flows of valves in L/min: CO2 at 20 degC and 1 bar has 1.82 g/L.
     own = catalogue.part("valves", "festo-mpye-5-m5-010-b")
