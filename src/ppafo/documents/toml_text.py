@@ -18,6 +18,8 @@ from ppafo.errors import PpafoError
 from ppafo.wording import nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
+_RESULT = "run.json"
+"""File of a result folder that describes the run."""
 _MAXIMUM_NAMED = 3
 """Largest number of files listed in a message."""
 _LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
@@ -68,13 +70,16 @@ class TomlKind:
             return read_regular_file(path, MAXIMUM_BYTES_TYPED)
         except IsADirectoryError as error:
             inside = [label(str(file)) for file in sorted(path.glob(f"*{_SUFFIX}"))[:_MAXIMUM_NAMED]]
-            remedy = f"; give {' or '.join(inside)}" if inside else f"; give a .toml file{self.made}"
+            other = self._remedy(name) or f"; give a .toml file{self.made}"
+            remedy = f"; give {' or '.join(inside)}" if inside else other
             raise self.error(f"{label(name)}: cannot be read: {reason(error)}{remedy}") from error
         except (OSError, ValueError) as error:
             raise self.error(f"{label(name)}: cannot be read: {reason(error)}{self._remedy(name)}") from error
 
     def _remedy(self, file: str) -> str:
-        """Return the remedy for a file of another kind, such as a recording; empty for a .toml file."""
+        """Return the remedy for a stored result or a file of another kind; empty for a .toml file."""
+        if Path(file).name == _RESULT or Path(file, _RESULT).is_file():
+            return "; it is a stored result: give the name or file of what was run, or read it by ppafo.read_result"
         return "" if Path(file).suffix in ("", _SUFFIX) else f"; give a .toml file{self.made}"
 
     def parse(self, content: bytes, file: str) -> dict[str, Any]:

@@ -22,6 +22,9 @@ from ppafo.signals.recording import Floats
 from ppafo.units import without_exponent
 from ppafo.units.shown import quantity_of_unit
 
+YES_OR_NO = "; 1: yes, 0: no"
+"""Remark in the label of a number that answers a question; a mean of several runs lies between."""
+
 
 @dataclass(frozen=True, slots=True)
 class ConfidenceInterval:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.report.kind import Kind
+from ppafo.report.kind import YES_OR_NO, Kind
 from ppafo.report.style import (
     BLUE,
     DASHES,
@@ -392,3 +392,9 @@ def _share_scales(figure: "Figure", drawn: "Sequence[tuple[Axes, Panel, Any]]", 
                 drawing.set_clim(lowest, highest)
         bar = figure.colorbar(coloured[0], ax=axes, pad=0.02)
         bar.set_label(_wrapped(scale.axis, height))
+        values = np.concatenate([np.ma.compressed(drawing.get_array()) for drawing in coloured])
+        if scale.words.endswith(YES_OR_NO) and np.isin(values[np.isfinite(values)], (0.0, 1.0)).all():
+            for drawing in coloured:
+                drawing.set(clim=(0.0, 1.0), cmap=drawing.get_cmap().resampled(2))
+            bar.set_ticks([0.25, 0.75], labels=["no", "yes"])
+            bar.set_label(_wrapped(scale.words.removesuffix(YES_OR_NO), height))

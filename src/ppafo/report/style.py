@@ -176,6 +176,9 @@ def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, by
 def lay_out(figure: "Figure") -> None:
     """Compute the layout of a figure once, then fix it: resizing keeps the proportions."""
     layout = figure.get_layout_engine()
+    for axes in figure.axes:
+        # The number of ticks follows the font that is set when a figure is saved, unless its axes have one.
+        axes.tick_params(labelsize=font_size(_FONT_SIZES["font.size"]))
     if layout is not None:
         # Twice: the ticks follow the length of their axis, and their labels take room.
         layout.execute(figure)

@@ -116,3 +116,22 @@ def test_the_copy_of_a_set_names_it_as_parent_from_wherever_it_lies(
     file.unlink()
     assert main(["sets", "audit", "below/second.toml"]) == 2
     assert "below/second.toml: parent: below/../first.toml: cannot be read" in capsys.readouterr().err
+
+
+def test_placeholders_of_the_template_are_a_warning_and_a_source_mended_is_a_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    main(["new", "set", "mine"])
+    main(["new", "set", "mended", "--from", "mine.toml"])
+    text = Path("mended.toml").read_text(encoding="utf-8")
+    placeholder = 'origin = "assumed"\nsource = "template"'
+    text = text.replace(placeholder, 'origin = "datasheet"\nsource = "page 3"', 3)
+    Path("mended.toml").write_text(text.replace("value = 60.0", "value = 61.0"), encoding="utf-8")
+    capsys.readouterr()
+    main(["sets", "audit", "mine.toml"])
+    assert "the source of 20 values is the template's" in capsys.readouterr().out
+    main(["sets", "audit", "mended.toml"])
+    assert capsys.readouterr().out.startswith(
+        "mended changes 1 value and the origin or source of 2 values of its parent mine\n"
+    )

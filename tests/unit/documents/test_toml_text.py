@@ -113,6 +113,12 @@ def test_a_file_of_another_kind_and_a_folder_are_answered_with_what_to_give(tmp_
         ScenarioError, match=r"it is a directory, not a file; give a \.toml file, which a command makes$"
     ):
         kind.read(tmp_path)
+    (tmp_path / "run.json").write_text("{}", encoding="utf-8")
+    for stored in (tmp_path, tmp_path / "run.json"):
+        with pytest.raises(
+            ScenarioError, match=r"it is a stored result: give the name or file of what was run, or read"
+        ):
+            kind.parse(kind.read(stored), str(stored))
     (tmp_path / "mine.toml").touch()
     with pytest.raises(ScenarioError, match=r"it is a directory, not a file; give \S*/mine\.toml$"):
         kind.read(tmp_path)

@@ -340,7 +340,7 @@ def test_everything_can_be_reached_and_changed_by_keyboard_alone(chromium: Any, 
         reached.add(
             page.evaluate("document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent")
         )
-    assert {"Share and export", "Torque task", "Supply pressure", "Supply pressure, slider", "Valve opening"} <= reached
+    assert {"Share and export", "Torque task", "Supply pressure", "Supply pressure, slider", "Valve area"} <= reached
     page.locator(".control[data-key='supply.pressure'] input[type=range]").focus()
     page.keyboard.press("ArrowRight")
     assert "supply.pressure" in page.evaluate("workbench.address()")

@@ -77,7 +77,7 @@ def test_it_is_changed_by_keyboard_alone(page: DrivenPage, file: Path) -> None:
     for _ in range(30):
         page.press("Tab")
         reached.add(page.evaluate(FOCUSED))
-    assert {"Torque task", "Supply pressure", "Supply pressure, slider", "Valve opening"} <= reached
+    assert {"Torque task", "Supply pressure", "Supply pressure, slider", "Valve area"} <= reached
     page.evaluate("wanted => document.querySelector(wanted).focus()", SLIDER)
     page.press("ArrowRight")
     assert "supply.pressure" in page.evaluate("workbench.address()")

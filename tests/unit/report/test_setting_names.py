@@ -8,7 +8,7 @@ from ppafo.report.setting_names import label_of
 @pytest.mark.parametrize(
     ("path", "label"),
     [
-        ("valve.area", "Valve opening"),
+        ("valve.area", "Valve area"),
         ("effects.mesh.area", "Area"),
         ("sensors.angle_noise", "Sensors: angle noise"),
     ],

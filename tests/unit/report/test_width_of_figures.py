@@ -160,3 +160,12 @@ def test_a_figure_whose_size_is_changed_keeps_its_panels() -> None:
 def test_a_width_that_no_page_has_is_refused_with_the_argument_named(width: str | float) -> None:
     with pytest.raises(ArgumentError, match="width"), drawn_at(width):
         pass
+
+
+def test_ticks_keep_their_labels_after_the_layout_so_that_no_label_of_an_axis_leaves_the_figure() -> None:
+    x, y = np.linspace(4.0, 8.0, 9), np.linspace(5.0, 15.0, 9)
+    marks = (Mark("map", x, y, np.add.outer(y, x)),)
+    with drawn_at("84 mm"):
+        figure = draw_panels([Panel(Kind("Pressure"), Kind("Valve area"), marks, scale=Kind(name)) for name in "abc"])
+    figure.draw_without_rendering()
+    assert min(axes.yaxis.label.get_window_extent().x0 for axes in figure.axes[:3]) > 0.0

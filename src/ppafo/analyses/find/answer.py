@@ -143,7 +143,11 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
     value = float(tried["value"][index])
     # Beyond it the condition may be met by a loop that does not follow its reference.
     follows = " and follows its reference" if missed else ""
-    lead = f"{path} = {kind.text(value)} is the {wanted} value that {meets}{follows}"
+    intervals, gap = outcome.met_intervals, ""
+    if len(intervals) > 1:
+        (_, start), (stop, _) = intervals[-2:] if outcome.highest else intervals[:2]
+        gap = f", but no value between {kind.text(start)} and {kind.text(stop)} does"
+    lead = f"{path} = {kind.text(value)} is the {wanted} value that {meets}{follows}{gap}"
     # Verdicts have the number that decided, in a line of their own.
     number, judged = (of_condition.text(float(tried[name][index])) for name in ("metric", "judged"))
     there = "" if outcome.verdicts else f": {condition.metric} is {number} there"
@@ -156,7 +160,7 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
         end = kind.text(float(tried["value"][-1 if outcome.highest else 0]), ".9g")
         add = f"; for {further} values, add {override_text([f'{other}={end}'])}" if other else ""
         valid = f"it is the {wanted} valid value, not the limit of the condition {bracket}"
-        return f"{path} = {kind.text(value)} {meets}{follows}{there}; {valid}: {reason}{add}"
+        return f"{path} = {kind.text(value)} {meets}{follows}{gap}{there}; {valid}: {reason}{add}"
     beyond, why = tried[index + (1 if outcome.highest else -1)], ""
     if beyond["oscillating"]:
         why = "; beyond it the loop oscillates"

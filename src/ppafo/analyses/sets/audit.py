@@ -143,8 +143,15 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
             (change.path, change.before or None, change.after or None, change.origin)
             for change in changes(audited_set.parameter_set, parent)
         ]
-        count = count_of(len(rows), "value") if rows else "nothing"
-        sentence = f"{name} changes {count} of its parent {parent.name}"
+        own, others, changed_values = audited_set.parameter_set.entries(), parent.entries(), {row[0] for row in rows}
+        restated = sum(
+            (entry.origin, entry.source) != (others[path].origin, others[path].source)
+            for path, entry in own.items()
+            if path in others and path not in changed_values
+        )
+        counts = [count_of(len(rows), "value")] if rows else []
+        counts += [f"the origin or source of {count_of(restated, 'value')}"] if restated else []
+        sentence = f"{name} changes {' and '.join(counts) or 'nothing'} of its parent {parent.name}"
         parts.append(Section(said=[sentence], columns=columns_of(("value", parent.name, name, "origin"), rows), left=4))
     listed = [
         finding

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.errors import DataError, StudyError, UnitError, refused_as
-from ppafo.report.kind import Kind, of_stored_metric
+from ppafo.report.kind import YES_OR_NO, Kind, of_stored_metric
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, column_names, matrix_of, read_parquet
 from ppafo.study.folder import StudyFolder
@@ -179,5 +179,5 @@ def metric_kind(results: StudyResults, metric: str) -> Kind:
     """Return label, unit and format of a metric from the stored unit, also for a metric that no longer exists."""
     if metric == FOLLOWS:
         # A column of every study, not a requested metric.
-        return Kind("Follows its reference; 1: yes, 0: no")
+        return Kind(f"Follows its reference{YES_OR_NO}")
     return of_stored_metric(metric, results.document["metrics"][metric]["unit"])

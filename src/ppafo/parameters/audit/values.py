@@ -63,8 +63,23 @@ _SWITCHING = ("closing_delay", "switching_interval")
 
 
 def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a warning on values that a device lacks, unless the set names a completed set, and on ideal valves."""
+    """Yield a warning on sources that are a template's, values that a device lacks, and ideal valves.
+
+    Values may be missing where the set names a completed set.
+    """
     parameter_set = evidence.parameter_set
+    placeholders = [
+        path
+        for path, entry in parameter_set.entries().items()
+        if entry.source.startswith("template") and not entry.note.startswith("follows")
+    ]
+    if placeholders:
+        yield AuditFinding(
+            id="template-sources",
+            severity="warning",
+            title=f"the source of {count_of(len(placeholders), 'value')} is the template's",
+            paragraph=f"Measure, look up or estimate, and say where it comes from: {', '.join(placeholders)}.",
+        )
     if parameter_set.completed_by:
         return
     missing: list[str] = []

@@ -104,9 +104,13 @@ def test_a_condition_that_is_always_met_ends_where_the_range_does(
 def test_a_condition_that_changes_more_than_once_says_so_and_shows_where_it_is_met(
     of_curve: Callable[..., Finding[Threshold]],
 ) -> None:
-    found = of_curve(lambda p: 1.0 + np.sin(p)).found
+    answer = of_curve(lambda p: 1.0 + np.sin(p))
+    found = answer.found
     assert found.value is not None
     assert found.value / BAR == pytest.approx(np.pi, abs=1e-5)
+    assert re.search(
+        r"is the lowest value that meets .*, but no value between 6\.\S+ bar_a and 9\.\S+ bar_a does", answer.said[0]
+    )
     assert found.changes == 3
     assert "changes 3 times over the range, so it is not met everywhere above this value" in found.remarks[1]
     assert np.array(found.met) / BAR == pytest.approx(np.array([[3.14, 6.28], [9.42, 10.0]]), abs=0.13)
