@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.errors import ParameterError, ScenarioError
+from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters.declaration import WHY_ONE_CHAMBER
 from ppafo.parameters.device import Device
@@ -83,16 +83,23 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     device = read_device(reading, hardware)
     # Refusals are in the units of the set.
     with shown_in(device.shown):
-        times = read_clock(reading)
+        wrong = list[PpafoError]()
+        with noted_in(wrong):
+            times = read_clock(reading)
+        with noted_in(wrong):
+            reading.section("sensors", SENSORS)
+        with noted_in(wrong):
+            controlled = _controlled(reading)
+            reference, reference_links = _reference(reading, controlled, device.supply.atmospheric_pressure)
+        with noted_in(wrong):
+            initial, initial_links = _initial(reading, device)
+        raise_noted(wrong)
         tolerance = reading.number("run.tolerance", ACCURACY)
         section = MOTIONS[kind_at(document, "motion")].section
         assert section is not None, "walks are built from another layout"
         motion = section.read(reading, device, times.duration, times.step, request.folder)
-        initial, initial_links = _initial(reading, device)
         sensors = _sensors(reading, times)
         supply_line = read_supply_line(reading, device)
-        controlled = _controlled(reading)
-        reference, reference_links = _reference(reading, controlled, device.supply.atmospheric_pressure)
         control, control_links = _control(reading, device, times.period, sensors, supply_line, motion, reference)
         as_written = DocumentReader(request.file, request.content)
         assumptions = read_assumptions(as_written, reading, hardware, request.overrides)

@@ -8,7 +8,7 @@ from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.problems import quote
-from ppafo.errors import ScenarioError, UnitError
+from ppafo.errors import PpafoError, ScenarioError, UnitError, noted_in, raise_noted
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet
@@ -120,9 +120,12 @@ class DocumentReader:
         self, section: str, quantities: tuple[Quantity, ...], atmosphere: float = STANDARD_ATMOSPHERE
     ) -> dict[str, float]:
         """Return all values of a section by name, in SI; gauge pressures refer to ``atmosphere`` [Pa absolute]."""
-        return {
-            quantity.name: self.number(f"{section}.{quantity.name}", quantity, atmosphere) for quantity in quantities
-        }
+        values, wrong = dict[str, float](), list[PpafoError]()
+        for quantity in quantities:
+            with noted_in(wrong):
+                values[quantity.name] = self.number(f"{section}.{quantity.name}", quantity, atmosphere)
+        raise_noted(wrong)
+        return values
 
 
 def _form(quantity: Quantity, number: float) -> str:

@@ -69,9 +69,7 @@ class Endurance:
             "kind": "simulated",
             "ppafo": __version__,
             "result": {
-                "walking_time": result.walking_time,
-                "total_time": result.total_time,
-                "strides": result.strides,
+                **{name: getattr(result, name) for name in ("walking_time", "total_time", "strides")},
                 "ending": asdict(result.ending),
                 "coldest_temperature": float(np.min(recording["bottle_temperature"])),
                 "at_end": {name: float(recording[name][-1]) for name in recording.names},

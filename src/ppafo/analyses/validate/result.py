@@ -150,13 +150,10 @@ def _cause_data(cause: ResidualCause | None) -> dict[str, Any] | None:
     if cause is None:
         return None
     return {
-        "name": cause.name,
+        **{name: getattr(cause, name) for name in ("name", "gain", "left", "is_usual")},
         "words": in_words(cause),
         "same": [other.name for other in cause.same],
-        "gain": cause.gain,
-        "left": cause.left,
         "numbers": {path: value for path, (value, _) in cause.numbers.items()},
-        "is_usual": cause.is_usual,
     }
 
 
