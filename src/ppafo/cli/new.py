@@ -19,6 +19,8 @@ _SCHEMAS = {"set": "parameters"}
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _NAME_LINE = re.compile(r"""^name *= *(["'])(.*?)\1""", re.MULTILINE)
 _PARENT_LINE = re.compile(r"^parent *=.*\n", re.MULTILINE)
+_TITLE_LINE = re.compile(r"^title *=.*$", re.MULTILINE)
+_NOTES = re.compile(r'^notes *= *""".*?"""\n', re.MULTILINE | re.DOTALL)
 _FIRST_TABLE = re.compile(r"^\s*\[", re.MULTILINE)
 
 
@@ -133,7 +135,8 @@ def new(
             path.unlink(missing_ok=True)
     command = chosen.command.replace("FILE", shlex.quote(str(path))).replace("NAME", name)
     document = {"kind": kind, "name": name, "file": str(path), "next": command}
-    copied = f", still with values, notes and sources of {source}" if source and kind in _WITH_SOURCES else ""
+    kept = "values, sources and citation" if kind == "set" else "values, notes and sources"
+    copied = f", still with {kept} of {source}" if source and kind in _WITH_SOURCES else ""
     return CommandOutput(f"written: {path}{copied}; next: {command}", document)
 
 
@@ -186,6 +189,9 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
         # What the copy changes is shown by 'ppafo sets audit'; what the source changed is not its matter.
         parent = source if source in files.names() else os.path.relpath(source, path.parent)
         rest = f"\nparent = {value_text(parent)}{_PARENT_LINE.sub('', rest, count=1)}"
+        # Title and notes are of the other device; the citation stays, to which the sources of its values refer.
+        title = f"title = {value_text(f'{name}, from {Path(parent).stem}')}"
+        rest = _NOTES.sub("", _TITLE_LINE.sub(lambda _: title, rest, count=1), count=1)
     text = f'{head}name = "{name}"{rest}'
     # A file of the package shows in its first lines how it is run.
     renamed = {named[2]: shlex.quote(str(path)), f"out/{named[2]}": f"out/{name}"}

@@ -83,6 +83,8 @@ _LINE = 0.17
 """Line height of the note, and of a legend above all panels [inches]."""
 _UNDER_NAMES = 0.08
 """Space between a legend above all panels and the panels [inches]."""
+_UNBROKEN = "\u00a0"
+"""Space at which no line of a title is broken."""
 _LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
 """Letters of a title per inch, fewest letters per line, and width of the mark "simulated" [inches]."""
 _ENTRY, _ENTRY_LETTERS = 0.53, 14.5
@@ -194,7 +196,7 @@ def draw_panels(
     notes = textwrap.wrap(note, round(15.0 * size[0] * across))
     below = _LINE * len(notes)
     # Beside the title stands what kind of numbers these are.
-    lines = textwrap.wrap(title, max(_FEWEST_LETTERS, round(_LETTERS * (width - _KIND))))
+    lines = _title_lines(title, max(_FEWEST_LETTERS, round(_LETTERS * (width - _KIND))))
     shared = next((panel for panel in panels if panel.legend == "figure"), None)
     names, legend_rows = (0, 0) if shared is None else _legend_rows(shared, "", width if title else width - _KIND)
     legend_height = 0.0 if shared is None else _LINE * max(1, legend_rows) + _UNDER_NAMES
@@ -273,6 +275,12 @@ def _widened(panels: Sequence[Panel], across: int) -> set[int]:
 def _title(panel: Panel) -> str:
     """Return the title of a panel: its own, or the label of the vertical axis."""
     return panel.title or (panel.y.axis if panel.shares_x else "")
+
+
+def _title_lines(title: str, letters: int) -> list[str]:
+    """Return the lines of a title; a clause that fits into one line is not broken."""
+    clauses = [clause.replace(" ", _UNBROKEN) if len(clause) < letters else clause for clause in title.split(", ")]
+    return [line.replace(_UNBROKEN, " ") for line in textwrap.wrap(", ".join(clauses), letters)]
 
 
 def _title_fit(panel: Panel, size: tuple[float, float]) -> float:

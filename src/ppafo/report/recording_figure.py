@@ -41,6 +41,9 @@ _HEADROOM = 0.06
 _MAXIMUM_TICKS = 5
 """Largest number of intervals between ticks of a value axis."""
 
+_SMALL_COMMAND = 0.2
+"""Command [-] below which the axis does not reach full opening, where a small command would be a flat line."""
+
 _ANGLE, _COMMAND = Kind("Ankle angle", "rad", "angle"), Kind("Valve command (-1 to 1)")
 _COMMAND_THAT_VENTS = Kind("Valve command (-1 to 1; 2 vents both chambers)")
 
@@ -133,6 +136,8 @@ def _panel(recording: Recording, quantity: _Quantity, valve: str, joint: JointNa
     ends = (float(recording.time[0]), float(recording.time[-1])) if recording.duration > 0.0 else None
     always_shown = (gauge_zero(),) if kind.quantity == "pressure" else quantity.always_shown
     smallest_span = display_difference(quantity.smallest_span, kind.quantity)
+    if kind is _COMMAND and float(np.abs(recording["command"]).max()) < _SMALL_COMMAND:
+        always_shown, smallest_span = (0.0,), _SMALL_COMMAND
     then = partial(_set_limits, ends, smallest_span, tuple(kind.values(always_shown)))
     vents = kind is _COMMAND and float(recording["command"].max()) > 1.0
     shown_kind = _COMMAND_THAT_VENTS if vents else kind

@@ -54,7 +54,7 @@ def test_what_a_copy_of_a_set_accepts_lapses_where_it_changes_a_value_of_the_fin
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     main(["new", "set", "own", "--from", "ppafo2011"])
-    assert "written: own.toml, still with values, notes and sources of ppafo2011; next: " in capsys.readouterr().out
+    assert "written: own.toml, still with values, sources and citation of ppafo2011; next: " in capsys.readouterr().out
     same = {finding.id: finding.accepted for finding in findings_of(load_parameter_set("own.toml"))}
     assert same["flow-of-solenoid"].startswith("As for the proportional valve")
     text = Path("own.toml").read_text(encoding="utf-8")
@@ -96,7 +96,10 @@ def test_every_file_of_the_package_is_copied_under_a_new_name_and_loads(kind: st
     first = (resources.files("ppafo").joinpath(*KINDS[kind].shipped.split("/")) / f"{source}.toml").read_text("utf-8")
     if kind == "set":
         assert f'parent = "{source}"' in made.split("\n")
-        made, first = (re.sub(r"^parent = .*\n", "", text, flags=re.MULTILINE) for text in (made, first))
+        # Title and notes are of the device that was copied.
+        assert f'title = "my-own, from {source}"' in made.split("\n")
+        own = r'^(parent|title) = [^\n]*\n|^notes = """.*?"""\n'
+        made, first = (re.sub(own, "", text, flags=re.MULTILINE | re.DOTALL) for text in (made, first))
     differing = [line for old, line in zip(first.split("\n"), made.split("\n"), strict=True) if old != line]
     assert 'name = "my-own"' in differing
     assert all(line == 'name = "my-own"' or line.startswith("#   ppafo ") for line in differing)

@@ -76,10 +76,13 @@ def test_a_signal_that_hardly_changes_is_not_blown_up() -> None:
     assert highest - lowest >= 10.0
 
 
-def test_the_command_axis_always_reaches_both_ends() -> None:
-    lowest, highest = recording_figure(recording(command=1.0)).axes[0].get_ylim()
+def test_the_command_axis_reaches_both_ends_unless_the_command_would_be_flat() -> None:
+    lowest, highest = recording_figure(recording(command=0.3)).axes[0].get_ylim()
     assert lowest < -1.0
     assert highest > 1.0
+    lowest, highest = recording_figure(recording(command=0.07)).axes[0].get_ylim()
+    assert -0.3 < lowest < 0.0
+    assert 0.07 < highest < 0.3
 
 
 def test_a_panel_with_two_lines_names_them() -> None:

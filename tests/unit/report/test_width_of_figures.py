@@ -169,3 +169,8 @@ def test_ticks_keep_their_labels_after_the_layout_so_that_no_label_of_an_axis_le
         figure = draw_panels([Panel(Kind("Pressure"), Kind("Valve area"), marks, scale=Kind(name)) for name in "abc"])
     figure.draw_without_rendering()
     assert min(axes.yaxis.label.get_window_extent().x0 for axes in figure.axes[:3]) > 0.0
+
+
+def test_the_title_of_a_narrow_figure_breaks_between_its_clauses() -> None:
+    figure = ppafo.simulate("torque-task-proportional", overrides=SHORT).plot("84 mm")
+    assert figure.get_suptitle() == "torque-task-proportional,\nankle at 75 deg"

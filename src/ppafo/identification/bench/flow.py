@@ -47,6 +47,14 @@ NEXT_LAW: Mapping[Law, str] = {
 }
 """Remedy by flow law, for readings that the law does not fit; the law ``both`` contains each of its parts."""
 
+LAW_NAMES: Mapping[Law, str] = {
+    "orifice": "orifice",
+    "laminar": "laminar gap",
+    "iso6358": "ISO 6358",
+    "both": "orifice and laminar gap",
+}
+"""Legend by flow law."""
+
 TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
 ZERO = "zero of the flow meter"
 APPARENT = "laminar gap equivalent to a gain error of the flow meter"

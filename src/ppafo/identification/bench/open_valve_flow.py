@@ -16,6 +16,7 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.checks import check_moves, check_not_clipped, check_sources
 from ppafo.identification.bench.flow import (
+    LAW_NAMES,
     NEXT_LAW,
     PRODUCT_ONLY,
     GasAt,
@@ -120,7 +121,7 @@ def open_valve_flow(
     first = np.interp(dense, ratio[order], upstream[order])
     shown = {"upstream_pressure": first, "downstream_pressure": dense * first}
     law_flow = shown_flow(opening, paths, shown, defaultdict(float, fitted.by_name))
-    curve = curve_mark(law, dense, _GRAMS_PER_BAR * law_flow / first)
+    curve = curve_mark(LAW_NAMES[law], dense, _GRAMS_PER_BAR * law_flow / first)
     marks = readings_mark("measured", ratio, measured_ordinate), curve
     axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")
     result = result_of(

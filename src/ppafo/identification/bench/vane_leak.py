@@ -29,6 +29,7 @@ from ppafo.identification.bench.chamber_decay import (
 from ppafo.identification.bench.checks import check_moves, check_not_clipped, check_sources
 from ppafo.identification.bench.flow import (
     GAS_LAW,
+    LAW_NAMES,
     NEXT_LAW,
     PRODUCT_ONLY,
     TEMPERATURE,
@@ -168,7 +169,7 @@ def _steady_leak(
         confidence,
     )
     scatter = float(np.std(flow - model) / np.abs(flow).max())
-    marks = readings_mark("measured", difference, flow), curve_mark(opening.law, difference, model)
+    marks = readings_mark("measured", difference, flow), curve_mark(LAW_NAMES[opening.law], difference, model)
     axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind("Flow", "kg/s", "mass flow")
     return result_of(
         PROCEDURE,
@@ -234,7 +235,7 @@ def _closed_leak(
     times = [decay.time for decay in decays for _ in decay.fitted]
     time, models = np.concatenate(times), np.split(model, np.cumsum([values.size for values in times])[:-1])
     # The legend names the first curve only.
-    names = [opening.law, *[""] * (len(times) - 1)]
+    names = [LAW_NAMES[opening.law], *[""] * (len(times) - 1)]
     marks = [readings_mark("measured", time, readings.measured)]
     marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
     is_room = all(decay.room is not None for decay in decays)

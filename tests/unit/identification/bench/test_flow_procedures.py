@@ -65,7 +65,7 @@ def test_flow_of_the_standard_gives_back_its_two_numbers_and_an_orifice_law_hold
     flow = 7.0e-9 * planted.CO2.flow_per_sonic_conductance * iso6358_shape(*pressures, 0.2)
     noisy = changed(source, "mass_flow", flow * (1.0 + np.random.default_rng(1).normal(0.0, 0.003, flow.size)))
     result = open_valve_flow((noisy,), planted.CO2, law="iso6358", path="valves.main", tolerances=EXACT)
-    curve = next(mark for mark in result.panels[0].marks if mark.label == "iso6358")
+    curve = next(mark for mark in result.panels[0].marks if mark.label == "ISO 6358")
     # ISO 6358: sqrt(1 - ((r - b) / (1 - b))^2) above b, 1 below it, at more ratios than were measured.
     shape = np.sqrt(1.0 - np.clip((curve.x - 0.2) / 0.8, 0.0, 1.0) ** 2)
     assert curve.x.size > 2 * noisy.recording.time.size
@@ -85,7 +85,7 @@ def test_the_drawn_curve_has_the_zero_of_the_meter_as_the_residuals_have() -> No
     shown = changed(source, "mass_flow", flow + 0.04 * flow.max())
     tolerances = Tolerances(gas_temperature=0.0, gas_law=0.0, zero_of_pressure=0.0, gain=0.0)
     result = open_valve_flow((shown,), planted.CO2, law="iso6358", path="valves.main", tolerances=tolerances)
-    curve = next(mark for mark in result.panels[0].marks if mark.label == "iso6358")
+    curve = next(mark for mark in result.panels[0].marks if mark.label == "ISO 6358")
     order = np.argsort(downstream / upstream)
     first = np.interp(curve.x, (downstream / upstream)[order], upstream[order])
     law = 7.0e-9 * planted.CO2.flow_per_sonic_conductance * iso6358_shape(first, curve.x * first, 0.2)
