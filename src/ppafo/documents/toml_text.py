@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources.abc import Traversable
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +79,8 @@ class TomlKind:
 
     def _remedy(self, file: str) -> str:
         """Return the remedy for a stored result or a file of another kind; empty for a .toml file."""
-        if Path(file).name == _RESULT or Path(file, _RESULT).is_file():
+        # Path.is_file raises an error for a name that is too long.
+        if Path(file).name == _RESULT or isfile(Path(file, _RESULT)):  # noqa: PTH113
             return "; it is a stored result: give the name or file of what was run, or read it by ppafo.read_result"
         return "" if Path(file).suffix in ("", _SUFFIX) else f"; give a .toml file{self.made}"
 
