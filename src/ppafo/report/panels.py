@@ -308,7 +308,7 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
 
     ``title_size`` is the font size of the title [points].
     """
-    from matplotlib.ticker import LogLocator, NullFormatter
+    from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter
 
     if not panel.marks:
         axes.set_axis_off()
@@ -350,7 +350,8 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
     if panel.then is not None:
         panel.then(axes)
     for axis in (axes.xaxis, axes.yaxis):
-        if axis.get_scale() == "log":
+        # Ticks that a panel has set are kept.
+        if axis.get_scale() == "log" and not isinstance(axis.get_major_locator(), FixedLocator):
             low, high = sorted(axis.get_view_interval())
             if high < _FEW_DECADES * low:
                 # Labels side by side take more room than labels above each other.

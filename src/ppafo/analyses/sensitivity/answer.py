@@ -1,6 +1,7 @@
 """Report of a sensitivity analysis: a table for each metric, and panels of the indices and their convergence."""
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -24,6 +25,8 @@ _INCHES_OF_A_BAR = 0.27
 """Height of the row of a varied value in a panel [inches]."""
 _MAXIMUM_LINES = 5
 """Number of varied values whose indices are plotted over the sample size."""
+_MOST_SIZES = 3
+"""Largest number of sample sizes with a tick, whose labels would run together if there were more."""
 _TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
 _CAPTION = (
     "Left: indices with confidence bands, {filled} filled{open}. Right: convergence of the largest indices with the "
@@ -178,4 +181,12 @@ def _course(influences: Influences, metric: MetricSensitivity) -> Panel:
         marks.append(Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
     title = f"{_TITLES[name][:1].upper()}{_TITLES[name][1:]}, {order.size} largest"
     axis = Kind(f"{method.sizes_label[:1].upper()}{method.sizes_label[1:]}")
-    return Panel(axis, Kind(), marks, title, then=lambda axes: axes.set_xscale("log", base=2))
+    return Panel(axis, Kind(), marks, title, then=partial(_set_sizes, sizes))
+
+
+def _set_sizes(sizes: Sequence[int], axes: "Axes") -> None:
+    """Make the axis of the sizes logarithmic, with ticks at the largest size and at even steps below."""
+    axes.set_xscale("log", base=2)
+    ticks = sizes[:: -math.ceil(len(sizes) / _MOST_SIZES)]
+    axes.set_xticks(ticks, [str(size) for size in ticks])
+    axes.minorticks_off()

@@ -360,3 +360,9 @@ def test_the_band_of_a_change_has_what_the_metric_bends_beside_the_spread(
         change, band = changes(EvaluatedBlocks(drawn, drawn, values, np.arange(len(points)), ends, seed), 0.95)
         held += bool(abs(change[0] - np.diff(metric(np.array([0.05, 0.95])))[0]) <= band[0])
     assert held >= fewest
+
+
+def test_the_convergence_has_ticks_at_the_sample_sizes_that_it_shows() -> None:
+    axes = sensitivity(STUDY, metrics=["gas_supplied"], samples=512, configuration="proportional").plot().axes[1]
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["512", "128"]
+    assert list(axes.get_xticks()) == [512, 128]
