@@ -190,7 +190,8 @@ def check_words(words: list[str]) -> None:
         if action is None:
             raise UsageError(f"{word}: give one of {', '.join(actions)}; see 'ppafo {word} --help'")
         if action not in actions:
-            raise UsageError(f"there is no 'ppafo {word} {action}'{known_names(action, actions)}")
+            tables = "; a result folder has its table as recording.csv and recording.nc" if word == "export" else ""
+            raise UsageError(f"there is no 'ppafo {word} {action}'{known_names(action, actions)}{tables}")
 
 
 def list_commands() -> str:

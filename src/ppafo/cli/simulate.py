@@ -124,8 +124,16 @@ def _text(report: _RunReport) -> str:
     exact = exact if report.check is None else repr(report.check)
     # Gains that are in force are no news: they stand last.
     gains = "" if report.gains is None else report.gains.sentence
-    last = [*filter(None, [exact, gains]), *(f"\nCommand with the remedy\n{text}" for text in report.usage)]
+    valve = scenario.device.valve.settings
+    times = [name for name in _OPENING if name in valve]
+    ideal = f"the valve opens without delay, as an ideal one: {', '.join(f'valve.{name}' for name in times)} = 0"
+    ideal = "" if any(valve[name] for name in times) or not times else ideal
+    last = [*filter(None, [exact, gains, ideal]), *(f"\nCommand with the remedy\n{text}" for text in report.usage)]
     return "\n".join([*head, *metrics_lines(report.result.metrics), *([""] if last else []), *last])
+
+
+_OPENING = "opening_delay", "spool_frequency", "slew_limit"
+"""Values of a valve that delay its opening; 0 for none."""
 
 
 @in_units(lambda report, _folder: report.result.scenario.device.shown)

@@ -78,7 +78,7 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
                 f"the header must name columns as 'name [unit]', separated by commas, not as '{one_line(shown)}'"
                 f"{remedy}"
             )
-        name, unit, word = match[1], match[2], match[3]
+        name, unit, word = match[1], "Pa" if match[2] == _LEVEL else match[2], match[3]
         # Time itself does nothing between its samples.
         between = next((known for known in BETWEEN if word == known and name != TIME), None)
         if word and between is None:
@@ -191,8 +191,11 @@ def csv_bytes(recording: Recording) -> bytes:
     """Return the CSV table of a recording without its label and kind."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    named = recording.channels.items()
-    heads = (f"{name} [{channel.unit}] {channel.between or ''}".rstrip() for name, channel in named)
+    # A pressure states that it is absolute.
+    heads = [
+        f"{name} [{_LEVEL if channel.unit == 'Pa' else channel.unit}] {channel.between or ''}".rstrip()
+        for name, channel in recording.channels.items()
+    ]
     writer.writerow([f"{TIME} [{TIME_UNIT}]", *heads])
     columns = [recording.time, *(recording[name] for name in recording.names)]
     rows = map(",".join, zip(*(map(repr, column.tolist()) for column in columns), strict=True))

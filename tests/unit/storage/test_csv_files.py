@@ -153,7 +153,7 @@ def test_what_a_channel_declares_between_its_samples_is_in_the_header(tmp_path: 
     supply = Channel(np.array([4.0e5, 5.0e5]), "Pa", "hold")
     declared = Recording("bench", np.array([0.0, 1.0]), {"supply_pressure": supply})
     path = write_csv(tmp_path / "bench.csv", declared)
-    assert path.read_text().splitlines()[0] == "time [s],supply_pressure [Pa] hold"
+    assert path.read_text().splitlines()[0] == "time [s],supply_pressure [Pa_a] hold"
     assert read_csv(path).is_held("supply_pressure")
     path.write_text("time [s],command [-] linaer\n0,1\n")
     with pytest.raises(DataError, match=r"column 'command': 'linaer' .* must be hold or linear, did you mean 'linear'"):
