@@ -54,7 +54,7 @@ def test_the_command_that_compares_a_recording_names_its_motion_and_the_motion_i
     capsys.readouterr()
     assert main(words[:-2]) == 1
     verdict = capsys.readouterr().out.splitlines()[0]
-    assert verdict.endswith("; the vane seems to be coupled to a leg (--motion leg)")
+    assert "; the vane seems to be coupled to a leg (--motion leg); " in verdict
 
 
 def test_values_of_an_experiment_that_replace_those_of_the_requested_set_are_said_in_the_answer(
