@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ppafo.control.catalog import switching_remedy
-from ppafo.control.controllers.switching import ON_OFF
+from ppafo.control.catalog import CONTROLLERS, switching_remedy
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
@@ -138,8 +137,9 @@ def oscillation(case: Case) -> TrackingCause | None:
     if law is not None and case.only_switches:
         return _step_of_valves(case, law)
     # Valves that a Python object opens fully alone act as under the shipped on/off law.
-    if law is None and may_be_late and not late and _pair_step(case, ON_OFF)[0] > _FINE * case.settled.wanted_change:
-        return _step_of_valves(case, ON_OFF)
+    shipped = CONTROLLERS["on_off"] if law is None and may_be_late and not late else None
+    if shipped is not None and _pair_step(case, shipped)[0] > _FINE * case.settled.wanted_change:
+        return _step_of_valves(case, shipped)
     if law is not None and names:
         return gains_of_another_device(case) or _fast_loop(case, law, names[0])
     name = "the user-defined controller" if law is None else f"`{law.name}`"
