@@ -15,11 +15,7 @@ from ppafo.simulation.numbers import number_at
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
-from ppafo.simulation.tracking.rule import (
-    REVERSALS,
-    is_pair,
-    most_reversals,
-)
+from ppafo.simulation.tracking.rule import REVERSALS, is_pair, most_reversals
 from ppafo.simulation.tracking.settled import smallest_change
 from ppafo.units import without_exponent
 from ppafo.units.shown import in_units
