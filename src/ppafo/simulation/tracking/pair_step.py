@@ -63,10 +63,7 @@ def quicker_text(scenario: Scenario, dead_time: float) -> str:
 
 
 def unlimited_switching(result: "RecordedResult") -> str:
-    """Remark on valves that reverse more often than their data permit, or than known valves do; "" for others.
-
-    Without data the limit is the switching frequency that the paper reports of its solenoid valves.
-    """
+    """Remark on valves that reverse more often than their data permit, or than known valves do; "" for others."""
     scenario = result.scenario
     # A law that asks for gradual openings and reverses them is said to oscillate.
     if math.isfinite(most_reversals(scenario)) or REVERSALS not in result.metrics:

@@ -26,9 +26,7 @@ LARGEST_MEAN_SWITCHED = 0.15
 LARGEST_SPAN_SWITCHED = 0.6
 """Range of the error at rest divided by the wanted change, above which an on/off controller does not follow [-].
 
-A pair of valves is called coarse where its step exceeds a quarter of the wanted change: one such step beyond each side
-of the usual dead zone, 4.2 % of the reach, is a range of 58 %. An RMS error of a quarter is a range of 50 % in a square
-wave and of 87 % in a triangle.
+One step of a quarter, above which a pair is called coarse, beyond each side of a dead zone of +-4.2 % is 58 %.
 """
 LARGEST_SHARE_MOVING = 0.2
 """RMS error divided by the wanted change, if the reference or the joint moves: every loop lags then [-]."""
