@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
+from ppafo.model.controlled import TORQUE
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
@@ -46,8 +47,9 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
         if left is None:
             # A number that was tried is one of many; a kind is none.
             example = "for example, " * any(".kind=" not in text for text in remedy.overrides)
-            # Pressures are computed for more torque than is requested.
-            margin = ", with a margin" * any(text.startswith("supply.") for text in remedy.overrides)
+            # Pressures are computed for more torque than is requested, but not for more angle.
+            has_margin = scenario.controlled == TORQUE and any(text.startswith("supply.") for text in remedy.overrides)
+            margin = ", with a margin" * has_margin
             text = f"{example}with {remedy.text} it follows, as a further run shows{margin}"
             return replace(verdict, cause=cause, tried=text, mended=remedy.overrides if is_of_file else ())
     of_cause = [(remedy, left.error) for cause, remedy, left in judged if left and cause == verdict.cause]

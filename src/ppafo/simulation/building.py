@@ -103,8 +103,9 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         control, control_links = _control(reading, device, times.period, sensors, supply_line, motion, reference)
         as_written = DocumentReader(request.file, request.content)
         assumptions = read_assumptions(as_written, reading, hardware, request.overrides)
-        # The reason for a reference beyond reach holds for the numbers of the file alone.
-        is_moved = changes_reach(override.typed for override in request.overrides)
+        # The reason for a reference beyond reach holds for the numbers beside which it is given alone.
+        given = {override.typed for override in request.overrides}
+        is_moved = PURPOSE not in given and changes_reach(given)
         scenario = Scenario(
             name=document["name"],
             description=document.get("description", ""),

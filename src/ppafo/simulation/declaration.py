@@ -220,7 +220,7 @@ def profile_path(section: MotionSection | None) -> str:
 
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the path of every text that a document can contain."""
-    kinds = ("motion.kind", "controller.kind", "reference.kind", REFERENCE_OF, "gas_model.kind")
+    kinds = ("motion.kind", "controller.kind", "reference.kind", REFERENCE_OF, PURPOSE, "gas_model.kind")
     section = section_of(document)
     if section is None or section.profile is None:
         return (*TEXTS, *kinds)

@@ -59,6 +59,8 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     for changed in ("reference.level=6.1 N m", "supply.pressure=49 psi_g", "actuator.torque_constant=14 cm^3"):
         assert load_scenario(TASK, [changed]).beyond_reach == ""
     assert load_scenario(TASK, ["valve.area=12 mm^2"]).beyond_reach == told.accepted
+    again = load_scenario(TASK, ["reference.level=6.1 N m", "reference.beyond_reach=to see what is left"])
+    assert again.beyond_reach == "to see what is left"
     assert with_numbers(load_scenario(TASK), {"supply.pressure": 3.0e5}).beyond_reach == ""
     scenario = load_scenario(TASK, ["reference.level=9 N m"])
     verdict = tried(scenario, simulate(scenario).tracking)
@@ -866,6 +868,15 @@ def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> Non
     slow = simulate(TASK, ["controller.kind=on_off", "reference.level=3 N m", "valve.slew_limit=50 1/s"])
     (remark,) = (said for said in slow.warnings if "a second" in said)
     assert "`valve.slew_limit` lets them open and shut fully at most 25 times a second" in remark
+
+
+def test_a_pressure_computed_for_a_torque_has_no_margin_of_an_angle() -> None:
+    low = ["supply.pressure=0.6 bar_g", "supply.dorsiflexion_pressure=0.6 bar_g", "motion.external_torque=3 N m"]
+    scenario = load_scenario("cylinder-servo", low)
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert "supply.pressure=" in verdict.tried
+    assert verdict.tried.endswith("as a further run shows")
 
 
 def test_a_reference_just_beyond_reach_that_is_followed_within_the_limit_is_told_the_reach() -> None:

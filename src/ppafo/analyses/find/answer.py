@@ -92,9 +92,9 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
             Section("To use the value" if used else "", code=used),
             Section(
                 "Metric over the value",
-                panels=(_panel(outcome, kind),),
+                panels=(_panel(outcome, kind, _met_words(missed)),),
                 name="find",
-                caption=f"The {drawn} over the value; dashed: the limit; shaded: where the condition is met.",
+                caption=f"The {drawn} over the value; dashed: the limit; shaded: where {_met_words(missed)}.",
             ),
         ),
         found=Threshold(
@@ -139,7 +139,10 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
         nearest = f"{_SETTLED} of " if tried["judged"][row] > tried["metric"][row] else nearest
         there = "" if outcome.verdicts else f"{nearest}{of_condition.text(tried['judged'][row])} at "
         ends = f"from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}"
-        return f"no {path} {ends} {meets}; the nearest is {there}{kind.text(tried['value'][row])}"
+        # Inside the range this number alone does not decide.
+        other = ", inside the range: a finer grid, or other gains (ppafo tune), may meet it"
+        other = other if 0 < row < tried.size - 1 else ""
+        return f"no {path} {ends} {meets}; the nearest is {there}{kind.text(tried['value'][row])}{other}"
     value = float(tried["value"][index])
     # Beyond it the condition may be met by a loop that does not follow its reference.
     follows = " and follows its reference" if missed else ""
@@ -204,7 +207,12 @@ def _remarks(outcome: FindResult, kind: Kind, missed: int) -> Iterator[str]:
         yield f"{runs.failures} of {runs.count} runs failed and count as not met; the first: {runs.reason}"
 
 
-def _panel(outcome: FindResult, kind: Kind) -> Panel:
+def _met_words(missed: int) -> str:
+    """Return the label of the values that count as met, ``missed`` values being met without being followed."""
+    return f"the condition is met{' and the reference followed' if missed else ''}"
+
+
+def _panel(outcome: FindResult, kind: Kind, met: str) -> Panel:
     """Return a panel of the metric over the value, with the limit, the values that meet it, and the result."""
     tried, condition = outcome.tried, outcome.condition
     # What decides whether a run follows is the excess, which has no larger number beside it.
@@ -223,7 +231,7 @@ def _panel(outcome: FindResult, kind: Kind) -> Panel:
         marks.append(Mark("line", values, larger, label=label, colour=GREY, style=crosses))
     marks.append(Mark("level", (), limit, label="limit", colour=BLACK, style=dashes))
     marks += [
-        Mark("span", ends, label="" if row else "condition met", colour=GREEN)
+        Mark("span", ends, label="" if row else met, colour=GREEN)
         for row, ends in enumerate(outcome.met_intervals)
     ]
     index, _ = outcome.found
