@@ -1,5 +1,7 @@
 """Kind of a number: label, SI unit and number format, declared once for text, tables and axes."""
 
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,16 +108,26 @@ class Kind:
 
     def interval(self, interval: ConfidenceInterval, form: str = "") -> str:
         """Return an estimate with the limits of its confidence interval, given in SI, as text without unit."""
-        value, low, high = (self.number(each, form) for each in (interval.value, interval.low, interval.high))
-        return f"{value} [{low}, {high}]"
+        return _interval_text(interval, form or self.form, self.number)
 
     def change_interval(self, interval: ConfidenceInterval, form: str = "") -> str:
         """Return a difference with the limits of its confidence interval, given in SI, as text without unit."""
-        ends = (interval.value, interval.low, interval.high)
-        value, low, high = (self.change_number(each, form or self.form) for each in ends)
-        return f"{value} [{low}, {high}]"
+        return _interval_text(interval, form or self.form, self.change_number)
 
 
+def _interval_text(interval: ConfidenceInterval, form: str, number: Callable[[float, str], str]) -> str:
+    """Return an estimate and its limits in as many digits, up to three more than ``form``, as tell these apart."""
+    ends = (interval.value, interval.low, interval.high)
+    for more in range(_MORE_DIGITS + 1):
+        finer = re.sub(r"\d+", lambda digits, more=more: str(int(digits[0]) + more), form)  # type: ignore[misc]
+        value, low, high = (number(each, finer) for each in ends)
+        if len({value, low, high}) == len({*ends}):
+            break
+    return f"{value} [{low}, {high}]"
+
+
+_MORE_DIGITS = 3
+"""Largest number of digits added to tell the limits of an interval apart."""
 PLAIN = Kind()
 """Kind of dimensionless numbers, and of texts."""
 TIME = Kind("Time", "s", "time")

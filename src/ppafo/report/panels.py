@@ -97,8 +97,6 @@ _EDGES, _NARROWEST = 0.3, 2.4
 """Width of a figure outside its panels, and least width of a panel beside another, at a font of 10 pt [inches]."""
 _LABEL_LETTERS, _AXIS_ROOM = 13.0, 0.55
 """Letters of an axis label per inch, and width or height of a panel outside its axes [inches]."""
-_DASHED_SHAPES = ("line", "bars")
-"""Shapes whose dashes follow their colour, so that lines differ in greyscale too."""
 _TITLE_SIZE, _SMALLEST_TITLE = 11.0, 0.72
 """Font size of a title [points], and smallest relative size of a shortened title."""
 _MARKUP = re.compile(r"\\[a-z]+|[${}_^]")
@@ -315,9 +313,9 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float], title_size: flo
         return None
     mapped = None
     # Lines of several colours, which would be one in grey, have the dashes of their colours.
-    plain = {mark.colour for mark in panel.marks if mark.shape in _DASHED_SHAPES and "linestyle" not in mark.style}
+    plain = {mark.colour for mark in panel.marks if mark.shape == "line" and "linestyle" not in mark.style}
     for mark in panel.marks:
-        is_dashed = len(plain) > 1 and mark.shape in _DASHED_SHAPES
+        is_dashed = len(plain) > 1 and mark.shape == "line"
         style = {"linestyle": DASHES.get(mark.colour, "-"), **mark.style} if is_dashed else mark.style
         artist = SHAPES[mark.shape](axes, replace(mark, style=style), panel.x.values(mark.x), panel.y.values(mark.y))
         mapped = artist if mark.shape in ("map", "points") else mapped

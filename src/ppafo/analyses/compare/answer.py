@@ -188,6 +188,12 @@ def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
         for metric in (_ERROR, _GAS)
         if len(comparison.configurations) > 2 and task.best.get(metric)
     }
+    following = [case for case in task.cases if case.follows]
+    for metric, kind in kinds:
+        values = [case.value(metric) for case in following]
+        if not comparison.draws and metric in (_ERROR, _GAS) and len(values) > 1 and np.isfinite(values).all():
+            least = [case.configuration for case, value in zip(following, values, strict=True) if value == min(values)]
+            best[metric] = f"{', '.join(least)} ({kind.text(min(values))})"
     laws = ((case, case.scenario.law) for case in task.cases)
     gains = ((case, gains_of(case.scenario, law)) for case, law in laws if law is not None)
     return [
@@ -341,7 +347,7 @@ def _pareto(comparison: ComparisonResult, task: TaskComparison) -> Panel:
 
 def _change(comparison: ComparisonResult, task: TaskComparison, metric: str) -> Panel:
     """Return a panel with histograms of the change of a metric against the baseline; dashed: nominal device."""
-    baseline, marks, ends = task.case(comparison.baseline), [], []
+    baseline, marks, ends = task.case(comparison.baseline), [], list[float]()
     for name, colour in _colours(task).items():
         case = task.case(name)
         if name == comparison.baseline or case.rows is None or baseline.rows is None:
@@ -355,7 +361,9 @@ def _change(comparison: ComparisonResult, task: TaskComparison, metric: str) -> 
         marks.append(Mark("bars", edges, counts, label=name, colour=colour))
         nominal = _relative(*(np.array([side.value(metric)]) for side in (baseline, case)))
         dashed = {"linestyle": "--", "linewidth": 1.2}
-        marks += [Mark("at", value, label="as declared", colour=colour, style=dashed) for value in nominal]
+        # One dashed line of the legend stands for all.
+        said = "" if ends else "nominal device"
+        marks += [Mark("at", value, label=said, colour=colour, style=dashed) for value in nominal]
         ends += [float(low), float(high), *nominal.tolist()]
     words = f"{of_metric(metric).words}, change from {comparison.baseline}"
     is_first = metric == _ERROR

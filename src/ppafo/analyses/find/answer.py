@@ -231,8 +231,7 @@ def _panel(outcome: FindResult, kind: Kind, met: str) -> Panel:
         marks.append(Mark("line", values, larger, label=label, colour=GREY, style=crosses))
     marks.append(Mark("level", (), limit, label="limit", colour=BLACK, style=dashes))
     marks += [
-        Mark("span", ends, label="" if row else met, colour=GREEN)
-        for row, ends in enumerate(outcome.met_intervals)
+        Mark("span", ends, label="" if row else met, colour=GREEN) for row, ends in enumerate(outcome.met_intervals)
     ]
     index, _ = outcome.found
     if index is not None:

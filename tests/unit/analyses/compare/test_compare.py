@@ -13,6 +13,7 @@ from ppafo.analyses.compare.answer import _change_panels, _pareto_panels
 from ppafo.analyses.compare.pairs import best_probabilities, compare_pairs, pareto_front
 from ppafo.analyses.compare.question import compare
 from ppafo.errors import StudyError
+from ppafo.report.finding import text_of
 from ppafo.studies.distributions import NormalAround
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.study import RandomValue
@@ -241,6 +242,20 @@ def test_an_override_that_one_configuration_lacks_names_it_and_the_way_to_anothe
     )
     with pytest.raises(StudyError, match="there is no configuration 'solenoid', did you mean 'torque-task-solenoid'"):
         compare(given, overrides=["solenoid:valve.area=5 mm^2"])
+
+
+def test_without_draws_the_least_error_and_gas_are_named_of_those_that_follow() -> None:
+    beyond = ppafo.load_scenario("torque-task-proportional", ["reference.level=9 N m"])
+    pair = {
+        "paper": ppafo.load_scenario("torque-task-proportional"),
+        "small": ppafo.load_scenario("torque-task-proportional", ["valve.area=6 mm^2"]),
+    }
+    answer = compare({**pair, "beyond": beyond})
+    text = text_of(answer)
+    (task,) = answer.found.tasks
+    for metric in ("rms_error", "gas_supplied"):
+        least = min(pair, key=lambda name: task.case(name).value(metric))
+        assert f"best: {metric}: {least} (" in text
 
 
 def test_a_configuration_has_one_colour_in_all_figures() -> None:

@@ -55,7 +55,7 @@ _WHOLE_PEAK = 0.005
 _MARGINS = ("error", "torque", "flow", "gas")
 _ORIGINS = {
     "typed": "typed, not measured",
-    "measured": "measured",
+    "measured": "recorded",
     "simulated": "simulated, not measured",
     "synthetic": "synthetic, not measured",
 }
