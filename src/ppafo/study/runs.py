@@ -183,7 +183,7 @@ def excess(
     """
     if not set(needed_metrics(scenario)) & set(rows):
         unknown = np.full(next(iter(rows.values())).size, np.nan)
-        return TrackingExcess(unknown, unknown)
+        return TrackingExcess(unknown, unknown, np.zeros_like(unknown))
     varied = {path: column for path, column in absolute(scenario, columns, gauge).items() if path not in TIMES}
     least = smallest_change(scenario) if scenario.follows_reference else 0.0
     return tracking_excess(with_numbers(scenario, varied), rows, most_reversals(scenario), least)

@@ -73,7 +73,10 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
     # In the unit of the range that was given.
     kind = of_path(path.path, path.quantity.unit, given=path.given)
     met, (index, neighbour) = outcome.met_intervals, outcome.found
-    drawn = "tracking error, divided by its limit," if condition.text == FOLLOWS else "metric"
+    drawn, also = "metric", ""
+    if condition.text == FOLLOWS:
+        drawn = "error, swing, peak or command reversals, each divided by its limit, whichever is largest,"
+        also = "; a torque beyond the actuator's does not meet it"
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
     # Values that meet the condition although the run does not follow its reference.
     missed = int(np.count_nonzero(~tried["follows"] & condition.is_kept(tried["judged"]))) * (condition.text != FOLLOWS)
@@ -94,7 +97,7 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
                 "Metric over the value",
                 panels=(_panel(outcome, kind, _met_words(missed)),),
                 name="find",
-                caption=f"The {drawn} over the value; dashed: the limit; shaded: where {_met_words(missed)}.",
+                caption=f"The {drawn} over the value; dashed: the limit; shaded: where {_met_words(missed)}{also}.",
             ),
         ),
         found=Threshold(
@@ -218,7 +221,7 @@ def _panel(outcome: FindResult, kind: Kind, met: str) -> Panel:
     # What decides whether a run follows is the excess, which has no larger number beside it.
     drawn, of_drawn, limit = ("metric", "judged"), of_metric(condition.metric), condition.limit
     if condition.text == FOLLOWS:
-        drawn, of_drawn, limit = ("excess", "excess"), Kind("Tracking error over its limit"), 1.0
+        drawn, of_drawn, limit = ("excess", "excess"), Kind("Largest tracking number over its limit"), 1.0
     values, metrics, judged = tried["value"], *(tried[name] for name in drawn)
     dots, dashes = {"linestyle": "", "marker": "o", "markersize": 3}, {"linestyle": "--", "linewidth": 1.0}
     grid_samples = tried[tried["is_of_grid"]]

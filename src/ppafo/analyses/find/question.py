@@ -43,7 +43,8 @@ def find(
     Arguments:
         scenario: name of a scenario, or a .toml file
         vary: a number of the scenario or its device, and its range, for example 'supply.pressure=20..90 psi_g'
-        such_that: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m', or 'follows'
+        such_that: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m', or 'follows': the
+            run follows a reference that the actuator can give
         highest: find the highest value
         grid: number of evenly spaced values to try first; default 64
         overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated

@@ -12,11 +12,15 @@ from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, a
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
 from ppafo.running import simulate
+from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remarks import standing_still
+from ppafo.simulation.tracking.remedies import change_text
+from ppafo.simulation.tracking.rule import CRITERION_TEXTS
+from ppafo.simulation.tracking.shortfall import shortfall
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
@@ -39,7 +43,7 @@ _SEED = 1
 """Random seed of the noise streams."""
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 FOLLOWS = "follows"
-"""Text of the condition that the run follows its reference, by the verdict of ``simulate``."""
+"""Text of the condition that the run follows its reference, by the verdict of ``simulate``, within the reach."""
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
@@ -174,7 +178,10 @@ class FindResult:
         oscillates = verdicts.oscillates == 1.0
         # A run without a verdict is none that follows.
         fails = verdicts.follows != 1.0
-        if self.condition.text != FOLLOWS:
+        if self.condition.text == FOLLOWS:
+            # A torque just beyond the actuator's is missed by no more than is allowed, but it is not reached.
+            fails |= (verdicts.beyond_reach > 0.0) & changes_reach(columns)
+        else:
             fails = (verdicts.follows == 0.0) & is_to_follow(base, columns)
         # A loop whose command turns all the time meets no condition that anybody would build on.
         usable = np.where(oscillates, np.nan, judged)
@@ -249,6 +256,9 @@ def outermost(
     for value in values:
         result = simulate(with_overrides(base, [f"{path.path}={value!r} {SI}"]))
         said = result.following if result.tracking is None else result.tracking.found
+        lacking = float(np.max(shortfall(result.scenario)))
+        if result.tracking is None and lacking > 0.0 and changes_reach([path.path]):
+            said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
         verdicts.append((value, "; ".join(filter(None, (said, standing_still(result, result.tracking is None))))))
     return replace(search, verdicts=tuple(verdicts))
 

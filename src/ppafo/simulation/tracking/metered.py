@@ -48,10 +48,12 @@ class TrackingExcess(NamedTuple):
     """Numbers of each run divided by their limits (runs,); nan if unknown.
 
     With ``largest`` up to 1 the run follows its reference, with ``oscillation`` up to 1 its loop does not oscillate.
+    ``beyond_reach`` [N m] is the requested torque beyond that of the actuator (runs,), which the limits allow in part.
     """
 
     largest: Floats
     oscillation: Floats
+    beyond_reach: Floats
 
     @property
     def follows(self) -> Floats:
@@ -90,7 +92,8 @@ def tracking_excess(
             # A law that requests no torque is judged by the peak alone.
             excess = excess_of_walk(settled, turning, limit)
             known = (np.isfinite(error) & (requested > 0.0)) | (np.isnan(error) & np.isfinite(peak) & (limit > 0.0))
-            return TrackingExcess(np.where(known, excess, np.nan), np.where(counted | known, turning, np.nan))
+            known_turning = np.where(counted | known, turning, np.nan)
+            return TrackingExcess(np.where(known, excess, np.nan), known_turning, np.zeros_like(none))
         settled = settled_tasks(scenario, numbers, least)
         found = excess_of_task(settled, only_switches(scenario, scenario.law))
         # On the ramp every loop is behind, and what lies beyond reach may not have been asked for yet.
@@ -106,5 +109,7 @@ def tracking_excess(
     # A value that does not move is no oscillation, however far it is from the reference, and a cut wave is none either.
     oscillation = np.fmax(turning, np.where((found.standstill > 1.0) | (cut > 1.0), 0.0, found.oscillation))
     return TrackingExcess(
-        largest=np.where(known_verdict, largest, np.nan), oscillation=np.where(counted | known, oscillation, np.nan)
+        largest=np.where(known_verdict, largest, np.nan),
+        oscillation=np.where(counted | known, oscillation, np.nan),
+        beyond_reach=beyond + np.zeros_like(none),
     )

@@ -136,7 +136,7 @@ class _TaskExcess(NamedTuple):
 
     - ``error``: remaining error
     - ``oscillation``: oscillation of the value
-    - ``overshoot``: peak of the value
+    - ``overshoot``: peak of the value beyond the wanted change
     - ``standstill``: error of a value that does not move, 0 for others
     """
 
@@ -201,7 +201,7 @@ def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
     else:
         oscillation = np.where(rests | (error > 1.0), np.asarray(settled.error_reversals) / (SUSTAINED - 1), 0.0)
         oscillation = np.where(rests & swings, np.maximum(oscillation, deviation), oscillation)
-        overshoot = np.where(rests, settled.peak / (LARGEST_PEAK * wanted), 0.0)
+        overshoot = np.where(rests, (settled.peak / wanted - 1.0) / (LARGEST_PEAK - 1.0), 0.0)
     share = np.asarray(settled.rms_error / wanted)
     is_still = (share > LARGEST_SHARE) & (settled.value_range <= SMALLEST_MOVE * wanted)
     standstill = np.where(is_still, share / LARGEST_SHARE, 0.0)
