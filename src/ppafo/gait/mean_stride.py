@@ -25,11 +25,21 @@ class MeanStride:
     """True if toe-off was found in the shank angle, without a vertical force and without events of the file."""
 
 
+_DIRECTIONS = {
+    "shank_angle.positive": "ankle_in_front or ankle_behind",
+    "ankle_angle.positive": "plantarflexion or dorsiflexion",
+    "ankle_moment.positive": "plantarflexion or dorsiflexion",
+    "vertical_force.positive": "up or down",
+}
+"""Values of each direction in a gait map."""
+
+
 def other_sign(signs_from: SignSource, key: str, turned: str = "the opposite sign") -> str:
     """Return the remedy for a curve with a wrong sign: the key in a gait map, or a correction of the file."""
+    either = f" ({_DIRECTIONS[key]})" if key in _DIRECTIONS else ""
     return {
-        "map": f"change {key} in the gait map",
-        "columns": f"correct the sign in the file, or change {key} in a gait map",
+        "map": f"change {key} in the gait map{either}",
+        "columns": f"correct the sign in the file, or change {key} in a gait map{either}",
         "gait_file": f"write mean, cosine and sine with {turned}",
     }[signs_from]
 

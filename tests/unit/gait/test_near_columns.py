@@ -2,6 +2,7 @@
 
 import pytest
 
+from ppafo.gait.recorded.mapping import ShankMap, column_names
 from ppafo.gait.recorded.near_columns import nearest_column
 from ppafo.storage.text_table import told_apart
 
@@ -42,3 +43,8 @@ def test_only_a_column_of_the_same_kind_is_suggested(missing: str, known: list[s
 )
 def test_doubled_names_are_told_apart(names: list[str], descriptions: list[str], apart: list[str]) -> None:
     assert told_apart(names, descriptions) == apart
+
+
+def test_a_map_may_name_a_column_with_its_unit_as_the_header_does() -> None:
+    shank = ShankMap(terms=("shank to vertical [deg]", "-lean[2]"))
+    assert column_names(shank) == ("shank to vertical", "-lean[2]")

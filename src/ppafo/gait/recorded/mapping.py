@@ -149,6 +149,9 @@ class GaitMap(StrictTable):
     knee: KneeMap | None = Field(None, description=_OF_THE_FORM)
 
 
+_UNIT_OF_HEADER = re.compile(r"\s+\[[^\[\]]*\]$")
+
+
 def column_names(mapped: object) -> tuple[str, ...]:
     """Return the columns named in the map of one curve, with a leading minus for subtracted columns."""
     if isinstance(mapped, KneeMap):
@@ -158,7 +161,8 @@ def column_names(mapped: object) -> tuple[str, ...]:
         axes = mapped.forward.removeprefix("-"), mapped.vertical
         return tuple(f"{marker}.{axis}" for marker in markers for axis in axes)
     terms: tuple[str, ...] = getattr(mapped, "terms")  # noqa: B009  # every other map has them, by its own class
-    return terms
+    # As in the header of a CSV file, whose units are no part of the names.
+    return tuple(_UNIT_OF_HEADER.sub("", term) for term in terms)
 
 
 def unsaid_axes(columns: GaitMap) -> list[str]:
