@@ -9,10 +9,26 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from ppafo.exports.hil.wire import BEGIN, OVER, VENTED, Answer, Reader, WireSample, answer_bytes, sample_bytes, value_of
+from ppafo.exports.hil.wire import (
+    ANSWER,
+    BEGIN,
+    OVER,
+    VENTED,
+    Answer,
+    Reader,
+    WireSample,
+    packet_bytes,
+    sample_bytes,
+    value_of,
+)
 
 Fault = Callable[[random.Random, float, bytes], list[tuple[float, bytes]]]
 """What becomes of a packet that would arrive at a time [s]: packets with their times."""
+
+
+def answer_bytes(answer: Answer) -> bytes:
+    """The packet of a controller's answer."""
+    return packet_bytes(ANSWER, answer[:4], struct.pack("<i", answer.command))
 
 
 def undisturbed(_draw: random.Random, arrival: float, data: bytes) -> list[tuple[float, bytes]]:

@@ -16,8 +16,8 @@ from ppafo.parameters.parameter_set import (
     Entry,
     ParameterSet,
     atmospheric_pressure,
+    entry_text,
     links_of_set,
-    number_text,
 )
 from ppafo.units import from_si, to_si
 
@@ -74,7 +74,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
     value, low, high = (
         from_si(number, unit, si_unit, atmosphere) for number in (estimate.value, estimate.low, estimate.high)
     )
-    previous = "no value" if before is None else f"{number_text(before)} ({before.origin}: {before.source})"
+    previous = "no value" if before is None else f"{entry_text(before)} ({before.origin}: {before.source})"
     said = f"{estimate.verdict_text}, {100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
     # An interval that is cut at a bound is too narrow on that side.
     wider = max(high - value, value - low)

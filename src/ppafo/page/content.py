@@ -1,16 +1,15 @@
 """Content of a page as plain data for its script: scenarios and walks with settings, and conversions of units."""
 
 import contextlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
 from ppafo.errors import ScenarioError, UnitError
 from ppafo.page.motions import declared_content, is_walk, relations_in_files, usual_changes
 from ppafo.page.setting import DIFFERENCE, LEVEL, Interval, bare_unit, gauge_texts, page_setting, typed_unit
 from ppafo.page.wasm import WasmModule
+from ppafo.page.words import stored_data
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.parameters.overrides import over, read_overrides
@@ -152,7 +151,7 @@ def page_content(
         "joint": joint,
         "form": form,
         "tabs": list(tabs),
-        "bottle": json.loads(files("ppafo.page").joinpath("minutes.json").read_text(encoding="utf-8")),
+        "bottle": stored_data("minutes.json"),
         "programs": list(programs),
         "units": scales,
         # Magnitude below which a number is shown as 0, by SI unit.

@@ -7,8 +7,6 @@ computed when the page is made.
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -18,10 +16,12 @@ from ppafo.engine.channels import TRACED
 from ppafo.errors import ScenarioError
 from ppafo.model.controlled import CONTROLLED
 from ppafo.page.wasm import WasmModule
+from ppafo.page.words import stored_data
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
 
 MOST_FIRST = 12
+_STORED = "opening.json"
 LEAST_CHANGE = 1e-3
 """Relative change of a result [-] below which the effect of a setting is invisible."""
 _STEP = 0.2
@@ -41,7 +41,7 @@ def opening_of(
     A change is a list of fractions: relative change of each claim, and change divided by the span of the first panel.
     """
     key = _key(module, changes, claims)
-    stored = _stored().get(scenario.name, {})
+    stored = stored_data(_STORED).get(scenario.name, {})
     if stored.get("key") == key:
         return dict(stored)
     numbers = [[entry["key"], entry["value"]] for entry in module.description["settings"]]
@@ -56,7 +56,7 @@ def opening_of(
 def opening_like(module: WasmModule) -> dict[str, Any]:
     """Return the stored initial state of the bundled scenario with most settings in common, without a run."""
     keys = {entry["key"] for entry in module.description["settings"]}
-    stored = _stored()
+    stored = stored_data(_STORED)
     of_same_name = stored.get(module.description["name"])
     return dict(of_same_name or max(stored.values(), key=lambda opening: len(keys & set(opening["changes"]))))
 
@@ -65,12 +65,6 @@ def _key(module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]
     """Return the hash of a scenario's file, overrides and changes on a page."""
     content = [module.description["document"], module.description["overrides"], sorted(changes.items()), list(claims)]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
-
-
-@cache
-def _stored() -> dict[str, Any]:
-    openings: dict[str, Any] = json.loads(files("ppafo.page").joinpath("opening.json").read_text(encoding="utf-8"))
-    return openings
 
 
 def computed_opening(

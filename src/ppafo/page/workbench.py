@@ -1,11 +1,8 @@
 """Workbench page: scenarios and walks in tabs, with labels and content."""
 
 import contextlib
-import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +16,7 @@ from ppafo.page.opening import computed_opening, first_settings, opening_like, o
 from ppafo.page.setting import Interval
 from ppafo.page.still import still_of
 from ppafo.page.wasm import module_of
-from ppafo.page.words import words
+from ppafo.page.words import stored_data, words
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart
@@ -173,14 +170,12 @@ def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
     return openings
 
 
-@cache
 def known_intervals() -> Mapping[str, Interval]:
     """Return 95 % intervals [SI] by key, for numbers without a stated uncertainty in the set.
 
     ``scripts/known_intervals.py`` writes them to a file, because the underlying study takes long to read.
     """
-    described = json.loads(files("ppafo.page").joinpath("intervals.json").read_text(encoding="utf-8"))
-    return {path: (low, high) for path, (low, high) in described.items()}
+    return {path: (low, high) for path, (low, high) in stored_data("intervals.json").items()}
 
 
 def _fits(changes: Mapping[str, str], units: Mapping[str, str]) -> bool:

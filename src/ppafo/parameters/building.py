@@ -36,8 +36,8 @@ from ppafo.parameters.parameter_set import (
     allowed_number,
     atmospheric_pressure,
     chosen_valve,
+    entry_text,
     links_of_set,
-    number_text,
     with_followers,
 )
 from ppafo.parameters.plant import first_settings, shape_and_growth
@@ -145,7 +145,7 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
             unit = entry.unit if declaration.fits(entry.unit, si_unit) else ""
             allowed = f"{relation} {other} = {shown_text(limit, si_unit, atmosphere=room, unit=unit)}"
             why = _BESIDE_ANOTHER if path in SUPPLIES else ""
-            yield (path, other), f"{path} = {number_text(entry)} must be {allowed}{why}"
+            yield (path, other), f"{path} = {entry_text(entry)} must be {allowed}{why}"
     if device.supply.is_vacuum and declaration.RELIEVING_PATH in parameter_set.flags and not device.supply.relieving:
         yield (
             (declaration.RELIEVING_PATH, *SUPPLIES),
@@ -253,7 +253,7 @@ def _reader(parameter_set: ParameterSet) -> Reader:
                 numbers[member.name] = float(member.default)
                 continue
             entry = parameter_set.numbers[path]
-            written = f"{parameter_set.file}: {path} = {number_text(entry)}"
+            written = f"{parameter_set.file}: {path} = {entry_text(entry)}"
             numbers[member.name] = allowed_number(written, entry, declared[path], atmosphere)
         return numbers
 

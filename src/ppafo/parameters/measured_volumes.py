@@ -83,18 +83,16 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
     columns, digits, units = _columns(text, file)
     angles, pressures = np.unique(columns["angle"]), np.unique(columns["pressure"])
     # Refusals are in the units of the table.
-    shown = counted_from({COLUMNS[name].unit: unit for name, unit in units.items()}, 0.0)
-    with shown_in(shown):
+    with shown_in(counted_from({COLUMNS[name].unit: unit for name, unit in units.items()}, 0.0)):
         _check_grid(columns["angle"], columns["pressure"], file)
-    order = np.lexsort((columns["pressure"], columns["angle"]))
-    volumes = {
-        name: column[order].reshape(angles.size, pressures.size)
-        for name, column in columns.items()
-        if name.startswith("volume")
-    }
-    with shown_in(shown):
-        for name in sorted(volumes):
-            _check_volume(name, volumes[name], angles, pressures, digits[name], file)
+        order = np.lexsort((columns["pressure"], columns["angle"]))
+        volumes = {
+            name: columns[name][order].reshape(angles.size, pressures.size)
+            for name in sorted(columns)
+            if name.startswith("volume")
+        }
+        for name, volume in volumes.items():
+            _check_volume(name, volume, angles, pressures, digits[name], file)
     return MeasuredVolumes(
         angles=angles,
         pressures=pressures,

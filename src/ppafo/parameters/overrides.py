@@ -242,25 +242,8 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
         allowed = [*declared, SPECIES_PATH, RELIEVING_PATH]
         if override.typed.startswith(CHOSEN_VALVE):
             allowed = [one_path(known, path.split(".")[1]) for known in allowed]
-        section, _, rest = override.typed.partition(".")
-        name = rest.partition(".")[0]
-        if section == SECTION and name in EFFECTS.loaded():
-            section = f"{section}.{name}"
-        # Compared without their section, which all values in it have in common and which makes strangers look alike.
-        near = [known.removeprefix(f"{section}.") for known in allowed if known.startswith(f"{section}.")]
-        hint = nearest_name(override.typed.removeprefix(f"{section}."), near).replace("'", f"'{section}.", 1)
-        # Nothing is spelt alike: values of the same section stand for what there is.
-        hint = hint or (f"; '{section}' has {', '.join(near)}" if near else nearest_name(override.typed, allowed))
-        # A gas is given by the name of its species, whatever the value was called.
-        if "gas" in override.typed.split(".") and override.text in SPECIES:
-            hint = f", did you mean '{SPECIES_PATH}={override.text}'?"
-        if section == SECTION:
-            near_name = nearest_name(name, EFFECTS.loaded()) or f"; effects: {', '.join(sorted(EFFECTS.loaded()))}"
-            hint = f": no effect '{name}'{near_name}; your own needs an entry point 'ppafo.effects'"
-        worked = _in_conductance(override)
-        raise ParameterError(
-            f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}{worked}"
-        )
+        hint = _nearest_value(override, allowed) + _in_conductance(override)
+        raise ParameterError(f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}")
     with refused_as(ParameterError, f"override '{override}'", UnitError):
         value, unit = split_number(override.text)
         unit = declared[path].unit if unit == SI else unit
@@ -268,6 +251,25 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
         entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
     kept = {key: old for key, old in parameter_set.numbers.items() if key not in other_forms(path)}
     return replace(parameter_set, numbers={**kept, path: entry})
+
+
+def _nearest_value(override: Override, allowed: Sequence[str]) -> str:
+    """Return a hint on the values of a set that an unknown override may mean."""
+    section, _, rest = override.typed.partition(".")
+    name = rest.partition(".")[0]
+    # A gas is given by the name of its species, whatever the value was called.
+    if "gas" in override.typed.split(".") and override.text in SPECIES:
+        return f", did you mean '{SPECIES_PATH}={override.text}'?"
+    if section == SECTION and name not in EFFECTS.loaded():
+        return (
+            f": no effect '{name}'{known_names(name, EFFECTS.loaded())}; your own needs an entry point 'ppafo.effects'"
+        )
+    section = f"{section}.{name}" if section == SECTION else section
+    # Compared without their section, which all values in it have in common and which makes strangers look alike.
+    near = [known.removeprefix(f"{section}.") for known in allowed if known.startswith(f"{section}.")]
+    hint = nearest_name(override.typed.removeprefix(f"{section}."), near).replace("'", f"'{section}.", 1)
+    # Nothing is spelt alike: values of the same section stand for what there is.
+    return hint or (f"; '{section}' has {', '.join(near)}" if near else nearest_name(override.typed, allowed))
 
 
 def _in_conductance(override: Override) -> str:

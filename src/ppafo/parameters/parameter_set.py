@@ -355,15 +355,10 @@ def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
         return base_value(entry.value, entry.unit)
 
 
-def number_text(entry: Entry) -> str:
-    """Format the value and unit of an entry."""
-    return format_quantity(entry.value, entry.unit)
-
-
 def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
     """Format the value of any entry: number with unit, text, true or false."""
     if isinstance(entry, Entry):
-        return number_text(entry)
+        return format_quantity(entry.value, entry.unit)
     return str(entry.value).lower() if isinstance(entry, FlagEntry) else entry.value
 
 

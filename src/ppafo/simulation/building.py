@@ -3,8 +3,7 @@
 Each mistake in the document raises an error of one line.
 """
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted
@@ -87,7 +86,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         with noted_in(wrong):
             times = read_clock(reading)
         with noted_in(wrong):
-            reading.section("sensors", SENSORS)
+            of_sensors = reading.section("sensors", SENSORS)
         with noted_in(wrong):
             controlled = _controlled(reading)
             reference, reference_links = _reference(reading, controlled, device.supply.atmospheric_pressure)
@@ -98,7 +97,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         section = MOTIONS[kind_at(document, "motion")].section
         assert section is not None, "walks are built from another layout"
         motion = section.read(reading, device, times.duration, times.step, request.folder)
-        sensors = _sensors(reading, times)
+        sensors = _sensors(reading, of_sensors, times)
         supply_line = read_supply_line(reading, device)
         control, control_links = _control(reading, device, times.period, sensors, supply_line, motion, reference)
         as_written = DocumentReader(request.file, request.content)
@@ -253,8 +252,7 @@ def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> t
     return choice, {path: follow for path, follow in links.items() if follow}
 
 
-def _sensors(reading: DocumentReader, clock: RunTimes) -> Sensors:
-    values: dict[str, Any] = reading.section("sensors", SENSORS)
+def _sensors(reading: DocumentReader, values: Mapping[str, float], clock: RunTimes) -> Sensors:
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration, or no measurement would arrive")
     if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, refused_as
-from ppafo.signals import Recording, RecordingKind
+from ppafo.signals import Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, recording_kind
 from ppafo.storage.comma_separated import parse_header, recording_of_columns
 from ppafo.wording import one_line
@@ -50,18 +50,11 @@ def _call_of_pandas(path: str | Path) -> str:
     return "" if call is None else f"pandas.{call.format(path=str(path))}"
 
 
-def recording_of_frame(
-    frame: Any, label: str = "", kind: RecordingKind = "measured", atmosphere: float = STANDARD_ATMOSPHERE
-) -> Recording:
-    """Return the recording in a pandas DataFrame or an xarray Dataset, in SI units.
+def recording_of_frame(frame: Any, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
+    """Return the recording in a pandas DataFrame or an xarray Dataset, in SI units; its attributes name title and kind.
 
-    Arguments:
-        frame: table with time as a column, as the index, or as the coordinate of a Dataset
-        label: name of the recording; default: ``frame.attrs["title"]``
-        kind: where the numbers come from, unless ``frame.attrs["kind"]`` says it
-        atmosphere: level from which gauge pressure counts [Pa absolute]
-
-    Raises DataError for a table without time, a column without unit and a cell that is no finite number.
+    Time is a column, the index, or the coordinate of a Dataset; gauge pressures are relative to ``atmosphere`` [Pa
+    absolute]. Raises DataError for a table without time, a column without unit and a cell that is no finite number.
     """
     attributes = dict(frame.attrs)
     if hasattr(frame, "data_vars"):
@@ -82,8 +75,8 @@ def recording_of_frame(
                 known = ", ".join(map(one_line, names))
                 raise DataError(f"the table has no column and no index '{TIME} [{TIME_UNIT}]'; available: {known}")
             names, values = [named, *names], [np.asarray(frame.index), *values]
-    title = label or str(attributes.get("title", "")) or "table"
-    return _recording(names, values, units, title, str(attributes.get("kind", kind)), atmosphere)
+    title, kind = str(attributes.get("title", "")) or "table", str(attributes.get("kind", "measured"))
+    return _recording(names, values, units, title, kind, atmosphere)
 
 
 def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:

@@ -232,19 +232,21 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     return scale, DECIMALS.divide(DECIMALS.subtract(given.offset, wanted.offset), wanted.scale), counts_from_atmosphere
 
 
+_NEEDED: dict[str, str] = {
+    LEVEL: "a pressure level is needed, for example '50 psi_g' or '446 kPa_a'",
+    DIFFERENCE: "a pressure difference is needed, for example '5 psi_d'",
+    "rad": "an angle is needed, for example '75 deg' or '1.3 rad'",
+    CONDUCTANCE: (
+        "a sonic conductance is needed, such as '1 L/(s bar)', a flow per pressure before the valve; a nominal "
+        "flow q from p1 to p2 (absolute) is C = q/(p1 sqrt(1 - ((p2/p1 - b)/(1 - b))^2)), with b = critical_ratio"
+    ),
+    "": "a plain number without a unit is needed",
+}
+"""Statements of what is needed in place of a wrong unit, by SI unit."""
+
+
 def _describe_unit(si_unit: str) -> str:
-    if si_unit == LEVEL:
-        return "a pressure level is needed, for example '50 psi_g' or '446 kPa_a'"
-    if si_unit == DIFFERENCE:
-        return "a pressure difference is needed, for example '5 psi_d'"
-    if si_unit == "rad":
-        return "an angle is needed, for example '75 deg' or '1.3 rad'"
-    if si_unit == CONDUCTANCE:
-        return (
-            "a sonic conductance is needed, such as '1 L/(s bar)', a flow per pressure before the valve; a nominal "
-            "flow q from p1 to p2 (absolute) is C = q/(p1 sqrt(1 - ((p2/p1 - b)/(1 - b))^2)), with b = critical_ratio"
-        )
-    return f"a unit like '{si_unit}' is needed" if si_unit else "a plain number without a unit is needed"
+    return _NEEDED.get(si_unit, f"a unit like '{si_unit}' is needed")
 
 
 def _decimal(value: float) -> Decimal:

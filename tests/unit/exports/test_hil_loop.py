@@ -17,7 +17,7 @@ from ppafo.exports.hil.pacing import LockStep, RealTime
 from ppafo.exports.hil.plant import CompiledPlant, check_baud, plant_of
 from ppafo.exports.hil.result import HardwareRun, longest_silence
 from ppafo.exports.hil.run import run_plant
-from ppafo.exports.hil.wire import OVER, VENTED, Answer, WireSample, answer_bytes
+from ppafo.exports.hil.wire import OVER, VENTED, Answer, WireSample
 from ppafo.loading import load_scenario
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import VENT
@@ -29,6 +29,7 @@ from tests.virtual_wire import (
     ProportionalLaw,
     ProportionalPartner,
     VirtualWire,
+    answer_bytes,
     faults,
     undisturbed,
     with_sequence,

@@ -19,12 +19,12 @@ from ppafo.exports.hil.wire import (
     Packet,
     Reader,
     WireSample,
-    answer_bytes,
     count_of,
     sample_bytes,
     value_of,
 )
 from ppafo.signals import CHANNELS as KNOWN
+from tests.virtual_wire import answer_bytes
 
 PAGE = (Path(__file__).parents[3] / "docs" / "wire-protocol.md").read_text(encoding="utf-8")
 WORDS = st.integers(0, 2**32 - 1)

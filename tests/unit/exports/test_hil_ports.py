@@ -24,13 +24,13 @@ from hypothesis import strategies as st
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.ports import open_port
-from ppafo.exports.hil.wire import Answer, Reader, WireSample, answer_bytes, sample_bytes
+from ppafo.exports.hil.wire import Answer, Reader, WireSample, sample_bytes
 from ppafo.processor.link import example_controller
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage.reading import read_recording
 from tests.example_board import COMPILER, SENT, WHOLE, built, running
-from tests.virtual_wire import ProportionalPartner, free_port
+from tests.virtual_wire import ProportionalPartner, answer_bytes, free_port
 
 TASK = "torque-task-proportional"
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no compiler of C is here")

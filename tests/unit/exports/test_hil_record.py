@@ -25,12 +25,11 @@ from ppafo.exports.hil.wire import (
     Answer,
     Reader,
     WireSample,
-    answer_bytes,
     count_of,
     sample_bytes,
 )
 from ppafo.storage.reading import read_recording
-from tests.virtual_wire import free_port, sending_bench
+from tests.virtual_wire import answer_bytes, free_port, sending_bench
 
 START = WRAP - 50_000
 """A time stamp [us] that goes on from 0 soon."""

@@ -128,7 +128,8 @@ from scripts.wasm_programs import keys_of
 # Again, as the first time loads modules.
 _, keys = keys_of(["step-response"]), keys_of(["step-response"])
 scenario = load_scenario("step-response")
-wasm._shipped_keys = lambda: keys
+stored_data = wasm.stored_data
+wasm.stored_data = lambda file: keys if file.endswith(wasm.SHIPPED_KEYS) else stored_data(file)
 composed, translated = [], []
 outlines, source_of = wasm.outline_of_unit, wasm.source_of
 wasm.outline_of_unit = lambda *given: composed.append(given) or outlines(*given)

@@ -13,7 +13,7 @@ from ppafo.identification.source import RecordingSource
 from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.overrides import read_overrides, with_overrides
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
-from ppafo.parameters.parameter_set import number_text, with_followers
+from ppafo.parameters.parameter_set import entry_text, with_followers
 from ppafo.progress import Report, report_nothing
 from ppafo.rig import record
 from ppafo.signals import Recording
@@ -86,7 +86,7 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
             if path not in settled and entry.origin in _NOT_OF_THE_PAPER and not is_of_file:
                 # What was set for this run says what it replaces.
                 reason, source = (f"set for this run; {entry.note}", "") if is_set_here else (entry.note, entry.source)
-                meaning, text = summaries[path], number_text(entry)
+                meaning, text = summaries[path], entry_text(entry)
                 values.append(AssumedValue(path, meaning, text, entry.origin, reason, source, (name,)))
         for value in values:
             key = (value.path, value.value, value.reason)

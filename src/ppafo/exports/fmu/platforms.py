@@ -74,17 +74,9 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
 def compiler_for(name: str) -> Sequence[str]:
     """Return the command of a compiler for a platform; ProgramError if there is none."""
     if importlib.util.find_spec("ziglang") is not None:
-        return [
-            sys.executable,
-            "-m",
-            "ziglang",
-            "cc",
-            "-target",
-            PLATFORMS[name].target,
-            "-s",
-            # zig turns undefined behaviour into traps in what it calls a debug build.
-            "-fno-sanitize=undefined",
-        ]
+        # zig turns undefined behaviour into traps in what it calls a debug build.
+        options = ("-s", "-fno-sanitize=undefined")
+        return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[name].target, *options]
     compiler = next(filter(None, map(shutil.which, ("gcc", "clang"))), None)
     # A library of this system's gcc runs on systems that are at least as new; zig links against an old one.
     if name == host_platform() == "linux64" and compiler is not None:

@@ -106,15 +106,11 @@ def sample_bytes(sample: WireSample) -> bytes:
     # In order of bits, whatever the order of the mapping: the receiver has only the mask.
     mask = sum(1 << _NAMES.index(name) for name in sample.counts)
     values = [sample.counts[name] for name in _NAMES if name in sample.counts]
-    return _packet(SAMPLE, sample[:4], _MASK.pack(mask) + struct.pack(f"<{len(values)}i", *values))
+    return packet_bytes(SAMPLE, sample[:4], _MASK.pack(mask) + struct.pack(f"<{len(values)}i", *values))
 
 
-def answer_bytes(answer: Answer) -> bytes:
-    """Return the packet of a controller's answer."""
-    return _packet(ANSWER, answer[:4], _WORD.pack(answer.command))
-
-
-def _packet(kind: int, head: tuple[int, int, int, int], payload: bytes) -> bytes:
+def packet_bytes(kind: int, head: tuple[int, int, int, int], payload: bytes) -> bytes:
+    """Return a packet; ``head`` has the first four numbers of a sample or an answer."""
     flags, run, sequence, time = head
     length = _HEADER.size + len(payload) + _CHECKSUM
     # 16 bits of checksum would pass a garbled packet in two hours at 1 kHz with 1 % garbled, 32 one in fourteen years.

@@ -175,9 +175,12 @@ def _gait(
     origin: Origin = "imported" if all(table.kind == "measured" for table in source.tables) else "synthetic"
     count, curves = len(strides.taken), dict[str, Any](series)
     times, shares = ([getattr(stride, name) for stride in strides.taken] for name in ("time", "stance_share"))
+    # A table over percent does not state the number of its strides.
+    is_mean_stride = any(table.is_mean_stride for table in source.tables)
+    counted = f"Mean of {count} strides" if count > 1 else "One stride"
     return Gait(
         name=settings.name,
-        title=settings.title or f"{_strides_text(source, count)}, {settings.side} foot",
+        title=settings.title or f"{'Mean stride' if is_mean_stride else counted}, {settings.side} foot",
         origin=origin,
         source=f"imported from {files}, {settings.side} foot; strides from the {events.replace('_', ' ')}",
         body_mass=settings.body_mass or 0.0,
@@ -190,10 +193,3 @@ def _gait(
         strides=count,
         **curves,
     )
-
-
-def _strides_text(source: GaitSource, count: int) -> str:
-    """Return words for the strides of a gait: a table over percent does not state the number of its strides."""
-    if any(table.is_mean_stride for table in source.tables):
-        return "Mean stride"
-    return f"Mean of {count} strides" if count > 1 else "One stride"

@@ -37,12 +37,10 @@ translation unit by ziglang, or taken from an earlier compilation of the same te
 
 import hashlib
 import importlib.util
-import json
 import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -57,6 +55,7 @@ from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, 
 from ppafo.exports.c_library.files import run_words
 from ppafo.exports.c_library.library import Library
 from ppafo.page.wasm.description import description_of
+from ppafo.page.words import stored_data
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked, complaint
@@ -76,7 +75,7 @@ STACK = 262144
 _LINKED = ("-Wl,--no-entry", "-Wl,--strip-all", f"-Wl,-z,stack-size={STACK}")
 FLAGS = (*TARGET, *STRICT, *_FREESTANDING, *_LINKED)
 INDEX = "index.json"
-"""Index file of prebuilt programs: digest of each C text, and compiler version."""
+"""Index file of prebuilt programs: file name of each by digest of its C text, and compiler version."""
 _TITLE = "The functions that a run is made of, from ppafo."
 _COMMENT = re.compile(r"\s*/\*.*?\*/\s*", re.DOTALL)
 _INSIDE = re.compile(r"(?:PPAFO_INLINE\s[\w\s*]*?\b|^\} )(\w+)(?=[(;])", re.MULTILINE)
@@ -100,7 +99,7 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
     """
     key = module_key(scenario)
     # Stored digests of C texts, by scenario description and by outline, which are void after any change of code.
-    keys, shipped = _shipped_keys(), dict[str, str]()
+    keys, shipped = stored_data(f"wasm/{SHIPPED_KEYS}"), dict[str, str]()
     if key is not None and key.files == keys["files"]:
         shipped = keys["digests"] if key.values.items() <= keys["values"].items() else {}
     if key is None:
@@ -108,9 +107,9 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
     elif not (digest := shipped.get(short_digest(key.described), "")):
         words = "\n".join([__version__, *FLAGS, key.words])
         digest = kept_bytes("module", words, lambda: _known_digest(library, shipped).encode()).decode()
-    prebuilt = prebuilt_programs().get(digest)
+    prebuilt = stored_data(f"wasm/programs/{INDEX}")["programs"].get(digest)
     if prebuilt is not None:
-        return _PROGRAMS.joinpath(prebuilt).read_bytes()
+        return files("ppafo.page.wasm").joinpath("programs", prebuilt).read_bytes()
     check_can_build()
     return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library, compose(library))))
 
@@ -118,13 +117,6 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
 def module_key(scenario: Scenario) -> Key | None:
     """Return the key of a scenario's module, the same for each duration; None if parts are not from the package."""
     return package_key(replace(scenario, run=replace(scenario.run, duration=0.0)), WRITTEN_BY)
-
-
-@cache
-def _shipped_keys() -> dict[str, Any]:
-    """Load the digests of bundled scenarios and walks, with the package files for which they are valid."""
-    keys: dict[str, Any] = json.loads(files("ppafo.page.wasm").joinpath(SHIPPED_KEYS).read_text(encoding="utf-8"))
-    return keys
 
 
 def short_digest(described: str) -> str:
@@ -260,16 +252,6 @@ def compiler_version() -> str:
     from importlib.metadata import version
 
     return version("ziglang") if importlib.util.find_spec("ziglang") is not None else ""
-
-
-_PROGRAMS = files("ppafo.page.wasm").joinpath("programs")
-
-
-@cache
-def prebuilt_programs() -> dict[str, str]:
-    """Return the file names of prebuilt programs by digest of the C text."""
-    programs: dict[str, str] = json.loads(_PROGRAMS.joinpath(INDEX).read_text(encoding="utf-8"))["programs"]
-    return programs
 
 
 @final

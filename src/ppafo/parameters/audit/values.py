@@ -11,7 +11,7 @@ from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence
 from ppafo.parameters.building import contradictions, missing_values, read_device
 from ppafo.parameters.declaration import is_within
-from ppafo.parameters.parameter_set import entry_in_si, number_in_si, number_text
+from ppafo.parameters.parameter_set import entry_in_si, entry_text, number_in_si
 from ppafo.parameters.publications.publication import FILE, read_publication
 from ppafo.units import to_si
 from ppafo.wording import count_of
@@ -35,7 +35,7 @@ def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
             title=f"{path} differs from the statement '{entry.key}'",
             values=evidence.values_of(path),
             paragraph=(
-                f"{path} is {number_text(entry)} and refers to '{entry.key}', which has {stated_number}. Give that "
+                f"{path} is {entry_text(entry)} and refers to '{entry.key}', which has {stated_number}. Give that "
                 "number, or the key of another statement ('ppafo reproduce --list'); for a value of another origin, "
                 f"delete the line 'key' of [{path}] and change origin and source."
             ),
@@ -165,7 +165,7 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("taken literally", 1.0 / value, quantity.unit),
             ),
             paragraph=(
-                f"{path} = {number_text(entry)} is declared as: {quantity.summary} [{quantity.unit}]. The reported "
+                f"{path} = {entry_text(entry)} is declared as: {quantity.summary} [{quantity.unit}]. The reported "
                 f"unit {entry.unit} belongs to the reciprocal. Invert the ratio and keep the number: "
                 f"taken literally, the value would be {1.0 / value:.3g} {quantity.unit}."
             ),
@@ -173,7 +173,7 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
     if foreign:
         numbers, declared = evidence.parameter_set.numbers, evidence.declared
         described = "; ".join(
-            f"{path} = {number_text(numbers[path])} must have the unit {declared[path].unit or '-'} "
+            f"{path} = {entry_text(numbers[path])} must have the unit {declared[path].unit or '-'} "
             f"({declared[path].summary})"
             for path in foreign
         )
@@ -210,7 +210,7 @@ def check_ranges(evidence: Evidence) -> Iterator[AuditFinding]:
                 ),
             ),
             paragraph=(
-                f"{path} = {number_text(entry)}: {quantity.summary} must lie between {quantity.minimum:g} and "
+                f"{path} = {entry_text(entry)}: {quantity.summary} must lie between {quantity.minimum:g} and "
                 f"{quantity.maximum:g} {quantity.unit}".rstrip()
                 + ". Give a value in that range."
             ),
