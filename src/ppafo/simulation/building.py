@@ -33,14 +33,7 @@ from ppafo.simulation.declaration import (
     reference_settings,
 )
 from ppafo.simulation.default_gains import default_gain_terms
-from ppafo.simulation.document import (
-    REFERENCE_OF,
-    DocumentReader,
-    ScenarioRequest,
-    controlled_in,
-    kind_at,
-    value_at,
-)
+from ppafo.simulation.document import REFERENCE_OF, DocumentReader, ScenarioRequest, controlled_in, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, read_followers
 from ppafo.simulation.hardware import Hardware, device_error, read_device, read_hardware
 from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_scenario

@@ -13,24 +13,13 @@ from ppafo.documents.problems import all_problems, is_gap, is_unknown_kind
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet
-from ppafo.parameters.overrides import (
-    FORMS,
-    either,
-    in_two_forms,
-    read_overrides,
-)
+from ppafo.parameters.overrides import FORMS, either, in_two_forms, read_overrides
 from ppafo.simulation.building import build_scenario
-from ppafo.simulation.declaration import (
-    OF_A_VANE,
-    DeclaredContent,
-)
+from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent
 from ppafo.simulation.document import DocumentReader, ScenarioRequest, value_at
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.overrides import OverriddenDocument, override_document
-from ppafo.simulation.scenario import (
-    Origin,
-    Scenario,
-)
+from ppafo.simulation.scenario import Origin, Scenario
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
 from ppafo.wording import one_line, override_text
 

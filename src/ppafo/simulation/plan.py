@@ -23,18 +23,7 @@ from ppafo.engine.step.lane import NoParameters
 from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS, VALVES
-from ppafo.model.columns import (
-    Problem,
-    at,
-    choose,
-    first,
-    larger,
-    over_runs,
-    rounded_up,
-    smaller,
-    truncated,
-    whole,
-)
+from ppafo.model.columns import Problem, at, choose, first, larger, over_runs, rounded_up, smaller, truncated, whole
 from ppafo.model.controlled import OF_TORQUE, TORQUE, error_functions
 from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange

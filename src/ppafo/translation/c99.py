@@ -22,18 +22,7 @@ from ppafo.translation import typed
 from ppafo.translation.c_terms import PART, CTerms, c_name, member_name
 from ppafo.translation.scopes import Scopes, scopes_of
 from ppafo.translation.typed import Function, Module, Statement, Term
-from ppafo.translation.value_types import (
-    BOOL,
-    FLOAT,
-    Array,
-    Items,
-    Row,
-    RowReference,
-    Scalar,
-    Type,
-    is_empty,
-    types_in,
-)
+from ppafo.translation.value_types import BOOL, FLOAT, Array, Items, Row, RowReference, Scalar, Type, is_empty, types_in
 from ppafo.translation.walk import walk_module
 
 WIDTH = 118

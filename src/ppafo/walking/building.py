@@ -29,15 +29,7 @@ from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH, lag_of_sensor
 from ppafo.simulation.motion_kind import MOTIONS, WALK
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument
-from ppafo.simulation.scenario import (
-    Assumption,
-    Control,
-    Initial,
-    RunSettings,
-    Scenario,
-    Sensors,
-    SupplyLine,
-)
+from ppafo.simulation.scenario import Assumption, Control, Initial, RunSettings, Scenario, Sensors, SupplyLine
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
@@ -51,13 +43,7 @@ from ppafo.walking.declaration import (
     fault_numbers,
     timing_of,
 )
-from ppafo.walking.motion import (
-    WalkMotion,
-    duration_problems,
-    record_interval,
-    walk_of,
-    with_duration,
-)
+from ppafo.walking.motion import WalkMotion, duration_problems, record_interval, walk_of, with_duration
 from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import load_task_sequence

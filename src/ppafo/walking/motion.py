@@ -19,15 +19,7 @@ from ppafo.simulation.declaration import THERMAL, line_paths
 from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BottleSupply
-from ppafo.walking.declaration import (
-    FAULTS,
-    FAULTY,
-    FORCES,
-    PERSON,
-    by_path,
-    fault_numbers,
-    sections,
-)
+from ppafo.walking.declaration import FAULTS, FAULTY, FORCES, PERSON, by_path, fault_numbers, sections
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.wearer import WEARER, Wearer, who_walks

@@ -16,14 +16,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.columns import smaller
 from ppafo.model.orifice import FlowCurve, orifice_flow, orifice_flow_slopes
-from ppafo.model.plant import (
-    ActuatorFunctions,
-    PlantParameters,
-    PlantState,
-    PortFlow,
-    PortFlowSlopes,
-    admitted_flow,
-)
+from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, PortFlow, PortFlowSlopes, admitted_flow
 from ppafo.model.ports import leakage_path
 
 

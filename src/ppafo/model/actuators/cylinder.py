@@ -7,13 +7,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range, ShapedPlant
-from ppafo.model.actuators.linear_chambers import (
-    LinearChamber,
-    linear_chambers,
-    linear_pressures,
-    linear_torque,
-    rigid,
-)
+from ppafo.model.actuators.linear_chambers import LinearChamber, linear_chambers, linear_pressures, linear_torque, rigid
 from ppafo.model.declaration import Number
 from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 
