@@ -322,8 +322,7 @@ class CommandParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise argparse's message as a one-line ``UsageError`` that names the help."""
-        bad_value = _BAD_VALUE.fullmatch(message)
-        if bad_value is not None:
+        if (bad_value := _BAD_VALUE.fullmatch(message)) is not None:
             raise UsageError(f"{bad_value[1]} {bad_value[2]}")
         raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
 

@@ -126,13 +126,11 @@ def new(
     load = kind_at(chosen.load)
     write_file(path, _content(kind, source, name, path).encode())
     # What does not load, such as a file with a path relative to another folder, is not left.
-    is_good = False
     try:
         load(path)
-        is_good = True
-    finally:
-        if not is_good:
-            path.unlink(missing_ok=True)
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
     command = chosen.command.replace("FILE", shlex.quote(str(path))).replace("NAME", name)
     document = {"kind": kind, "name": name, "file": str(path), "next": command}
     kept = "values, sources and citation" if kind == "set" else "values, notes and sources"

@@ -43,6 +43,11 @@ def plain(value: Any) -> Any:
     return f"{type(value).__module__}.{type(value).__qualname__}"
 
 
+def fields_of(value: object, *names: str) -> dict[str, Any]:
+    """Return attributes of an object by name."""
+    return {name: getattr(value, name) for name in names}
+
+
 def json_document(content: bytes) -> Any:
     """Parse JSON text in UTF-8. Raises ValueError for invalid or too deeply nested text."""
     try:

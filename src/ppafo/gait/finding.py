@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ppafo.documents.json_text import fields_of
 from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.curves import PHASES
@@ -57,7 +58,7 @@ class GaitFound:
         """Return numbers, curves and, after an import, strides as plain data in SI units."""
         gait, imported = self.gait, self.imported
         document: dict[str, Any] = {
-            **{name: getattr(gait, name) for name in _PLAIN},
+            **fields_of(gait, *_PLAIN),
             "phases": PHASES.tolist(),
             "curves": {
                 name: {

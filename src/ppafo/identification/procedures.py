@@ -80,8 +80,7 @@ class ProcedureContext:
     def numbers(self, *paths: str) -> list[float]:
         """Return the values of parameters [SI]. Raises IdentificationError with every one that the set lacks."""
         found = {path: number_in_si(with_followers(self.parameter_set), path) for path in paths}
-        missing = [path for path, value in found.items() if value is None]
-        if missing:
+        if missing := [path for path, value in found.items() if value is None]:
             raise IdentificationError(f"{self.label}: {said_missing(missing)} in {self.parameter_set.file}")
         return [value for value in found.values() if value is not None]
 

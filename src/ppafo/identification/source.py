@@ -124,8 +124,7 @@ def remarks_on_readings(sources: tuple[RecordingSource, ...]) -> tuple[str, ...]
     """Return remarks on gaps in time and on values at the limit of a sensor."""
     remarks = []
     for source in sources:
-        gap = longest_gap(source.recording.time)
-        if gap is not None:
+        if (gap := longest_gap(source.recording.time)) is not None:
             index, duration = gap
             remarks.append(f"{source.name} has no reading for {duration:.4g} s after sample {index + 1}")
         for name in source.recording.names:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ppafo.documents.json_text import plain
+from ppafo.documents.json_text import fields_of, plain
 from ppafo.errors import ParameterError
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.loading import load_parameter_set
@@ -99,8 +99,7 @@ def record(
         "device": plain(result.device),
         "shown": dict(result.device.shown),
         "preset": {
-            "name": preset.name,
-            "title": preset.title,
+            **fields_of(preset, "name", "title"),
             "values": plain(preset.values),
             "reasons": dict(preset.reasons),
         },

@@ -199,8 +199,7 @@ class _Equations:
     def with_prescribed_angle(self, time: float, unknowns: Floats) -> Floats:
         """Return the unknowns of ``RigState`` (unknowns,), with the prescribed angle inserted if there is one."""
         state = np.array(unknowns[:UNKNOWNS])
-        path = self.run.program.angle
-        if path is not None:
+        if (path := self.run.program.angle) is not None:
             state[ANGLE], state[VELOCITY], _ = path.value(self.run.path, time)
         return state
 

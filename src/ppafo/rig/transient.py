@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.documents.json_text import fields_of
 from ppafo.errors import ScenarioError
 from ppafo.model.controlled import TORQUE
 from ppafo.model.effects.second_virial import real_density
@@ -145,8 +146,7 @@ def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str
         "duration": scenario.run.duration,
         "initial_angle": bench_run.initial.angle,
         "initial_angular_velocity": bench_run.initial.angular_velocity,
-        "impacts": solution.impacts,
-        "breakaways": solution.breakaways,
+        **fields_of(solution, "impacts", "breakaways"),
     }
     moved = vane_motion(scenario)
     kind = "leg" if moved.leg else getattr(moved, "kind", "free")

@@ -26,11 +26,9 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
             known = offered(scenario)
             hint = nearest_kind(name, known, MetricKind)
             raise StudyError(f"there is no metric '{name}'{hint}; available: {', '.join(known)}")
-        reason = lacking(scenario, METRICS[name])
-        if reason:
+        if reason := lacking(scenario, METRICS[name]):
             raise StudyError(f"scenario '{scenario.name}' has no '{name}': {reason}")
-    repeated = first_twice(metrics)
-    if repeated is not None:
+    if (repeated := first_twice(metrics)) is not None:
         raise StudyError(f"metric '{repeated}' is named twice; name it once")
 
 

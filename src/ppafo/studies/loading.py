@@ -176,8 +176,7 @@ def _build(
 
     ``document`` is the file as plain data with the caller's ``changes``; the study keeps both.
     """
-    repeated = first_twice([section.name for section in parsed.configurations])
-    if repeated is not None:
+    if (repeated := first_twice([section.name for section in parsed.configurations])) is not None:
         raise StudyError(f"two configurations are named '{repeated}'; give every configuration a different name")
     configurations = tuple(_configuration(section, source.folder) for section in parsed.configurations)
     scenarios = [configuration.scenario for configuration in configurations]
@@ -231,8 +230,7 @@ def _check_varied(parsed: declared.StudyFile) -> None:
         raise StudyError(
             "'run.duration' cannot vary with trajectories or bands, which need runs of equal length; omit these outputs"
         )
-    repeated = first_twice(paths)
-    if repeated is not None:
+    if (repeated := first_twice(paths)) is not None:
         raise StudyError(f"'{repeated}' is varied twice; omit one [[vary]]")
 
 

@@ -91,8 +91,7 @@ def _check_names(key: str, requested: Sequence[str], known: Collection[str], sho
         if name not in known:
             what, apply = "metric" if key == "metrics" else "channel", shown or known
             raise StudyError(f"outputs.{key}: there is no {what} '{name}'{known_names(name, apply)}")
-    repeated = first_twice(requested)
-    if repeated is not None:
+    if (repeated := first_twice(requested)) is not None:
         raise StudyError(f"outputs.{key}: '{repeated}' is named twice; name it once")
 
 
@@ -233,8 +232,7 @@ def choose_configurations(
         names = (
             list(configurations) if isinstance(configurations, Mapping) else [scenario.name for scenario in scenarios]
         )
-        repeated = first_twice(names)
-        if repeated is not None:
+        if (repeated := first_twice(names)) is not None:
             raise StudyError(f"two scenarios are named '{repeated}'; give different names in a study file")
         chosen = tuple(map(Configuration, names, scenarios))
     if len(chosen) < 2:

@@ -153,9 +153,6 @@ class _StoredStudy(_Named):
 
 class _StoredUnit(_Part):
     unit: str
-
-
-class _StoredGiven(_StoredUnit):
     given: str = ""
 
     @model_validator(mode="after")
@@ -186,7 +183,7 @@ class _Stored(_Part):
     sha256: str
     runs: Annotated[int, Field(ge=1)]
     chunks: Annotated[int, Field(ge=1)]
-    varied: dict[str, _StoredGiven]
+    varied: dict[str, _StoredUnit]
     metrics: dict[str, _StoredUnit]
     shown: dict[str, str] = Field(default_factory=dict)
 
@@ -199,8 +196,7 @@ class _Stored(_Part):
                 f"{self.chunks} chunks of {self.runs} runs do not match {len(names)} configurations; run the study "
                 "again"
             )
-        lost = [number.path for number in self.study.vary if number.path not in self.varied]
-        if lost:
+        if lost := [number.path for number in self.study.vary if number.path not in self.varied]:
             raise ValueError(f"'{one_line(lost[0])}' varies, but has no unit in 'varied'")
         for si_unit, unit in self.shown.items():
             try:

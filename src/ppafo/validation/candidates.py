@@ -158,20 +158,12 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
             shown=1.0e3,
             usual=usual_errors(name).delay,
         )
-    yield CandidateCause(
-        "delay of all sensors",
-        "all sensors seem to lag the command by {:.3g} ms",
-        lambda delay: ModelChange(delay=delay),
-        _LONG_DELAYS,
-        shown=1.0e3,
-    )
-    yield CandidateCause(
-        "lead of all sensors",
-        "all sensors seem to lead the command by {:.3g} ms",
-        lambda lead: ModelChange(delay=-lead),
-        _SHIFTS,
-        shown=1.0e3,
-    )
+    leads = tuple(-lead for lead in _SHIFTS)
+    for noun, verb, delays, shown in (("delay", "lag", _LONG_DELAYS, 1.0e3), ("lead", "lead", leads, -1.0e3)):
+        words = f"all sensors seem to {verb} the command by {{:.3g}} ms"
+        yield CandidateCause(
+            f"{noun} of all sensors", words, lambda delay: ModelChange(delay=delay), delays, shown=shown
+        )
     yield CandidateCause(
         "rate of the clock",
         "the clock of the recording seems to run {:.4g} times as fast",
@@ -249,57 +241,40 @@ def _scaled(path: str, value: float, factor: float) -> ModelChange:
 class _UnknownEffect(NamedTuple):
     """Effect that is off in the model and may be present in the device, with one magnitude to fit.
 
-    ``words`` describes the effect in messages. ``scaled`` are the settings equal to the magnitude, which is tried from
-    ``lowest`` to ``highest`` [unit of these settings]; ``constant`` are the constant settings.
+    ``words`` describes the effect in messages. ``scaled`` are the settings equal to the magnitude, which is tried over
+    the ``range`` [unit of these settings]; ``constant`` are the constant settings.
     """
 
     name: str
     words: str
     scaled: tuple[str, ...]
-    lowest: float
-    highest: float
+    range: tuple[float, float]
     constant: Mapping[str, float] = MappingProxyType({})
 
 
 _EFFECTS = (
+    _UnknownEffect("leak_opening", "the leak seems to open at {:.3g} Pa", ("pressure",), (1e3, 2e5), {"rise": 0.3}),
     _UnknownEffect(
-        name="leak_opening",
-        words="the leak seems to open at {:.3g} Pa",
-        scaled=("pressure",),
-        lowest=1e3,
-        highest=2e5,
-        constant={"rise": 0.3},
+        "stribeck",
+        "friction seems to be higher up to {:.2g} rad/s (Stribeck)",
+        ("velocity",),
+        (0.02, 6.0),
+        {"share": 0.9},
     ),
     _UnknownEffect(
-        name="stribeck",
-        words="friction seems to be higher up to {:.2g} rad/s (Stribeck)",
-        scaled=("velocity",),
-        lowest=0.02,
-        highest=6.0,
-        constant={"share": 0.9},
+        "seal_friction",
+        "friction seems to grow with pressure by {:.2g} N m/Pa",
+        ("static_per_pressure", "dynamic_per_pressure"),
+        (1e-8, 5e-6),
     ),
     _UnknownEffect(
-        name="seal_friction",
-        words="friction seems to grow with pressure by {:.2g} N m/Pa",
-        scaled=("static_per_pressure", "dynamic_per_pressure"),
-        lowest=1e-8,
-        highest=5e-6,
+        "second_virial",
+        "the gas seems to have {:.2g} times the virial coefficient of CO2",
+        ("share",),
+        (0.05, 8.0),
+        {"coefficient": SECOND_VIRIAL["CO2"]},
     ),
-    _UnknownEffect(
-        name="second_virial",
-        words="the gas seems to have {:.2g} times the virial coefficient of CO2",
-        scaled=("share",),
-        lowest=0.05,
-        highest=8.0,
-        constant={"coefficient": SECOND_VIRIAL["CO2"]},
-    ),
-    _UnknownEffect(
-        name="spool_play",
-        words="the spool seems to have a play of {:.2g} of full command",
-        scaled=("width",),
-        lowest=0.005,
-        highest=0.4,
-    ),
+    _UnknownEffect("spool_play", "the spool seems to have a play of {:.2g} of full command", ("width",), (0.005, 0.4)),
 )
 _SIZES_OF_AN_EFFECT = 5
 """Number of trial magnitudes of an effect, in geometric progression."""
@@ -309,7 +284,7 @@ def effects(device: Device) -> Iterator[CandidateCause]:
     """Yield every effect that is off in the model of the device, with trial magnitudes."""
     for effect in _EFFECTS:
         if effect.name not in device.effects:
-            trial_sizes = tuple(np.geomspace(effect.lowest, effect.highest, _SIZES_OF_AN_EFFECT).tolist())
+            trial_sizes = tuple(np.geomspace(*effect.range, _SIZES_OF_AN_EFFECT).tolist())
 
             def change(size: float, effect: _UnknownEffect = effect) -> ModelChange:
                 return ModelChange(effects={effect.name: {**effect.constant, **dict.fromkeys(effect.scaled, size)}})

@@ -113,8 +113,7 @@ def causes_of(
 
     ``agreements`` are the comparisons of the recordings ``read``, in the same order.
     """
-    other_unit = _in_other_unit(read, agreements, device, settings)
-    if other_unit is not None:
+    if (other_unit := _in_other_unit(read, agreements, device, settings)) is not None:
         return Diagnosis(other_unit, None, 1)
     records = [
         record_of(measured, agreement, device, settings) for measured, agreement in zip(read, agreements, strict=True)
@@ -123,21 +122,16 @@ def causes_of(
     none = search.evaluated([ModelChange()])[0]
     if none is None or none.is_noise:
         return Diagnosis(is_noise=none is not None)
-    if settings.motion == "measured" and sum(measured.recording.duration for measured in read) > _LONGEST_SEARCHED:
-        # Hundreds of replays of a minute each would take minutes of computing time.
-        tried = search.compared(_samples(records), none)
-        has_cause = any(cause.explains for cause in tried)
-        return (
-            _explained(search, none, tried, [])
-            if has_cause
-            else Diagnosis(tried=len(tried), kinds=_TRIED_IN_LONG_RECORDINGS)
-        )
-    swaps, sized, lacking = _candidates(read, agreements, device, settings)
-    tried = []
+    tried = list[SizedCause]()
     for candidates in (_samples(records), _motions(records, settings)):
         tried += search.compared(candidates, none)
         if any(cause.explains for cause in tried):
-            return _explained(search, none, tried, sized)
+            return _explained(search, none, tried, [])
+    is_measured = settings.motion == "measured"
+    if is_measured and sum(measured.recording.duration for measured in read) > _LONGEST_SEARCHED:
+        # Hundreds of replays of a minute each would take minutes of computing time.
+        return Diagnosis(tried=len(tried), kinds=_TRIED_IN_LONG_RECORDINGS)
+    swaps, sized, lacking = _candidates(read, agreements, device, settings)
     # Errors that any bench has come before a fault, a mistake without a size too: they need no cause.
     of_bench = search.compared([candidate for candidate in sized if candidate.usual], none)
     # A delay that ends at its limit is longer than that, and no error of any bench.
@@ -150,7 +144,7 @@ def causes_of(
         tried += [*compared, *search.compared(candidates, none)]
         if any(cause.explains for cause in tried):
             return _explained(search, none, tried, sized)
-    return _unexplained(search, tried, _TRIED_WITH_MEASURED_ANGLE if settings.motion == "measured" else "")
+    return _unexplained(search, tried, _TRIED_WITH_MEASURED_ANGLE if is_measured else "")
 
 
 def _candidates(
@@ -264,13 +258,12 @@ def _unexplained(search: CauseSearch, tried: Sequence[SizedCause], kinds: str) -
     if not hints:
         return Diagnosis(tried=len(tried), kinds=kinds)
     nearest, *others = hints
-    near = [
+    near = tuple(
         other
         for other in others
         if other.is_of_samples == nearest.is_of_samples and other.left <= _AS_NEAR * nearest.left
-    ]
-    same = tuple(near[: _MOST_NAMED - 1])
-    return Diagnosis(nearest=replace(nearest, same=same), tried=len(tried), kinds=kinds)
+    )
+    return Diagnosis(nearest=replace(nearest, same=near[: _MOST_NAMED - 1]), tried=len(tried), kinds=kinds)
 
 
 def _in_other_unit(

@@ -29,7 +29,7 @@ from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units.shown import in_units, shown_text
 from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
-from ppafo.wording import nearest_name, override_text
+from ppafo.wording import count_of, nearest_name, override_text
 
 MINIMUM_SAMPLES = 10
 """Least number of samples of a recording."""
@@ -118,8 +118,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     """Check that a recording suits validation. Raises DataError, starting with ``file``, if it does not."""
     count = len(recording)
     if count < MINIMUM_SAMPLES:
-        noun = "sample" if count == 1 else "samples"
-        raise DataError(f"{file}: has {count} {noun}; at least {MINIMUM_SAMPLES} are needed")
+        raise DataError(f"{file}: has {count_of(count, 'sample')}; at least {MINIMUM_SAMPLES} are needed")
     remarks = _check_names(recording, file)
     check_gaps(recording, file)
     check_command(recording, file)
@@ -154,8 +153,8 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     intervals = np.diff(recording.time)
     wide = np.flatnonzero(intervals > _REMARKED_GAP * np.median(intervals))
     if wide.size:
-        noun, first = "gap" if wide.size == 1 else "gaps", float(recording.time[wide[0]])
-        remarks += (f"{wide.size} {noun} in time, the first after {first:.6g} s; inputs were constant across gaps",)
+        gaps, first = count_of(wide.size, "gap"), float(recording.time[wide[0]])
+        remarks += (f"{gaps} in time, the first after {first:.6g} s; inputs were constant across gaps",)
     return MeasuredRecording(file, sha256, recording, remarks)
 
 
@@ -165,8 +164,7 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
     missing = [name for name in used if name not in recording]
     unknown = [name for name in recording.names if name not in CHANNELS]
     for name in unknown:
-        hint = nearest_name(name, missing)
-        if hint:
+        if hint := nearest_name(name, missing):
             raise DataError(f"{file}: channel '{name}' is unknown{hint}")
     if COMMAND not in recording:
         names = ", ".join(recording.names)

@@ -149,8 +149,7 @@ def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement,
         other_cause = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
         words = f"never changes: {other_cause}the sensor is dead or not connected"
         return _Wrong(words, np.ones(len(values), dtype=bool))
-    clipped = _clipped_samples(values)
-    if clipped is not None:
+    if (clipped := _clipped_samples(values)) is not None:
         return clipped
     is_out, is_out_on_flank = isolated_samples(values, channel.noise), isolated_samples(residuals, channel.noise)
     # On a flank an outlier shows only beside a model that follows it; at the ends a delay makes one of a step.

@@ -9,6 +9,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -180,19 +181,19 @@ class CauseSearch:
 
         It is what a validation finds once the cause is mended, with its rule for the common delay: none at its limit.
         """
-        requests = [self._request(record, cause.change) for cause in causes for record in self.records]
-        results, left = iter(replay_together([request for request in requests if request is not None])), list[float]()
-        for number, cause in enumerate(causes):
+        all_requests = [self._request(record, cause.change) for cause in causes for record in self.records]
+        requests, left = [request for request in all_requests if request is not None], list[float]()
+        replays = zip(requests, replay_together(requests), strict=True)
+        for cause in causes:
             change, errors = cause.change, list[float]()
-            for request in requests[number * len(self.records) : (number + 1) * len(self.records)]:
-                result = None if request is None else next(results)
-                if request is not None and isinstance(result, Replayed):
-                    corrected = replace(request, measured=_in_step(request.measured, change))
-                    agreement = agreement_of(corrected, result, self.settings, abs(change.delay) or None)
-                    errors += [channel.in_noise for channel in agreement.channels]
+            for request, replayed in islice(replays, len(self.records)):
+                assert isinstance(replayed, Replayed), "the search has replayed it"
+                corrected = replace(request, measured=_in_step(request.measured, change))
+                agreement = agreement_of(corrected, replayed, self.settings, abs(change.delay) or None)
+                errors += [channel.in_noise for channel in agreement.channels]
             # Wrong samples are left out of the errors of the search alone.
-            is_seen = change.start is not None or not errors
-            left.append(math.sqrt(float(cause.residuals.squares.max())) if is_seen else max(errors))
+            of_search = math.sqrt(float(cause.residuals.squares.max()))
+            left.append(max(errors) if change.start is None else of_search)
         return left
 
     def _gain(self, residuals: ScaledResiduals, none: ScaledResiduals) -> float:

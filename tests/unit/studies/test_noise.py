@@ -11,7 +11,7 @@ import pytest
 import ppafo
 from ppafo.analyses.compare.question import compare
 from ppafo.analyses.sweep.statistic import draw_until
-from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, quantile_of
+from ppafo.analyses.sweep.statistic_kind import Statistic, parse_statistic
 from ppafo.analyses.sweep.stopping import StoppingRule
 from ppafo.errors import StudyError
 from ppafo.report.kind import ConfidenceInterval
@@ -133,7 +133,7 @@ def test_a_share_of_noise_and_both_ends_are_between_nothing_and_all() -> None:
     assert 0.0 <= share.low <= share.value <= share.high <= 1.0
 
 
-@pytest.mark.parametrize("statistic", [mean_of("N m"), quantile_of("N m", 0.5)])
+@pytest.mark.parametrize("statistic", [parse_statistic(text, "rms_error", None) for text in ("mean", "quantile 0.5")])
 def test_a_statistic_says_how_much_is_noise(statistic: Statistic) -> None:
     from scipy import stats
 

@@ -183,17 +183,15 @@ def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
     """Return the tables of a task: metrics, changes against the baseline, probability of being the best."""
     where = "" if len(comparison.tasks) == 1 else f", {task.task}"
     kinds = [(name, of_metric(name)) for name in comparison.metrics]
-    best = {
-        metric: ", ".join(f"{name} {_PROBABILITY.interval(share)}" for name, share in task.best[metric].items())
-        for metric in (_ERROR, _GAS)
-        if len(comparison.configurations) > 2 and task.best.get(metric)
-    }
-    following = [case for case in task.cases if case.follows]
-    for metric, kind in kinds:
-        values = [case.value(metric) for case in following]
-        if not comparison.draws and metric in (_ERROR, _GAS) and len(values) > 1 and np.isfinite(values).all():
-            least = [case.configuration for case, value in zip(following, values, strict=True) if value == min(values)]
-            best[metric] = f"{', '.join(least)} ({kind.text(min(values))})"
+    following, best = [case for case in task.cases if case.follows], dict[str, str]()
+    for metric, kind in ((name, kind) for name, kind in kinds if name in (_ERROR, _GAS)):
+        shares, values = task.best.get(metric, {}), {case.configuration: case.value(metric) for case in following}
+        if shares and len(comparison.configurations) > 2:
+            best[metric] = ", ".join(f"{name} {_PROBABILITY.interval(share)}" for name, share in shares.items())
+        elif not comparison.draws and len(values) > 1 and np.isfinite([*values.values()]).all():
+            least = min(values.values())
+            named = ", ".join(name for name, value in values.items() if value == least)
+            best[metric] = f"{named} ({kind.text(least)})"
     laws = ((case, case.scenario.law) for case in task.cases)
     gains = ((case, gains_of(case.scenario, law)) for case, law in laws if law is not None)
     return [

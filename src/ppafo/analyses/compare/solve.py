@@ -88,8 +88,7 @@ def compared(
         raise StudyError(f"baseline: there is no configuration '{baseline}'{known_names(baseline, names)}")
     baseline = baseline or names[0]
     named_tasks = list(tasks) or [(AS_WRITTEN, ())]
-    repeated = first_twice([name for name, _ in named_tasks])
-    if repeated is not None:
+    if (repeated := first_twice([name for name, _ in named_tasks])) is not None:
         raise StudyError(f"two tasks are named '{repeated}'; give every task a different name")
     scenarios = {
         (task, configuration.name): configuration.scenario

@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.analyses.endurance.discharge import Discharge
 from ppafo.analyses.endurance.gas_demand import GasDemand
+from ppafo.documents.json_text import fields_of
 from ppafo.model.cold_gas import heat_to_warm
 from ppafo.model.source import bottle_content
 from ppafo.parameters.bottles.bottle import Bottle
@@ -69,7 +70,7 @@ class Endurance:
             "kind": "simulated",
             "ppafo": __version__,
             "result": {
-                **{name: getattr(result, name) for name in ("walking_time", "total_time", "strides")},
+                **fields_of(result, "walking_time", "total_time", "strides"),
                 "ending": asdict(result.ending),
                 "coldest_temperature": float(np.min(recording["bottle_temperature"])),
                 "at_end": {name: float(recording[name][-1]) for name in recording.names},
@@ -79,12 +80,10 @@ class Endurance:
             "draw": asdict(self.draw) | {"mean_flow": self.draw.mean_flow},
             "schedule": self.schedule._asdict(),
             "bottle": {
-                "name": bottle.name,
-                "title": bottle.title,
+                **fields_of(bottle, "name", "title", "volume"),
                 "fluid": bottle.fluid.name,
                 "properties": bottle.fluid.source,
                 "gas_mass": bottle.mass,
-                "volume": bottle.volume,
                 "values": {path: entry.model_dump() for path, entry in bottle.entries.items()},
             },
         }

@@ -170,11 +170,10 @@ class Discharge:
 
 def check_schedule(schedule: Schedule) -> None:
     """Raise ParameterError for a schedule of walking and rest that cannot be simulated."""
-    for name, value, least in (("walk", schedule.walk, 1.0), ("longest", schedule.longest, 1.0)):
-        if not least <= value < float("inf"):
+    for name, least in (("walk", 1.0), ("longest", 1.0), ("rest", 0.0)):
+        value = getattr(schedule, name)
+        if not least <= value < math.inf:
             raise ParameterError(f"{name} = {value:g} s: must be finite and at least {least:g} s")
-    if not 0.0 <= schedule.rest < float("inf"):
-        raise ParameterError(f"rest = {schedule.rest:g} s: must be finite and at least 0 s")
     if schedule.rest > 0.0 and 2.0 * schedule.longest / (schedule.walk + schedule.rest) > MAXIMUM_INTERVALS:
         raise ParameterError(
             f"walking {schedule.walk:g} s and resting {schedule.rest:g} s give more than {MAXIMUM_INTERVALS} "

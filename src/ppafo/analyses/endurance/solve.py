@@ -222,8 +222,7 @@ def _check_gas_of_walk(name: str, scenario: Scenario, duration: float, bottle: s
     species, changes = device.gas.species, [f"{SPECIES_PATH}={full.fluid.name}"]
     if walk_of(scenario).bottle is not None:
         changes.append(f"{BOTTLE_NAME}={bottle}")
-    pressure = other_pressure(str(bottle), full, device)
-    if pressure is not None:
+    if (pressure := other_pressure(str(bottle), full, device)) is not None:
         room, unit = device.supply.atmospheric_pressure, full.entries[SET_PRESSURE].unit
         changes.append(f"supply.pressure={shown_text(pressure, 'Pa_a', atmosphere=room, unit=unit)}")
     problem = f"walk '{name}' uses {species}, and cannot be repeated on bottle '{full.name}' of {full.fluid.name}"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.documents.json_text import plain
+from ppafo.documents.json_text import fields_of, plain
 from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, bench_figure, figure_3
 from ppafo.identification.estimate import WRONG_UNIT, Estimate
@@ -84,11 +84,9 @@ class Identification:
         """Return estimates, checks and the new set as plain data in SI."""
         procedures = [
             {
-                "procedure": result.procedure,
-                "summary": result.summary,
+                **fields_of(result, "procedure", "summary", "conflict"),
                 "recordings_are": result.kind,
                 "estimates": [plain(item) | {"verdict_text": item.verdict_text} for item in result.estimates],
-                "conflict": result.conflict,
                 "remarks": list(result.remarks),
             }
             for result in self.results
@@ -250,8 +248,7 @@ def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> lis
         if tolerance.share >= _SHOWN:
             text += f"; {percentage(tolerance.share, 2)} of the variance of {tolerance.widens}"
         rows.append(text)
-    rest = len(known) - len(shown)
-    if rest:
+    if rest := len(known) - len(shown):
         do = "does" if rest == 1 else "do"
         rows.append(f"{count_of(rest, 'other tolerance')} {do} not affect the intervals")
     return rows
@@ -313,8 +310,7 @@ def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
     fit = outcome.fit
     recordings = [
         {
-            "label": experiment.label,
-            "source": experiment.source,
+            **fields_of(experiment, "label", "source"),
             "kind": experiment.recording.kind,
             "scenario": experiment.scenario.name,
             "inputs": list(experiment.inputs),
@@ -327,8 +323,7 @@ def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
         "recordings_are": kind_of_fit(fit),
         "recordings": recordings,
         "confidence": fit.problem.confidence,
-        "evaluations": fit.fit.evaluations,
-        "has_converged": fit.fit.has_converged,
+        **fields_of(fit.fit, "evaluations", "has_converged"),
         "estimates": [plain(item) | {"verdict_text": item.verdict_text} for item in fit.estimates],
         "covariance": fit.covariance.tolist(),
         "correlation": fit.correlation.tolist(),

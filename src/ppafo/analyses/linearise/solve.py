@@ -103,11 +103,9 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
         )
     if at == EQUILIBRIUM:
         return model_at(scenario, run, equilibrium(scenario))
-    if isinstance(at, Real):
-        return model_at(scenario, run, point_at(scenario, float(at)))
     problem = f"{scenario.name}: {argument_text('at', str(at))} must be a time, for example '1 s', or '{EQUILIBRIUM}'"
     with refused_as(ScenarioError, problem, UnitError):
-        time = parse_quantity(str(at), "s")
+        time = float(at) if isinstance(at, Real) else parse_quantity(str(at), "s")
     return model_at(scenario, run, point_at(scenario, time))
 
 

@@ -4,6 +4,7 @@ import textwrap
 from dataclasses import dataclass
 from typing import Any
 
+from ppafo.documents.json_text import fields_of
 from ppafo.parameters.parts import Catalogue, Part
 from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of
@@ -28,7 +29,7 @@ class Parts:
             "catalogue": self.catalogue.name,
             "parts": [
                 {
-                    **{name: getattr(part, name) for name in ("name", "group", "maker", "model", "document", "note")},
+                    **fields_of(part, "name", "group", "maker", "model", "document", "note"),
                     "kind": part.kind or None,
                     "figures": {name: figure.model_dump(mode="json") for name, figure in part.figures.items()},
                     "values": dict(part.values),

@@ -62,16 +62,8 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
         summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
         summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
         values = [
-            AssumedValue(
-                assumption.path,
-                summaries.get(assumption.path, ""),
-                assumption.value,
-                "assumed",
-                assumption.note,
-                "",
-                (name,),
-            )
-            for assumption in scenario.assumptions
+            AssumedValue(stated.path, summaries.get(stated.path, ""), stated.value, "assumed", stated.note, "", (name,))
+            for stated in scenario.assumptions
         ]
         settled = {assumption.path for assumption in values}
         # Reported results are what a run is compared with; of two valves one is in the device.

@@ -18,6 +18,7 @@ from ppafo.analyses.reproduce.result import (
     reading_rows,
     result_on_u,
 )
+from ppafo.documents.json_text import fields_of
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report.display_units import metric_level
@@ -70,16 +71,13 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
     values = {
         "paper": load_parameter_set(reproduction.printed_set).citation,
         "nothing_confirmed": NOTHING_CONFIRMED,
-        "overrides": reproduction.overrides,
+        **fields_of(reproduction, "overrides", "claims", "step_observations", "torque_observations"),
         "count_sentence": count_sentence([claim.verdict for claim in reproduction.claims]),
         "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
-        "claims": reproduction.claims,
         "words": VERDICTS,
         "symbols": _SYMBOLS,
         "not_published": [(entry.statement, entry.where) for entry in map(paper_entries().get, NOT_PUBLISHED) if entry],
         "not_read": NOT_READ,
-        "step_observations": reproduction.step_observations,
-        "torque_observations": reproduction.torque_observations,
         **_set_values(reproduction),
         **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
         "readings_of_u": reading_rows(readings),
@@ -119,8 +117,7 @@ def _set_values(reproduction: Reproduction) -> dict[str, Any]:
     } | {tuple(_EXPERIMENTS): "All experiments", (SOLENOID, PROPORTIONAL): "Torque task, both valves"}
     ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
     return {
-        "printed_set": reproduction.printed_set,
-        "completed_set": reproduction.completed_set,
+        **fields_of(reproduction, "printed_set", "completed_set"),
         **{
             name: [finding for finding in reproduction.printed_findings if finding.severity == severity]
             for severity, name in severities.items()

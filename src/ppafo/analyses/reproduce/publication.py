@@ -12,6 +12,7 @@ import numpy as np
 from ppafo.analyses.reproduce.claim import Verdict
 from ppafo.analyses.reproduce.event_times import WEARERS, event_error, uneven_task_sequence
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.json_text import fields_of
 from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.parameters import load_device
@@ -137,12 +138,17 @@ COMPUTATIONS: dict[str, _Computation] = {
 
 @dataclass(frozen=True, slots=True)
 class _PublishedClaim:
-    """Claim of a publication with its computation, None if it cannot be tested; ``arguments`` in SI."""
+    """Claim of a publication with its computation, None if it cannot be tested; ``arguments`` in SI.
+
+    The claim holds for values from ``low`` to ``high``, in its unit.
+    """
 
     entry: ClaimEntry
     computation: _Computation | None
     arguments: Mapping[str, float]
     source: str
+    low: float = -math.inf
+    high: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +197,7 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> _PublishedClaim:
     with refused_as(ScenarioError, f"{where}.unit", UnitError):
         # Only for what it raises: here the place in the file is known.
         from_si(1.0, entry.unit, computation.unit)
-    return _PublishedClaim(entry, computation, _arguments(entry, computation, where), source)
+    return _PublishedClaim(entry, computation, _arguments(entry, computation, where), source, low, high)
 
 
 def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict[str, float]:
@@ -204,8 +210,7 @@ def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict
                 f"{where}.arguments: '{name}' is unknown{hint}; arguments of {entry.computation}: {known}"
             )
     values: dict[str, float] = {}
-    missing = [name for name in computation.arguments if name not in entry.arguments]
-    if missing:
+    if missing := [name for name in computation.arguments if name not in entry.arguments]:
         raise ScenarioError(f"{where}.arguments: {said_missing(missing)}; arguments of {entry.computation}: {known}")
     for name, unit in computation.arguments.items():
         key, text = f"{where}.arguments.{name}", entry.arguments[name]
@@ -251,8 +256,8 @@ class JudgedClaim:
         entry = self.claim.entry
         return {
             "study": study,
-            **{name: getattr(entry, name) for name in ("id", "statement", "direction", "own", "unit", "computation")},
-            **{name: getattr(self, name) for name in ("published", "value", "verdict", "note")},
+            **fields_of(entry, "id", "statement", "direction", "own", "unit", "computation"),
+            **fields_of(self, "published", "value", "verdict", "note"),
             "paper": entry.published,
             "agrees_from": entry.at_least,
             "agrees_to": entry.at_most,
@@ -306,9 +311,7 @@ def judge(claim: _PublishedClaim) -> JudgedClaim:
     if computation is None:
         return JudgedClaim(claim, None, "not_testable")
     value = from_si(computation.compute(**claim.arguments), entry.unit, computation.unit)
-    low = -math.inf if entry.at_least is None else entry.at_least
-    high = math.inf if entry.at_most is None else entry.at_most
     # A model with assumptions that does not agree is no evidence against what was measured.
     agrees: Verdict = "plausible" if entry.assumed else "consistent"
     disagrees: Verdict = "undetermined" if entry.assumed else "inconsistent_as_reported"
-    return JudgedClaim(claim, value, agrees if low <= value <= high else disagrees)
+    return JudgedClaim(claim, value, agrees if claim.low <= value <= claim.high else disagrees)

@@ -113,8 +113,7 @@ def remarks(influences: Influences, metric: MetricSensitivity) -> list[str]:
     A difference of the sum from 1 within its error is not attributed to interactions.
     """
     sentences = []
-    unsettled = overlapping_pairs(influences, metric)
-    if unsettled:
+    if unsettled := overlapping_pairs(influences, metric):
         pairs = ", ".join(f"{first} and {second}" for first, second in unsettled)
         sentences.append(f"not converged at this sample size, confidence bands overlap: {pairs}")
     indices = metric.indices

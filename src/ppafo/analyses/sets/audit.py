@@ -162,8 +162,7 @@ def _parts(audited_set: AuditedSet, changed: frozenset[str] | None) -> list[Sect
         or any(value.path in changed for value in finding.values)
     ]
     summary = ", ".join(count_of(count, severity) for severity, count in audited_set.counts.items())
-    hidden = len(findings) - len(listed)
-    if hidden:
+    if hidden := len(findings) - len(listed):
         concern = "concerns" if hidden == 1 else "concern"
         summary += f"; {hidden} of them {concern} no changed value; {argument_text('all_', option='--all')} shows them"
     for finding in listed:

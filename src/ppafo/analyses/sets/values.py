@@ -5,6 +5,7 @@ from dataclasses import asdict
 from functools import partial
 from typing import Any
 
+from ppafo.documents.json_text import fields_of
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.parameter_set import with_followers
 from ppafo.report.finding import Finding, Section, columns_of
@@ -20,13 +21,9 @@ def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
     # By section only, so that within a section texts come first and numbers as they are declared.
     entries = sorted(parameter_set.entries().items(), key=lambda entry: _SECTIONS.index(entry[0].partition(".")[0]))
     return {
-        "name": parameter_set.name,
-        "title": parameter_set.title,
+        **fields_of(parameter_set, "name", "title", "completed_by", "parent", "default_valve"),
         "citation": None if citation is None else citation.model_dump(mode="json"),
         "notes": parameter_set.notes.strip(),
-        "completed_by": parameter_set.completed_by,
-        "parent": parameter_set.parent,
-        "default_valve": parameter_set.default_valve,
         "valves": dict(parameter_set.valve_kinds),
         "actuator": parameter_set.actuator_kind,
         "joint": asdict(parameter_set.joint),

@@ -100,11 +100,12 @@ class StudyResults:
         schema = next(self.chunks(list(frame))).schema
         shown = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in schema}
         for name, unit in (units or {}).items():
-            values = self.table([name])[name]
+            if name not in shown:
+                raise StudyError(f"the table has no column '{name}'{known_names(name, shown)}")
             with refused_as(UnitError, f"column '{name}' in '{unit}'", UnitError):
                 # Units are affine, so that two values decide all.
                 zero, one = (from_si(number, unit, shown[name]) for number in (0.0, 1.0))
-            frame[name] = zero + (one - zero) * values
+            frame[name] = zero + (one - zero) * frame[name]
         frame.attrs = {"title": self.name, "units": shown | dict(units or {})}
         return frame
 

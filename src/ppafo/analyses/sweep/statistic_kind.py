@@ -71,20 +71,6 @@ class Statistic:
         return effective_sample_size(known) if self.is_of_replicates else float(known.size)
 
 
-def mean_of(unit: str) -> Statistic:
-    """Return the statistic for the mean of a metric, in the unit of the metric."""
-    return Statistic("mean", unit, lambda values, level: floored_interval(values, REPLICATES, level), True)
-
-
-def quantile_of(unit: str, fraction: float) -> Statistic:
-    """Return the statistic for the quantile of a metric at a fraction of the runs."""
-    return Statistic(
-        f"quantile {fraction:g}",
-        unit,
-        lambda values, level: quantile_interval(values[np.isfinite(values)], fraction, level),
-    )
-
-
 def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:
     """Return the statistic for the probability of a metric above (or else below) a value [SI], given as ``text``."""
 
@@ -105,12 +91,15 @@ def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statist
     """
     words, unit = text.strip(), METRICS[metric].unit
     if words == "mean":
-        return mean_of(unit)
+        return Statistic("mean", unit, lambda values, level: floored_interval(values, REPLICATES, level), True)
     quantile = _QUANTILE.fullmatch(words)
-    if quantile is not None and 0.0 < float(quantile[1]) < 1.0:
-        return quantile_of(unit, float(quantile[1]))
-    probability = _PROBABILITY.fullmatch(words)
-    if probability is not None:
+    if quantile is not None and 0.0 < (fraction := float(quantile[1])) < 1.0:
+        return Statistic(
+            f"quantile {fraction:g}",
+            unit,
+            lambda values, level: quantile_interval(values[np.isfinite(values)], fraction, level),
+        )
+    if (probability := _PROBABILITY.fullmatch(words)) is not None:
         threshold = level_of(probability[2], metric, f"statistic '{text}'", atmosphere)
         return probability_of(threshold, probability[1] == "above", probability[2])
     raise StudyError(f"statistic '{text}': must be {GRAMMAR}, with a fraction above 0 and below 1")

@@ -314,8 +314,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         check_metrics(list(dict.fromkeys(metrics)), scenario)
         paths = [gain.path for gain in parsed.search]
         spread = _spread(parsed, source.folder, paths, scenario)
-        repeated = first_twice(paths)
-        if repeated is not None:
+        if (repeated := first_twice(paths)) is not None:
             raise StudyError(f"'{repeated}' appears in two [[search]] tables; omit one")
         drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
         atmosphere = atmosphere_of(scenario, (*drawn, *paths))
@@ -402,8 +401,7 @@ def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario:
                 f"'{next(iter(study.only))}' varies only in some configurations of the study, but must vary in all of "
                 "them; choose a study whose [[vary]] tables have no 'only'"
             )
-    both = next((path for path in uncertainty.paths if path in searched), None)
-    if both is not None:
+    if (both := next((path for path in uncertainty.paths if path in searched), None)) is not None:
         raise StudyError(
             f"robust: study '{study.name}' draws '{both}', which is also searched; omit the [[vary]] or the [[search]] "
             f"of '{both}'"

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ppafo.documents.json_text import fields_of
 from ppafo.parameters.device import Device
 from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind
@@ -47,12 +48,11 @@ class Validation:
         return {
             "format": "ppafo agreement",
             "schema_version": 1,
-            "parameter_set": self.parameter_set,
+            **fields_of(self, "parameter_set", "passes"),
             "device": self.device.name,
             "valve": self.device.valve_name,
             "overrides": list(self.overrides),
             "longest_delay": self.settings.longest_delay,
-            "passes": self.passes,
             "summary": verdict(self),
             "causes": {
                 "tried": self.causes.tried,
@@ -119,8 +119,7 @@ def _why(causes: Diagnosis, without: float, passes: bool) -> str:
         return ""
     tried = f"; tried: {causes.kinds}" if causes.kinds else ""
     nearest = causes.nearest
-    explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
-    if nearest is None or not explains:
+    if nearest is None or not (nearest.is_of_samples or nearest.left <= _EXPLAINS * without):
         return f"no single change explains the residual{tried}"
     texts = [
         f"{in_words(cause)}, which leaves {_times(cause.left)} times the noise" for cause in (nearest, *nearest.same)
@@ -150,7 +149,7 @@ def _cause_data(cause: ResidualCause | None) -> dict[str, Any] | None:
     if cause is None:
         return None
     return {
-        **{name: getattr(cause, name) for name in ("name", "gain", "left", "is_usual")},
+        **fields_of(cause, "name", "gain", "left", "is_usual"),
         "words": in_words(cause),
         "same": [other.name for other in cause.same],
         "numbers": {path: value for path, (value, _) in cause.numbers.items()},
@@ -162,33 +161,28 @@ def kind_of_channel(channel: ChannelAgreement) -> Kind:
     return Kind("", "", COMPARED[channel.channel].quantity)
 
 
-_OF_CHANNEL = ["noise", "passes", "full_range", "variation", "rms_unaligned", "bias", "largest", "largest_time"]
+_OF_CHANNEL = (
+    *("unit", "rms", "noise", "passes", "full_range", "variation"),
+    *("rms_unaligned", "bias", "largest", "largest_time"),
+)
 """Errors of a channel that its data has under the names of the fields."""
 
 
 def _recording_data(agreement: RecordingAgreement) -> dict[str, Any]:
     """Return the errors of a recording as plain data in SI."""
     return {
-        "file": agreement.file,
-        "sha256": agreement.sha256,
-        "label": agreement.measured.label,
-        "kind": agreement.measured.kind,
+        **fields_of(agreement, "file", "sha256", "motion", "step", "passes"),
+        **fields_of(agreement.measured, "label", "kind", "duration"),
         "samples": len(agreement.measured),
-        "duration": agreement.measured.duration,
-        "motion": agreement.motion,
         "inputs": list(agreement.inputs),
-        "step": agreement.step,
         "delay": agreement.delay.correction,
         "delay_is_at_limit": agreement.delay.is_at_limit,
-        "passes": agreement.passes,
         "remarks": list(agreement.remarks),
         "channels": {
             channel.channel: {
-                "unit": channel.unit,
-                "rms": channel.rms,
+                **fields_of(channel, *_OF_CHANNEL),
                 "rms_share": channel.fraction,
                 "limit_share": channel.limit,
-                **{name: getattr(channel, name) for name in _OF_CHANNEL},
                 # In the unit that people are shown.
                 "shown": {
                     "unit": kind_of_channel(channel).shown_unit,

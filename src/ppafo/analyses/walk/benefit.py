@@ -98,8 +98,7 @@ def _remedied(worn: WalkResult, drags: bool) -> list[str]:
     cause, remedies, advice = _trials(worn, drags)
     minutes = worn.scenario.run.duration / 60.0
     for overrides in remedies:
-        gain = _gain_with(worn, overrides, drags)
-        if gain:
+        if gain := _gain_with(worn, overrides, drags):
             changes = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
             return [f"{cause}: for example with {changes}, {gain}, simulated in another walk of {minutes:.3g} min"]
     return [f"{cause}, and {advice}"] if advice else []

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ppafo.documents.json_text import plain
+from ppafo.documents.json_text import fields_of, plain
 from ppafo.report.display_units import display_unit, display_value
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
@@ -24,15 +24,13 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
     motion, control, origin = walk_of(scenario), scenario.controller, scenario.origin
     seed = scenario.sensors.seed
     return {
-        "name": scenario.name,
-        "description": scenario.description,
+        **fields_of(scenario, "name", "description"),
         "device": plain(scenario.device),
         "gait": plain(motion.gait),
         "wearer": plain(motion.wearer),
-        "wearer_origin": motion.wearer_origin,
+        **fields_of(motion, "wearer_origin", "timing"),
         "task_sequence": plain(motion.task_sequence),
         "controller": control.kind,
-        "timing": motion.timing,
         "settings": plain(control.settings),
         "period": control.period,
         "step": scenario.run.step,
@@ -41,9 +39,8 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "gas_model": plain(scenario.gas_model),
         "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
         "assumed": {assumption.path: assumption.note for assumption in scenario.assumptions},
-        "file": origin.file,
+        **fields_of(origin, "file", "content"),
         "overrides": list(origin.overrides),
-        "content": origin.content,
     }
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, versions, walk_document
+from ppafo.documents.json_text import fields_of
 from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import changes_in
@@ -98,7 +99,7 @@ def wearers_data(population: Population) -> dict[str, Any]:
         "units": UNITS,
         "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
         "wearers": population.count,
-        **{name: getattr(population, name) for name in ("diverged", "vented", "paused", "minutes", "seed")},
+        **fields_of(population, "diverged", "vented", "paused", "minutes", "seed"),
         "varied": {
             "body_mass": MASS_VARIATION,
             "stature": STATURE_VARIATION,

@@ -126,8 +126,7 @@ def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> in
     The message gives the time of the gap.
     """
     skipped = int(np.searchsorted(source.recording.time, part.time[0]))
-    gap = longest_gap(part.time)
-    if gap is not None:
+    if (gap := longest_gap(part.time)) is not None:
         index, duration = gap
         raise IdentificationError(
             f"{source.name}: {procedure}: gap of {duration:.4g} s after {part.time[index]:.6g} s (sample "

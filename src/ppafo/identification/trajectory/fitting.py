@@ -27,7 +27,7 @@ from ppafo.identification.wording import conflict_in_words, in_shown_unit, widen
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.scenario import Scenario
-from ppafo.wording import nearest_name
+from ppafo.wording import count_of, nearest_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,10 +255,8 @@ def _outlier_remarks(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mappin
     for block in blocks:
         samples = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
         if samples:
-            is_one = len(samples) == 1
-            count, first = "1 sample" if is_one else f"{len(samples)} samples", times[block.recording][samples[0]]
-            verb = "is an outlier and was" if is_one else "are outliers and were"
-            yield f"experiment '{block.recording}': {count} of {block.channel}, at {first:.6g} s first, {verb} left out"
+            outliers, first = count_of(len(samples), "outlier"), times[block.recording][samples[0]]
+            yield f"experiment '{block.recording}': {outliers} of {block.channel} left out, the first at {first:.6g} s"
 
 
 _INSIDE = 1.0e-3

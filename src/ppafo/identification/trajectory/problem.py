@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
 from ppafo.identification.source import double_use
 from ppafo.identification.trajectory.experiment import FittedExperiment, check_experiment, use_of
 from ppafo.identification.trajectory.numbers import FitNumber, FreeParameter, number_of
@@ -24,8 +24,7 @@ class TrajectoryProblem:
         _refuse_twice("experiment", labels)
         for experiment in self.experiments:
             check_experiment(experiment)
-        message = double_use(use_of(experiment) for experiment in self.experiments)
-        if message:
+        if message := double_use(use_of(experiment) for experiment in self.experiments):
             raise IdentificationError(message)
         for parameter in self.parameters:
             for label in parameter.recordings:
@@ -37,21 +36,17 @@ class TrajectoryProblem:
 
 def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
     """Return all parameters of a problem with start and bounds resolved. Raises IdentificationError if inconsistent."""
-    numbers, problems = list[FitNumber](), list[str]()
+    numbers, wrong = list[FitNumber](), list[PpafoError]()
     for parameter in problem.parameters:
         labels = parameter.recordings
         acting = [experiment for experiment in problem.experiments if not labels or experiment.label in labels]
-        try:
+        with noted_in(wrong):
             numbers.append(number_of(parameter, acting))
-        except IdentificationError as error:
-            problems.append(str(error))
-    if problems:
-        raise IdentificationError("; ".join(problems))
+    raise_noted(wrong)
     return tuple(numbers)
 
 
 def _refuse_twice(kind: str, names: list[str]) -> None:
     """Raise IdentificationError for a duplicated name; ``kind`` is the noun for the message."""
-    twice = first_twice(names)
-    if twice is not None:
+    if (twice := first_twice(names)) is not None:
         raise IdentificationError(f"{kind} '{twice}' is given twice; rename or remove one of the two")

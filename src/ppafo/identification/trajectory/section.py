@@ -89,8 +89,7 @@ def trajectory_problem(section: TrajectorySection, context: SectionContext) -> T
     experiments = tuple(_experiment(entry, context) for entry in section.experiments)
     scenarios = {experiment.label: experiment.scenario for experiment in experiments}
     # Samples that a bench procedure used are in its interval, which is a prior here.
-    message = double_use(context.used, map(use_of, experiments))
-    if message:
+    if message := double_use(context.used, map(use_of, experiments)):
         raise IdentificationError(
             f"{context.file}: {message}; omit the recording from the procedure or from the trajectory"
         )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.sweep.statistic import draw_until, estimate
-from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, parse_statistic, probability_of, quantile_of
+from ppafo.analyses.sweep.statistic_kind import Statistic, parse_statistic, probability_of
 from ppafo.analyses.sweep.stopping import StatisticEstimate, StoppingRule, target_width
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween
@@ -22,6 +22,7 @@ SIGMA = 0.5
 UNCERTAIN = Uncertainty((RandomValue("x", LogNormalAround(1.0, math.exp(SIGMA))),))
 MEAN = math.exp(0.5 * SIGMA**2)
 NORMAL = NormalDist(sigma=SIGMA)
+THE_MEAN = parse_statistic("mean", METRIC, None)
 STUDY = "torque-task-uncertainty"
 
 
@@ -52,7 +53,7 @@ def failing(share: float) -> Model:
 
 def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
     rule = StoppingRule(0.03, is_relative=False, first=64, maximum=2**16)
-    found = drawn_until(value, UNCERTAIN, mean_of("N m"), rule, 1)
+    found = drawn_until(value, UNCERTAIN, THE_MEAN, rule, 1)
     widths = [look.interval.width + look.unseen for look in found.looks]
     assert found.is_met
     assert widths[-1] <= 0.03 < min(widths[:-1])
@@ -63,7 +64,7 @@ def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
 
 def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
     rule = StoppingRule(1e-6, is_relative=True, first=64, maximum=200)
-    found = drawn_until(value, UNCERTAIN, mean_of("N m"), rule, 1)
+    found = drawn_until(value, UNCERTAIN, THE_MEAN, rule, 1)
     assert not found.is_met
     assert [look.draws for look in found.looks] == [64, 128, 200]
 
@@ -71,8 +72,8 @@ def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
 @pytest.mark.parametrize(
     ("statistic", "truth", "width"),
     [
-        (mean_of("N m"), MEAN, 0.08),
-        (quantile_of("N m", 0.9), math.exp(NORMAL.inv_cdf(0.9)), 0.3),
+        (THE_MEAN, MEAN, 0.08),
+        (parse_statistic("quantile 0.9", METRIC, None), math.exp(NORMAL.inv_cdf(0.9)), 0.3),
         (probability_of(1.5, True, "1.5 N m"), 1.0 - NORMAL.cdf(math.log(1.5)), 0.08),
     ],
 )
@@ -93,9 +94,9 @@ def test_without_the_correction_they_would_not() -> None:
     rule = StoppingRule(0.08, is_relative=False, first=64, maximum=2048, confidence=0.9)
     held = []
     for seed in range(300):
-        looks = drawn_until(value, UNCERTAIN, mean_of("N m"), rule, seed).looks
+        looks = drawn_until(value, UNCERTAIN, THE_MEAN, rule, seed).looks
         values = UNCERTAIN.random_columns(0, looks[-1].draws, seed)["x"]
-        intervals = [mean_of("N m").estimate(values[: look.draws], 0.9) for look in looks]
+        intervals = [THE_MEAN.estimate(values[: look.draws], 0.9) for look in looks]
         held.append(all(interval.low <= MEAN <= interval.high for interval in intervals))
     assert np.mean(held) < 0.88
 
@@ -109,7 +110,7 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
         return {METRIC: values}
 
     rule = StoppingRule(0.5, is_relative=True, first=64, maximum=4096)
-    found = [drawn_until(heavy, NORMALS, mean_of("N m"), rule, seed) for seed in range(60)]
+    found = [drawn_until(heavy, NORMALS, THE_MEAN, rule, seed) for seed in range(60)]
     wrong = [not item.interval.low <= math.exp(2.0) <= item.interval.high for item in found]
     narrow = [any(look.interval.width <= 0.5 * look.interval.value for look in item.looks) for item in found]
     assert np.mean(narrow) > 0.3, "an interval that is narrow enough comes often"
@@ -117,7 +118,7 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
     warned = [item for item in found if not item.looks[-1].is_carried]
     assert len(warned) > 50
     assert "do not trust this interval" in warned[0].remarks[0]
-    quiet = drawn_until(value, UNCERTAIN, mean_of("N m"), StoppingRule(0.05, False, first=512), 1)
+    quiet = drawn_until(value, UNCERTAIN, THE_MEAN, StoppingRule(0.05, False, first=512), 1)
     assert quiet.is_met
     (unseen,) = quiet.remarks
     assert "outcomes with a probability below 0.018 % may be missing" in unseen
@@ -135,14 +136,14 @@ def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> N
         return run
 
     rule = StoppingRule(0.2, is_relative=False, first=64, maximum=2**14)
-    found = [drawn_until(outcomes(0.0003), rare, mean_of("N m"), rule, seed) for seed in range(20)]
+    found = [drawn_until(outcomes(0.0003), rare, THE_MEAN, rule, seed) for seed in range(20)]
     wrong = [not item.interval.low <= 0.03 <= item.interval.high for item in found]
     # Each of these was met at its first look, with an interval from 0 to 0.
     assert np.mean([item.is_met and is_wrong for item, is_wrong in zip(found, wrong, strict=True)]) <= 0.05
-    few = drawn_until(outcomes(0.0), rare, mean_of("N m"), StoppingRule(0.2, False, 64, 1024), 1)
+    few = drawn_until(outcomes(0.0), rare, THE_MEAN, StoppingRule(0.2, False, 64, 1024), 1)
     assert not few.is_met
     assert "all 1,024 values are equal" in few.remarks[0]
-    many = drawn_until(outcomes(0.0), rare, mean_of("N m"), rule, 1)
+    many = drawn_until(outcomes(0.0), rare, THE_MEAN, rule, 1)
     assert many.is_met
     (unseen,) = many.remarks
     assert "would shift the mean by up to 0.00018 d" in unseen
@@ -158,7 +159,7 @@ def test_a_mean_is_not_met_before_a_rare_jump_could_have_come() -> None:
     uncertain = Uncertainty(tuple(RandomValue(f"x{place}", UniformBetween(0.0, 1.0)) for place in range(2)))
     rule = StoppingRule(0.1, is_relative=False, first=256, maximum=2**16)
     for seed in range(20):
-        found = drawn_until(jumps, uncertain, mean_of("N m"), rule, seed)
+        found = drawn_until(jumps, uncertain, THE_MEAN, rule, seed)
         assert found.is_met
         assert float(np.max(found.values)) > 10.0
         assert found.interval.low <= truth <= found.interval.high
@@ -173,14 +174,14 @@ def test_a_mean_that_is_met_holds_beside_a_jump_that_hardly_ever_comes(share: fl
 
     uncertain = Uncertainty(tuple(RandomValue(f"x{place}", UniformBetween(0.0, 1.0)) for place in range(2)))
     rule, truth = StoppingRule(0.01, is_relative=True, first=256, maximum=2**15), 3.5 + size * share
-    found = [drawn_until(jumps, uncertain, mean_of("N m"), rule, seed) for seed in range(20)]
+    found = [drawn_until(jumps, uncertain, THE_MEAN, rule, seed) for seed in range(20)]
     wrong = [item for item in found if item.is_met and not abs(item.interval.value - truth) < 0.01 * truth]
     assert len(wrong) <= 1
 
 
 def test_a_mean_of_fewer_draws_than_would_show_a_rare_value_is_not_met_and_says_so() -> None:
     rule = StoppingRule(0.5, is_relative=True, first=64, maximum=1024)
-    finding = draw_until(model_runs(value, [METRIC]), UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
+    finding = draw_until(model_runs(value, [METRIC]), UNCERTAIN, METRIC, THE_MEAN, rule, 1)
     assert not finding.found.is_met
     assert "a mean needs at least 10,000 draws, and the maximum is 1,024" in finding.said[0]
 
@@ -206,7 +207,7 @@ def test_a_mean_that_rare_values_decide_is_not_met_by_replicates_that_count_them
 
     drawn = [rare(uniform.replicated_columns(0, 8192, seed)) for seed in range(60)]
     narrower = [replicates_interval(values, REPLICATES, 0.95) for values in drawn]
-    floored = [mean_of("N m").estimate(values, 0.95) for values in drawn]
+    floored = [THE_MEAN.estimate(values, 0.95) for values in drawn]
     assert np.mean([one.width < 0.6 * other.width for one, other in zip(narrower, floored, strict=True)]) > 0.3
     assert np.mean([interval.low <= 1.3 <= interval.high for interval in floored]) >= 0.93
 
@@ -220,11 +221,11 @@ def test_replicates_in_pieces_are_those_of_the_whole() -> None:
 
 def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
     rule = StoppingRule(0.1, is_relative=False, first=1024, maximum=2048, maximum_failed=0.02)
-    found = drawn_until(failing(0.005), UNCERTAIN, mean_of("N m"), rule, 1)
+    found = drawn_until(failing(0.005), UNCERTAIN, THE_MEAN, rule, 1)
     assert 0 < found.looks[-1].missing <= 0.02 * found.draws
     assert found.values.size == found.draws - found.looks[-1].missing
     with pytest.raises(StudyError, match=r"runs failed .* more than the 2 % .*diverged"):
-        drawn_until(failing(0.1), UNCERTAIN, mean_of("N m"), rule, 1)
+        drawn_until(failing(0.1), UNCERTAIN, THE_MEAN, rule, 1)
 
 
 @pytest.mark.parametrize(
@@ -238,7 +239,7 @@ def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
         (lambda: parse_statistic("median", METRIC, None), "statistic 'median': must be 'mean'"),
         (lambda: parse_statistic("quantile 1.5", METRIC, None), "a fraction above 0 and below 1"),
         (lambda: parse_statistic("probability above 3 g", METRIC, None), "statistic 'probability above 3 g'"),
-        (lambda: target_width(mean_of("N m"), METRIC, "3 g"), "width = '3 g'"),
+        (lambda: target_width(THE_MEAN, METRIC, "3 g"), "width = '3 g'"),
         (
             lambda: target_width(parse_statistic("probability above 1 N m", METRIC, None), METRIC, "1 %"),
             "plain number for a probability, for example 0.01",
@@ -253,9 +254,9 @@ def test_rules_and_words_that_make_no_sense_are_one_line(make: Callable[[], obje
 
 
 def test_widths_are_read_in_the_unit_of_the_metric() -> None:
-    assert target_width(mean_of("kg"), "gas_supplied", "2 g") == (pytest.approx(0.002), False)
-    assert target_width(mean_of("Pa"), "largest_pressure", "1 psi_d") == (pytest.approx(6894.757), False)
-    assert target_width(mean_of("kg"), "gas_supplied", "5 %") == (pytest.approx(0.05), True)
+    assert target_width(THE_MEAN, "gas_supplied", "2 g") == (pytest.approx(0.002), False)
+    assert target_width(THE_MEAN, "largest_pressure", "1 psi_d") == (pytest.approx(6894.757), False)
+    assert target_width(THE_MEAN, "gas_supplied", "5 %") == (pytest.approx(0.05), True)
 
 
 def test_a_scenario_is_drawn_until_its_error_is_known() -> None:
@@ -283,7 +284,7 @@ def test_further_metrics_are_means_over_the_same_draws_that_have_a_value() -> No
 
     rule = StoppingRule(10.0, is_relative=False, first=256, maximum=256)
     runs = model_runs(model, [METRIC, "final_error"])
-    finding = draw_until(runs, UNCERTAIN, METRIC, mean_of("N m"), rule, 1, ["final_error"])
+    finding = draw_until(runs, UNCERTAIN, METRIC, THE_MEAN, rule, 1, ["final_error"])
     found, mean = finding.found, finding.found.also["final_error"]
     above = found.values[found.values > 1.0]
     assert mean.draws == above.size < 256

@@ -12,6 +12,7 @@ from ppafo.analyses.design.profile.search import LAGS, LIMITS, Limit, ceiling
 from ppafo.analyses.design.wearer.requirements import REACHED
 from ppafo.analyses.parts.sections import doubts_data, part_titles, parts_to_check
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.documents.json_text import fields_of
 from ppafo.parameters.parts import Part, rated_pressure
 from ppafo.report import finding
 from ppafo.report.finding import Cell, Finding, columns_of
@@ -157,16 +158,15 @@ class Sizing:
     def json_document(self) -> dict[str, Any]:
         """Return the sized valves and the suggestion as plain data in SI."""
         problem = self.problem
-        stated = ("name", "description", "file", "repetitions", "hours", "reserve", "largest_error")
         found = ("works", "pressure", "lowest_pressure", "error", "gas_in_all", "mass", "remark")
         return {
             "format": "ppafo sizing",
             "schema_version": 1,
-            **{name: getattr(problem, name) for name in stated},
+            **fields_of(problem, "name", "description", "file", "repetitions", "hours", "reserve", "largest_error"),
             "units": "SI; pressures absolute, errors in N m, gas and mass in kg, margins as fractions",
             "scenario": problem.scenario.name,
             "profile": {
-                **{name: getattr(problem.profile, name) for name in ("kind", "period", "largest", "table_error")},
+                **fields_of(problem.profile, "kind", "period", "largest", "table_error"),
                 "times": problem.profile.knot_times.tolist(),
                 "torques": problem.profile.knot_values.tolist(),
             },
@@ -175,7 +175,7 @@ class Sizing:
             "valves": [
                 {
                     "valve": sized.valve.name,
-                    **{name: getattr(sized, name) for name in found},
+                    **fields_of(sized, *found),
                     "gains": dict(sized.gains),
                     "gas_per_repetition": sized.gas,
                     "bottle": None if sized.bottle is None else sized.bottle.name,

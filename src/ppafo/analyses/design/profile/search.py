@@ -224,8 +224,7 @@ def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
     highest pressure if none is feasible): the limit is the flow if only a larger opening works, else the control.
     """
     problem = trials.problem
-    known = _limit_of_pressure(problem, tried)
-    if known is not None:
+    if (known := _limit_of_pressure(problem, tried)) is not None:
         return known
     first = first_of(works_in(problem, tried))
     pressure = np.array([0.5 * (float(tried["pressure"][-1 if first is None else first]) + ceiling_pressure(problem))])

@@ -122,8 +122,7 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
     caption, draw = _CAPTION.format(wished=duration, lasts=lasts), partial(bottle_figure, walked)
     masses = {name: MASS.text(mass, ".0f") for name, mass in device.masses.items()}
     # The content as its catalogue states it.
-    content = device.bottle.figures.get("content")
-    if content is not None:
+    if (content := device.bottle.figures.get("content")) is not None:
         gas = walked.scenario.device.gas.species
         masses[f"bottle {device.bottle.name}, full"] += f", of these {content.value:g} {content.unit} of {gas}"
     return (

@@ -11,6 +11,7 @@ from ppafo.analyses.design.wearer.electrical import Electrical
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.parts.sections import doubts_data
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.documents.json_text import fields_of
 from ppafo.errors import StudyError, raise_noted
 from ppafo.parameters.parts import Part
 from ppafo.report.kind import Kind
@@ -267,26 +268,20 @@ class WearerSizing:
                 "walk": WALKS[device.tried.valve.kind],
                 "overrides": list(device.tried.overrides),
                 "lasts": device.life.discharge.walking_time,
-                "torque": device.torque,
-                "toes": device.toes,
+                **fields_of(device, "torque", "toes", "command"),
                 "masses": dict(device.masses),
                 "electrical_power": dict(device.electrical.powers),
                 "battery": {
                     "cell": device.electrical.cell.name,
-                    "cells": device.electrical.cells,
-                    "mass": device.electrical.mass,
-                    "lasts": device.electrical.lasts,
+                    **fields_of(device.electrical, "cells", "mass", "lasts"),
                 },
-                "command": device.command,
             },
             "instead": list(self.instead),
             "tried": [
                 {
                     "valve": tried.valve.name,
                     "actuator": tried.actuator.name,
-                    "torque": tried.torque,
-                    "toes": tried.toes,
-                    "flow": tried.flow,
+                    **fields_of(tried, "torque", "toes", "flow"),
                 }
                 for tried in self.tried
             ],
