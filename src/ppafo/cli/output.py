@@ -37,10 +37,14 @@ def check_output(out: Path | None, command: str) -> None:
 
 
 def check_new_file(path: Path) -> None:
-    """Raise DataError for an ``--out`` file that exists, since files have no mark of their command."""
+    """Raise DataError for an ``--out`` file that cannot be written, or exists: files have no mark of their command."""
+    from ppafo.storage.files import check_files_can_be_added
+
     # A link to nowhere exists too, and writing would create the file that it points to.
     if os.path.lexists(path):
         raise DataError(f"--out {path}: already exists; remove it or choose another name")
+    with blame_out_option():
+        check_files_can_be_added(path.parent, [path.name])
 
 
 @contextlib.contextmanager
@@ -201,11 +205,9 @@ def export(
 
 def export_file(out: Path, make: Callable[[], bytes], following: str) -> CommandOutput:
     """Write the file of an export unless it exists; the output names the next command."""
-    from ppafo.storage.files import check_files_can_be_added, write_file
+    from ppafo.storage.files import write_file
 
     check_new_file(out)
-    with blame_out_option():
-        check_files_can_be_added(out.parent, [out.name])
     write_file(out, make())
     return CommandOutput(f"written: {out}; next: {following}", {"file": str(out), "next": following})
 

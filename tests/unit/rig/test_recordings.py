@@ -282,7 +282,7 @@ def test_a_folder_is_the_rig_s_again_whenever_a_writer_is_killed(
 def test_an_empty_preset_points_to_the_schema_or_names_what_is_missing(tmp_path: Path) -> None:
     for text, message in (
         ("", "'ppafo doctor --schema rig' prints its format"),
-        ("# nothing yet\n", "'gas', 'supply'"),
+        ("# nothing yet\n", "'gas.heat_transfer_coefficient', 'gas.wall_area_per_volume'"),
     ):
         (tmp_path / "mine.toml").write_text(text)
         with pytest.raises(ParameterError, match=message):

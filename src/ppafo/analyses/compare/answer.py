@@ -262,8 +262,7 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
         for case in task.cases:
             where = f"{case.configuration}, {task.task}"
             with said_of_configuration(case.configuration):
-                remarks.append(coarse_pair(case.scenario))
-                remarks.append(remark_on_following_gains(case.scenario, comparison.varied))
+                remarks += [coarse_pair(case.scenario), remark_on_following_gains(case.scenario, comparison.varied)]
                 if kept := case.scenario.origin.replaced:
                     remarks.append(f"{where}: {kept}")
                 if case.tracking is not None and not case.follows:

@@ -154,14 +154,8 @@ def finding_of_several(several: Endurances) -> Finding[Endurances]:
     longest = max(use.discharge.walking_time for use in several.uses.values())
     titles = ("gas use", (f"gas per {counted}", _MASS), (time, duration_kind(longest)), f"{counted}s", "ended")
     rows = [
-        (
-            name,
-            use.draw.mass_per_stride,
-            use.discharge.walking_time,
-            strides_text(use.discharge.strides),
-            use.discharge.ending.kind,
-        )
-        for name, use in several.uses.items()
+        (name, draw.mass_per_stride, ended.walking_time, strides_text(ended.strides), ended.ending.kind)
+        for name, draw, ended in ((name, use.draw, use.discharge) for name, use in several.uses.items())
     ]
     return Finding(
         name="endurance",

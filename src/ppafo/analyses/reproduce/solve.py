@@ -46,6 +46,7 @@ def torque_task_claims(
     error = proportional.metrics["rms_error"].value
     gas = GRAMS_PER_KILOGRAM * proportional.metrics["gas_supplied"].value
     over = f"Median and range of {pair_errors.size} runs over the unknown phase of the decisions, either valve first."
+    every = "The controller decides every millisecond, so the phase does not matter."
     # Where the pair makes no error, or takes no gas, there is nothing to save from.
     with np.errstate(divide="ignore", invalid="ignore"):
         better, saved = 100.0 * (1.0 - error / pair_errors), 100.0 * (1.0 - gas / pair_gas)
@@ -54,12 +55,7 @@ def torque_task_claims(
     return [
         claim("torque_rms_improvement", better, 0, over),
         claim("co2_solenoid", pair_gas, 1, over),
-        claim(
-            "co2_proportional",
-            np.array([gas]),
-            2,
-            "The controller decides every millisecond, so the phase does not matter.",
-        ),
+        claim("co2_proportional", np.array([gas]), 2, every),
         claim("co2_saving", saved, 0, f"{over} Follows from the two amounts of gas and is not independent evidence."),
     ]
 

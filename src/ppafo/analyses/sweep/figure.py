@@ -203,8 +203,6 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
 
     def mark_axes(axes: "Axes") -> None:
         """Set ticks for the values of a list, and logarithmic scales."""
-        from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
         axes.grid(visible=False)
         sides = ((axes.xaxis, axes.set_xscale, columns), (axes.yaxis, axes.set_yscale, rows))
         for number, (axis, set_scale, levels) in enumerate(sides):
@@ -212,10 +210,6 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
                 axis.set_ticks(places[number], [f"{value:g}" for value in kinds[number].values(levels)])
             elif declared[grid[number]].get("spacing") == "logarithmic":
                 set_scale("log")
-                # Plain numbers at 1, 2 and 5 of every decade.
-                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-                axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-                axis.set_minor_formatter(NullFormatter())
 
     marks = (Mark("map", places[0], places[1], kind.values(mean)),)
     across_kind, upward_kind = (

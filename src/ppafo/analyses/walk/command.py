@@ -11,14 +11,11 @@ from ppafo.walking.motion import walk_of
 
 def list_files() -> list[dict[str, Any]]:
     """Return the walks and task sequences included in the package: name, kind of file, description."""
-    rows = []
-    for library in (FILE, task_sequences.FILE):
-        files = {name: library.parse(library.read(name), name) for name in library.names()}
-        rows += [
-            {"name": name, "kind": library.noun, "description": str(file.get("description", ""))}
-            for name, file in files.items()
-        ]
-    return rows
+    libraries = (FILE, task_sequences.FILE)
+    files = ((kind, name, kind.parse(kind.read(name), name)) for kind in libraries for name in kind.names())
+    return [
+        {"name": name, "kind": kind.noun, "description": str(file.get("description", ""))} for kind, name, file in files
+    ]
 
 
 def default_folder(values: Mapping[str, Any]) -> Path:

@@ -81,14 +81,10 @@ def rig_record(
 
     if duration is not None and duration <= 0.0:
         raise DataError("--duration: must be above 0 s")
-    output.check_new_file(out)
     if out.suffix != ".csv":
         raise DataError(f"--out {out}: the name must end in .csv")
-    from ppafo.storage.files import check_files_can_be_added
-
     # What a bench did cannot be recorded a second time.
-    with output.blame_out_option():
-        check_files_can_be_added(out.parent, [out.name])
+    output.check_new_file(out)
     from ppafo.exports.hil.ports import open_port
     from ppafo.exports.hil.recording import kept_aside, record
     from ppafo.interrupts import stop_by_interrupt

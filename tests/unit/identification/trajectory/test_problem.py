@@ -85,7 +85,9 @@ def test_a_problem_without_parameters_is_refused(experiment: FittedExperiment) -
 def test_every_parameter_that_0_leaves_out_of_the_model_is_refused_before_the_fit(experiment: FittedExperiment) -> None:
     late, spool = FreeParameter("valve.delay"), FreeParameter("valve.spool_frequency", start=30.0, low=0.0)
     words = r"0 leaves it out of the model, so it cannot be fitted from there; give start and low, both above 0"
-    with pytest.raises(IdentificationError, match=rf"^valve\.delay: {words}; valve\.spool_frequency: {words}$"):
+    with pytest.raises(
+        IdentificationError, match=rf"\(1\) valve\.delay: {words}; \(2\) valve\.spool_frequency: {words}$"
+    ):
         problem(experiment, late, INERTIA, spool)
     problem(experiment, FreeParameter("valve.delay", start=0.015, low=0.001))
 
