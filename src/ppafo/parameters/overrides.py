@@ -142,7 +142,7 @@ def check_valve(
     overrides: Iterable[Override], valve: str | None, choice: str, error: type[PpafoError] = ParameterError
 ) -> None:
     """Raise ``error`` if an override concerns another valve than the chosen ``valve``, None if none is chosen."""
-    for override in sorted(overrides) if valve else ():
+    for override in sorted(overrides):
         if valve and of_another_valve(override.typed, valve):
             raise error(
                 f"override '{override}' has no effect with {choice}, which selects another valve; remove one of them"

@@ -5,7 +5,7 @@ Measured and simulated data have the same form.
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -308,7 +308,7 @@ class Recording:
         """Return a copy with a channel added or replaced; a replaced channel keeps its interpolation."""
         between = self.channels[name].between if name in self.channels else None
         channel = Channel(np.asarray(values, dtype=np.float64), unit, between)
-        return Recording(self.label, self.time, {**self.channels, name: channel}, self.kind)
+        return replace(self, channels={**self.channels, name: channel})
 
     def between(self, start: float, end: float) -> "Recording":
         """Return a copy with the samples from ``start`` to ``end`` [s]; times are not shifted."""
@@ -316,11 +316,8 @@ class Recording:
         inside = (self.time >= start) & (self.time <= end)
         if not inside.any():
             raise DataError(f"{self.label}: there is no sample between {start:g} s and {end:g} s; {_span(self)}")
-        kept = {
-            name: Channel(channel.values[inside], channel.unit, channel.between, channel.stated)
-            for name, channel in self.channels.items()
-        }
-        return Recording(self.label, self.time[inside], kept, self.kind)
+        kept = {name: replace(channel, values=channel.values[inside]) for name, channel in self.channels.items()}
+        return replace(self, time=self.time[inside], channels=kept)
 
     def resample(self, times: ArrayLike) -> "Recording":
         """Return a copy at other times [s] within the time span; each channel is held or linear as declared."""
@@ -329,11 +326,9 @@ class Recording:
             raise DataError(
                 f"{self.label}: cannot be resampled from {wanted.min():g} s to {wanted.max():g} s; {_span(self)}"
             )
-        moved = {
-            name: Channel(between_samples(self, name, wanted), channel.unit, channel.between, channel.stated)
-            for name, channel in self.channels.items()
-        }
-        return Recording(self.label, wanted, moved, self.kind)
+        moved = {name: between_samples(self, name, wanted) for name in self.channels}
+        channels = {name: replace(channel, values=moved[name]) for name, channel in self.channels.items()}
+        return replace(self, time=wanted, channels=channels)
 
     def to_dataframe(
         self, units: Mapping[str, str] | None = None, atmosphere: float = STANDARD_ATMOSPHERE

@@ -162,8 +162,5 @@ def time_texts(base: Scenario) -> TimeTexts:
     own = RunTimes(base.run.duration, base.run.step, base.run.output_interval, base.controller.period)
     if read_clock(DocumentReader(base.name, texts)) == own:
         return texts
-    run = {"duration": base.run.duration, "step": base.run.step, "output_interval": base.run.output_interval}
-    return {
-        "run": {name: f"{value!r} s" for name, value in run.items()},
-        "controller": {"period": f"{base.controller.period!r} s"},
-    }
+    run = {name: f"{getattr(base.run, name)!r} s" for name in ("duration", "step", "output_interval")}
+    return {"run": run, "controller": {"period": f"{base.controller.period!r} s"}}

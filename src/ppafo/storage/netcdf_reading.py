@@ -155,12 +155,9 @@ def _channel(name: str, variable: Any) -> Channel:
                 raise DataError(
                     f"'{name}': attribute '{key}' must have {count_of(wanted, 'number')}, not {limits.size}"
                 )
-            is_outside = np.zeros(values.size, dtype=bool)
-            if key != "valid_max":
-                is_outside |= values < limits[0]
-            if key != "valid_min":
-                is_outside |= values > limits[-1]
-            rows = np.flatnonzero(is_outside)
+            is_below = (values < limits[0]) & (key != "valid_max")
+            is_above = (values > limits[-1]) & (key != "valid_min")
+            rows = np.flatnonzero(is_below | is_above)
             if rows.size:
                 first = int(rows[0])
                 raise DataError(

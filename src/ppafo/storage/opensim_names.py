@@ -8,6 +8,7 @@ package, as do all channels without a counterpart.
 """
 
 import math
+from dataclasses import replace
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.signals import Channel, Recording
@@ -50,4 +51,4 @@ def opensim_recording(
             channels[f"{name}_{foot}" if name in _OF_A_SIDE else name] = Channel(values, unit)
     if {"heel_force", "toe_force"} <= set(recording.names):
         channels[f"ground_force_{foot}_vy"] = Channel(recording["heel_force"] + recording["toe_force"], "N")
-    return Recording(recording.label, recording.time, channels, recording.kind), missing
+    return replace(recording, channels=channels), missing

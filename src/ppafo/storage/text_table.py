@@ -10,7 +10,7 @@ from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import finite_number
 from ppafo.storage.files import read_bytes, text_of
-from ppafo.wording import LONGEST_SHOWN, one_line
+from ppafo.wording import LONGEST_SHOWN, count_of, one_line
 
 _MOST_SAID = 3
 """Largest number of duplicated names with a separate remark."""
@@ -86,11 +86,6 @@ def said_of_doubled(twins: Mapping[str, Sequence[str]], left: Mapping[str, objec
         if all(other in left for other in own)
     ]
     more = len(said) - _MOST_SAID
-    return (
-        said
-        if more <= 0
-        else [
-            *said[:_MOST_SAID],
-            f"{noun} of {more} more repeated {'name' if more == 1 else 'names'} were renamed likewise",
-        ]
-    )
+    if more > 0:
+        said[_MOST_SAID:] = [f"{noun} of {count_of(more, 'more repeated name')} were renamed likewise"]
+    return said

@@ -11,7 +11,7 @@ from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.mapping import setting_text
 from ppafo.gait.recorded.near_columns import nearest_column
-from ppafo.gait.recorded.table import MotionTable
+from ppafo.gait.recorded.table import COORDINATES, MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import to_si
 from ppafo.wording import one_line
@@ -25,8 +25,6 @@ _BOTH_ANGLES = (
     "pelvis, hip and knee angles, or markers) and ankle_angle (90 deg neutral, growing in plantarflexion)"
 )
 """Reason for the required curves, their conventions, and other sources of a shank angle, in an error message."""
-_COORDINATES = (".x", ".y", ".z")
-"""Suffixes of the column names of a marker's coordinates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,7 +111,7 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
         missing = next((name for name in wanted if name not in known), wanted[0])
         twins = [name for name in known if re.fullmatch(re.escape(_marker(missing)) + r"#\d+(\.[xyz])?", name)]
         if twins:
-            either = " or ".join(repr(_marker(name)) for name in twins if name[-2:] not in _COORDINATES[1:])
+            either = " or ".join(repr(_marker(name)) for name in twins if name[-2:] not in COORDINATES[1:])
             raise DataError(
                 f"{curve}: {files} has several different columns {_marker(missing)!r}; choose {either} in a gait "
                 f"map ({setting_text('columns')})"
@@ -134,4 +132,4 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
 
 def _marker(name: str) -> str:
     """Return the marker of a coordinate column; any other column name is returned unchanged."""
-    return name[:-2] if name[-2:] in _COORDINATES else name
+    return name[:-2] if name[-2:] in COORDINATES else name

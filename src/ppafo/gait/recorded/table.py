@@ -15,8 +15,8 @@ STRIKE, OFF = "foot strike", "foot off"
 """Kinds of events in a file: heel strike and toe-off."""
 
 AXES = "xyz"
-_COORDINATES = (".x", ".y", ".z")
-"""Suffixes of the columns of a marker, ``LABEL.x``."""
+COORDINATES = (".x", ".y", ".z")
+"""Suffixes of the columns of a marker's coordinates, ``LABEL.x``."""
 
 
 def bare_label(label: str) -> str:
@@ -139,7 +139,7 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
     which is ``MOST_ACCELERATION`` times the interval squared [m].
     """
     columns, remarks = dict(table.columns), []
-    labels = dict.fromkeys(name[:-2] for name in names if name[-2:] in _COORDINATES)
+    labels = dict.fromkeys(name[:-2] for name in names if name[-2:] in COORDINATES)
     interval = float(np.median(np.diff(table.time))) if table.time.size > 1 else 0.0
     for label in labels:
         own = [f"{label}.{axis}" for axis in AXES if f"{label}.{axis}" in columns]

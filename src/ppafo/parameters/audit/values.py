@@ -204,10 +204,8 @@ def check_ranges(evidence: Evidence) -> Iterator[AuditFinding]:
             values=evidence.values_of(path),
             sides=(
                 ComparedNumber("in the set", value, quantity.unit),
-                *(
-                    ComparedNumber("lower limit", quantity.minimum, quantity.unit),
-                    ComparedNumber("upper limit", quantity.maximum, quantity.unit),
-                ),
+                ComparedNumber("lower limit", quantity.minimum, quantity.unit),
+                ComparedNumber("upper limit", quantity.maximum, quantity.unit),
             ),
             paragraph=(
                 f"{path} = {entry_text(entry)}: {quantity.summary} must lie between {quantity.minimum:g} and "

@@ -25,7 +25,7 @@ from ppafo.model.plant import PlantParameters
 from ppafo.model.source import bottle_content, has_liquid
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effect_row
-from ppafo.walking.bottle.course import DIVERGED, UNITS, WALKED, EndKind, SupplyCourse, SupplyEnding
+from ppafo.walking.bottle.course import DIVERGED, UNITS, WALKED, SupplyCourse, SupplyEnding
 from ppafo.walking.bottle.supply import BottleSupply
 from ppafo.walking.safety_events import SAFE_ROW
 
@@ -317,9 +317,8 @@ def _ending(supply: BottleSupply, meeting: _Meeting, reached: float) -> SupplyEn
     short = f"the supply gives less than {100.0 * supply.least_torque:.0f} % of the torque"
     # The bottle still has the pressure: the flow is too small, by ice or by the seat itself.
     if now.set_pressure >= bottle.regulator.set_pressure and open_share(bottle.supply, state.ice) < _OPEN:
-        kind: EndKind = "iced"
         why = f"dry ice leaves {100.0 * open_share(bottle.supply, state.ice):.0f} % of the seat open"
-        return SupplyEnding(kind, f"the regulator is iced: {why}, and {short}; {left} are left", time)
+        return SupplyEnding("iced", f"the regulator is iced: {why}, and {short}; {left} are left", time)
     if now.set_pressure >= bottle.regulator.set_pressure:
         return SupplyEnding("too little flow", f"the regulator flow is too small, and {short}; {left} are left", time)
     # The same gas at room temperature tells a cold bottle from an empty one.

@@ -10,14 +10,13 @@ import numpy as np
 from ppafo.errors import DataError
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
-from ppafo.gait.recorded.table import Events, MotionTable, TrialData, bare_label
+from ppafo.gait.recorded.table import AXES, Events, MotionTable, TrialData, bare_label
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 from ppafo.storage.text_table import doubled, said_of_doubled, told_apart
 from ppafo.storage.trial_reading import check_can_be_read
 from ppafo.wording import count_of, one_line
 
-_AXES = "xyz"
 _MARK = b"\x50"
 """Second byte of every C3D file."""
 
@@ -72,7 +71,7 @@ def read_c3d(path: str | Path) -> MotionTable:
     columns = {
         f"{label}.{axis}": points[row, number, :]
         for number, label in enumerate(labels)
-        for row, axis in enumerate(_AXES)
+        for row, axis in enumerate(AXES)
     }
     units = {name: unit for name, unit in _units(parameters["POINT"], labels).items() if name in columns}
     analogs: Floats = content["data"]["analogs"][0]
@@ -130,7 +129,7 @@ def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
         # Whichever axis is up, the weight is the largest of the sums.
         total = np.nansum(force, axis=1)
         sign = -1.0 if total[np.argmax(np.abs(total))] < 0.0 else 1.0
-        for row, axis in enumerate(_AXES):
+        for row, axis in enumerate(AXES):
             yield f"{PLATE}{number}.{axis}", sign * force[row]
 
 
@@ -141,7 +140,7 @@ def _units(group: Any, labels: Iterable[str]) -> dict[str, str]:
     for names, unit in _GROUPS:
         stated = _unit_name(next(iter(_texts(group, unit)), ""))
         units.update({bare_label(label): stated for label in _texts(group, names)})
-    return {f"{label}.{axis}": unit for label, unit in units.items() for axis in _AXES}
+    return {f"{label}.{axis}": unit for label, unit in units.items() for axis in AXES}
 
 
 def _unit_name(unit: str) -> str:

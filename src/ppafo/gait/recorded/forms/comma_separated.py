@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ppafo.errors import DataError, UnitError, refused_as
-from ppafo.gait.recorded.delimited import NumberBlock, delimiter_of, lines_of, table_of
+from ppafo.gait.recorded.delimited import NumberBlock, cells_of, delimiter_of, lines_of, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map, setting_text
 from ppafo.gait.recorded.table import MotionTable
@@ -48,7 +48,7 @@ def plain_names(path: str | Path) -> list[str]:
 
 
 def _named_columns(header: str) -> list[tuple[str, str]]:
-    cells = [cell.strip().strip('"').strip() for cell in header.split(delimiter_of(header))]
+    cells = cells_of(header, delimiter_of(header))
     return [(match[1], match[2] or "") for cell in cells if (match := _NAME.fullmatch(cell))]
 
 

@@ -212,8 +212,7 @@ def _axes(
     if oblique > _MOST_OBLIQUE:
         raise DataError(
             f"{table.file}: walking direction is {oblique:.0f} deg off lab axis {'xyz'[along]} (limit "
-            f"{_MOST_OBLIQUE:g} deg); rotate "
-            "the coordinates so that one axis points along the walk"
+            f"{_MOST_OBLIQUE:g} deg); rotate the coordinates so that one axis points along the walk"
         )
     forward = _FORWARDS[along + 3 * bool(travel[along] < 0.0)]
     remarks = () if (forward, up) == ("x", 2) else (f"walking direction is {forward}, upwards is {'xyz'[up]}",)
