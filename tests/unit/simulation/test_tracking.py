@@ -383,6 +383,28 @@ def test_a_python_relay_on_a_pair_is_told_the_step_of_the_valves_which_smaller_o
         assert simulate("torque-task-solenoid", [*sets, change]).tracking is not None
 
 
+def test_a_swing_about_an_earlier_level_is_named_beside_the_verdict_on_the_last_one() -> None:
+    """A stiff loop swings at 65 deg, near a stop, and settles at 115 deg; a softer one settles at both."""
+    knots = {"01": (0.0, 65), "02": (1.5, 65), "03": (1.6, 115), "04": (19.0, 115)}
+    table = [f"reference.value_{key}={level} deg" for key, (_, level) in knots.items()]
+    table += [f"reference.time_{key}={time} s" for key, (time, _) in knots.items() if time]
+    table += ["reference.kind=tabulated", "reference.level=0 deg", "reference.period=20 s", "motion.angle=70 deg"]
+    stiff, calm = (
+        simulate("cylinder-servo", [*table, "run.duration=8 s", f"controller.angle_stiffness={stiffness} N m/rad"])
+        for stiffness in (60, 40)
+    )
+    assert stiff.tracking is None
+    assert calm.tracking is None
+    angle = stiff.recording["angle"][(stiff.recording.time > 0.75) & (stiff.recording.time < 1.5)]
+    swing = round(float(np.ptp(np.degrees(angle))), 1)
+    assert swing > 10.0
+    assert [text for text in stiff.warnings if "the reference rests" in text] == [
+        f"while the reference rests from 0 s to 1.5 s, the angle swings by {swing} deg: the verdict is about the end "
+        "of the run alone"
+    ]
+    assert not any("the reference rests" in text for text in calm.warnings)
+
+
 def test_a_slow_approach_is_no_oscillation_and_needs_more_time() -> None:
     sets = ["reference.kind=constant", "reference.level=110 deg", "sensors.delay=10 ms"]
     found = simulate("cylinder-servo", [*sets, "run.duration=0.8 s"]).tracking

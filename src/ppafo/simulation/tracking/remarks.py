@@ -1,32 +1,39 @@
 """Remarks on a run beside its verdict: stops that the joint reaches, and overridden sensor values without effect."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.metrics.metric import extent, followed
+from ppafo.metrics.settled import SHORTEST_HOLD
+from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.plant import gravity_torque
 from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.reach import torque_reach
+from ppafo.signals.meter import SAME_LEVEL
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.load_causes import LOCKED, ON_STOP, stop_of
 from ppafo.simulation.tracking.pair_step import unlimited_switching
-from ppafo.simulation.tracking.remedies import level_text
-from ppafo.simulation.tracking.rule import SMALLEST_MOVE
+from ppafo.simulation.tracking.remedies import change_text, level_text
+from ppafo.simulation.tracking.rule import LARGEST_SHARE, SMALLEST_MOVE, deviation_limit, only_switches
+from ppafo.simulation.tracking.settled import MOVED_JOINT, settled_task
 
 if TYPE_CHECKING:
     from ppafo.simulation.at_hand import RecordedResult
 
 
 def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
-    """Yield remarks on a joint at rest, stops, switching, sensor values without effect, and replaced values of the set.
+    """Yield remarks on rest, earlier swings, stops, switching, sensor values without effect, and replaced values.
 
     ``follows``: True if the run follows its reference; a stop may then bear the torque that the reference asks for.
     """
     scenario, recording = result.scenario, result.recording
     motion, actuator, reached = scenario.motion, scenario.device.actuator, []
     yield standing_still(result, follows)
+    yield earlier_swing(result, follows)
     if isinstance(motion, FreeMotion):
         for side, stop in (("lower", actuator.angle_min), ("upper", actuator.angle_max)):
             rests = np.abs(recording["angle"] - stop) <= ON_STOP
@@ -63,6 +70,30 @@ def standing_still(result: "RecordedResult", follows: bool) -> str:
         text += f"; not tried: reduce `friction.static_torque`, or lock the joint ({LOCKED.text})"
     # A joint on which no torque acts is at rest without friction.
     return text if most > SMALLEST_MOVE * holding else ""
+
+
+def earlier_swing(result: "RecordedResult", follows: bool) -> str:
+    """Remark on a swing while the reference rested earlier, as the verdict judges the end of a run; "" for others."""
+    scenario, recording = result.scenario, result.recording
+    if not (follows and scenario.follows_reference) or only_switches(scenario, scenario.law):
+        return ""
+    settled = settled_task(scenario, recording)._replace(rests=True)
+    reference, value = followed(recording)
+    limit, said = float(deviation_limit(settled, is_switched=False)), ""
+    worst = limit if np.isfinite(limit) else 2.0 * LARGEST_SHARE * settled.wanted_change
+    changes = np.flatnonzero(np.abs(np.diff(reference)) > SAME_LEVEL * extent(recording)) + 1
+    # Of each rest the second half is judged, as of the last one, which has the verdict.
+    for first, end in pairwise((0, *changes.tolist())):
+        half = slice((first + end) // 2, end)
+        error, turned = (value - reference)[half], float(np.ptp(recording["angle"][half]))
+        is_disturbed = scenario.controlled != ANGLE and turned > MOVED_JOINT
+        if end - first < SHORTEST_HOLD * len(recording) or is_disturbed or np.ptp(error) <= worst:
+            continue
+        if reversals(error, OSCILLATION_THRESHOLD * settled.wanted_change) > 1:
+            worst, times = float(np.ptp(error)), f"from {recording.time[first]:.3g} s to {recording.time[end]:.3g} s"
+            swing = f"the {CONTROLLED[scenario.controlled].words} swings by {change_text(scenario.controlled, worst)}"
+            said = f"while the reference rests {times}, {swing}: the verdict is about the end of the run alone"
+    return said
 
 
 def _without_effect(scenario: Scenario) -> str:
