@@ -253,28 +253,39 @@ class _UnknownEffect(NamedTuple):
 
 
 _EFFECTS = (
-    _UnknownEffect("leak_opening", "the leak seems to open at {:.3g} Pa", ("pressure",), (1e3, 2e5), {"rise": 0.3}),
     _UnknownEffect(
-        "stribeck",
-        "friction seems to be higher up to {:.2g} rad/s (Stribeck)",
-        ("velocity",),
-        (0.02, 6.0),
-        {"share": 0.9},
+        name="leak_opening",
+        words="the leak seems to open at {:.3g} Pa",
+        scaled=("pressure",),
+        range=(1e3, 2e5),
+        constant={"rise": 0.3},
     ),
     _UnknownEffect(
-        "seal_friction",
-        "friction seems to grow with pressure by {:.2g} N m/Pa",
-        ("static_per_pressure", "dynamic_per_pressure"),
-        (1e-8, 5e-6),
+        name="stribeck",
+        words="friction seems to be higher up to {:.2g} rad/s (Stribeck)",
+        scaled=("velocity",),
+        range=(0.02, 6.0),
+        constant={"share": 0.9},
     ),
     _UnknownEffect(
-        "second_virial",
-        "the gas seems to have {:.2g} times the virial coefficient of CO2",
-        ("share",),
-        (0.05, 8.0),
-        {"coefficient": SECOND_VIRIAL["CO2"]},
+        name="seal_friction",
+        words="friction seems to grow with pressure by {:.2g} N m/Pa",
+        scaled=("static_per_pressure", "dynamic_per_pressure"),
+        range=(1e-8, 5e-6),
     ),
-    _UnknownEffect("spool_play", "the spool seems to have a play of {:.2g} of full command", ("width",), (0.005, 0.4)),
+    _UnknownEffect(
+        name="second_virial",
+        words="the gas seems to have {:.2g} times the virial coefficient of CO2",
+        scaled=("share",),
+        range=(0.05, 8.0),
+        constant={"coefficient": SECOND_VIRIAL["CO2"]},
+    ),
+    _UnknownEffect(
+        name="spool_play",
+        words="the spool seems to have a play of {:.2g} of full command",
+        scaled=("width",),
+        range=(0.005, 0.4),
+    ),
 )
 _SIZES_OF_AN_EFFECT = 5
 """Number of trial magnitudes of an effect, in geometric progression."""
