@@ -48,7 +48,8 @@ class TrackingExcess(NamedTuple):
     """Numbers of each run divided by their limits (runs,); nan if unknown.
 
     With ``largest`` up to 1 the run follows its reference, with ``oscillation`` up to 1 its loop does not oscillate.
-    ``beyond_reach`` [N m] is the requested torque beyond the reach of the actuator (runs,), which the limits allow in part.
+    ``beyond_reach`` [N m] is the requested torque that the actuator cannot reach (runs,), which the limits allow in
+    part.
     """
 
     largest: Floats
