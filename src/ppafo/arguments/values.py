@@ -261,8 +261,10 @@ def _either(kinds: list[AcceptedValues], allows_none: bool) -> AcceptedValues:
 
 
 def _at_hand(what: str, value: Any) -> str:
-    """Return a hint to pass an attribute of the value, such as ``result.recording``; empty if none is accepted."""
+    """Return a hint to pass an attribute of the value, such as ``result.recording``, or on a stored result; or ""."""
     names = [name for name in ("recording", "scenario") if f"a {name.capitalize()}" in what and hasattr(value, name)]
+    if not names and "a Scenario" in what and hasattr(value, "recording"):
+        return "; a stored result is not run or compared again: give what was run; its numbers are in '.metrics'"
     return f"; pass its attribute '{names[0]}'" if names else ""
 
 

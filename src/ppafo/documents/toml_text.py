@@ -81,7 +81,10 @@ class TomlKind:
         """Return the remedy for a stored result or a file of another kind; empty for a .toml file."""
         # Path.is_file raises an error for a name that is too long.
         if Path(file).name == _RESULT or isfile(Path(file, _RESULT)):  # noqa: PTH113
-            return "; it is a stored result: give the name or file of what was run, or read it by ppafo.read_result"
+            return (
+                "; it is a stored result, which is not run or compared again: give the name or file of what was run; "
+                "its numbers are in ppafo.read_result(folder).metrics"
+            )
         return "" if Path(file).suffix in ("", _SUFFIX) else f"; give a .toml file{self.made}"
 
     def parse(self, content: bytes, file: str) -> dict[str, Any]:

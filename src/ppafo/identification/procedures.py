@@ -43,6 +43,7 @@ from ppafo.parameters.parameter_set import (
     with_followers,
 )
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+from ppafo.units import from_si
 from ppafo.units.reference import molar_mass_in
 from ppafo.wording import known_names, said_missing
 
@@ -105,6 +106,13 @@ class ProcedureContext:
                 f"{metered:.4g} kg/mol, but the gas of {self.label} is {used}{remedy}"
             )
         return gas
+
+    def gas_text(self, problem: "FlowProblem", gas: GasAt) -> str:
+        """Return species and temperature of the gas of the bench as text, such as ``CO2 of the set, 22 degC``."""
+        names = [name for name, each in SPECIES.items() if abs(each.molar_mass / gas.molar_mass - 1.0) < _SAME_GAS]
+        name = names[0] if names else f"{gas.molar_mass:.4g} kg/mol"
+        origin = " of the set" if problem.gas is None else ""
+        return f"{name}{origin}, {from_si(gas.temperature, 'degC', 'K'):.4g} degC"
 
     def _gas(self, problem: "FlowProblem") -> GasAt:
         """Return the gas that the procedure or the set states."""
@@ -352,9 +360,10 @@ def run_procedure(
     for source in sources:
         with noted_in(wrong):
             check_needed_channels(source.name, problem, source.recording.names)
+    gas_used = ""
     if isinstance(problem, FlowProblem):
         with noted_in(wrong):
-            context.gas(problem, sources)
+            gas_used = f"; gas: {context.gas_text(problem, context.gas(problem, sources))}"
     raise_noted(wrong)
     try:
         result = problem.run(sources, context)
@@ -365,6 +374,7 @@ def run_procedure(
         raise IdentificationError(f"{context.label}: {error}") from error
     atmosphere = atmospheric_pressure(context.parameter_set)
     result = with_smoothing_unit(result, sources, atmosphere, lambda again: problem.run(again, context))
+    result = replace(result, summary=f"{result.summary}{gas_used}")
     acting = ("zero",) if problem.kind == "static-torque" else ()
     idle = [f"'{name}'" for name in context.tolerances.each_recording if name not in acting]
     if not idle or len(sources) == 1:

@@ -138,7 +138,7 @@ def test_overrides_in_another_place_are_answered_with_a_call_that_works() -> Non
         ppafo.walk("solenoid", {"supply.pressure": "4 bar_g"})  # type: ignore[call-arg]
 
 
-def test_what_is_taken_is_said_once_and_what_is_at_hand_with_it() -> None:
+def test_what_is_taken_is_said_once_and_what_is_at_hand_with_it(tmp_path: Path) -> None:
     run = ppafo.simulate("step-response")
     with pytest.raises(ArgumentError) as refused:
         ppafo.bottle(run)  # type: ignore[arg-type]
@@ -148,6 +148,9 @@ def test_what_is_taken_is_said_once_and_what_is_at_hand_with_it() -> None:
     )
     with pytest.raises(ArgumentError, match=r"; pass its attribute 'recording'$"):
         ppafo.evaluate(run)  # type: ignore[arg-type]
+    stored = ppafo.read_result(run.save(tmp_path / "run"))
+    with pytest.raises(ArgumentError, match=r"a path; a stored result is not run or compared again: give what was run"):
+        ppafo.compare({"stored": stored})  # type: ignore[dict-item]
 
 
 def test_a_message_names_arguments_in_python_and_options_on_the_command_line(

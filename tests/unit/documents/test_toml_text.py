@@ -116,7 +116,8 @@ def test_a_file_of_another_kind_and_a_folder_are_answered_with_what_to_give(tmp_
     (tmp_path / "run.json").write_text("{}", encoding="utf-8")
     for stored in (tmp_path, tmp_path / "run.json"):
         with pytest.raises(
-            ScenarioError, match=r"it is a stored result: give the name or file of what was run, or read"
+            ScenarioError,
+            match=r"it is a stored result, which is not run or compared again: give .*; its numbers are in ppafo\.read",
         ):
             kind.parse(kind.read(stored), str(stored))
     (tmp_path / "mine.toml").touch()

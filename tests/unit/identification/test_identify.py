@@ -362,6 +362,7 @@ def test_the_leak_of_a_cylinder_is_identified_as_that_of_a_vane(bench: Path) -> 
     head = HEAD.replace("ppafo2011", "cylinder-lever")
     (bench / "problem.toml").write_text(f'{head}{LEAK}gas = "CO2"\n')
     outcome = identify(bench / "problem.toml").found
+    assert outcome.results[0].summary.endswith("; gas: CO2, 20 degC")
     assert outcome.new_set.written == ("actuator.leak.area",)
     assert outcome.results[0].estimates[0].value == pytest.approx(0.3e-6 * 0.113 / 0.6, rel=0.05)
     (bench / "problem.toml").write_text(head + LEAK.partition("volume_1")[0] + 'angle = "60 deg"\n')
@@ -465,7 +466,9 @@ def test_bench_and_trajectory_hold_a_number_alike() -> None:
 def test_a_measured_gas_temperature_takes_the_place_of_the_set_s(solved: Solve) -> None:
     path = "valves.proportional.discharge_coefficient"
     temperatures = ("24.85 degC", "16.85 degC")
-    plain, cool = (solved(f'{FLOW}temperature = "{item}"\n').results[0][path] for item in temperatures)
+    results = [solved(f'{FLOW}temperature = "{item}"\n').results[0] for item in temperatures]
+    assert results[1].summary.endswith("; gas: CO2 of the set, 16.85 degC")
+    plain, cool = (result[path] for result in results)
     assert cool.value / plain.value == pytest.approx((290.0 / 298.0) ** 0.5, rel=1e-4)
 
 

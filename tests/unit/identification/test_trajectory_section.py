@@ -204,8 +204,11 @@ def test_what_the_new_set_keeps_beside_values_fitted_with_it_is_said(both: Ident
     estimates = (replace(inertia, verdict="not identifiable"), *fit.estimates[1:])
     written = replace(both.new_set, written=both.new_set.written[1:])
     trajectory = replace(both.trajectory, fit=replace(fit, estimates=estimates))
-    text = text_of(finding_of(replace(both, trajectory=trajectory, new_set=written)))
-    assert "the new set keeps its own foot_plate.inertia, with which its other values were not fitted" in text
+    inconsistent = finding_of(replace(both, trajectory=trajectory, new_set=written))
+    said = "not passed (exit code 1): the new set keeps its own foot_plate.inertia, with which its other values were"
+    assert said in text_of(inconsistent)
+    assert finding_of(both).passed
+    assert not inconsistent.passed
 
 
 def test_a_key_of_the_wrong_type_is_said_with_what_it_means(solve: Solve) -> None:

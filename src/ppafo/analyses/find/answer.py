@@ -135,6 +135,8 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
     wanted, further = ("highest", "higher") if outcome.highest else ("lowest", "lower")
     is_verdict = condition.text == FOLLOWS
     meets = "lets the run follow its reference" if is_verdict else f"meets {condition.text}"
+    # Beyond the value found, the condition may be met by a loop that does not follow its reference.
+    follows = " and follows its reference" if missed else ""
     nearest = f"{condition.metric} of " if is_verdict else ""
     if index is None:
         # The nearest one says whether a wider range could.
@@ -145,10 +147,9 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
         # Inside the range this number alone does not decide.
         other = ", inside the range: a finer grid, or other gains (ppafo tune), may meet it"
         other = other if 0 < row < tried.size - 1 else ""
-        return f"no {path} {ends} {meets}; the nearest is {there}{kind.text(tried['value'][row])}{other}"
+        near = f"the nearest is {there}{kind.text(tried['value'][row])}{other}"
+        return f"no {path} {ends} {meets}{follows}; {_condition_alone(outcome, kind) if missed else near}"
     value = float(tried["value"][index])
-    # Beyond it the condition may be met by a loop that does not follow its reference.
-    follows = " and follows its reference" if missed else ""
     intervals, gap = outcome.met_intervals, ""
     if len(intervals) > 1:
         (_, start), (stop, _) = intervals[-2:] if outcome.highest else intervals[:2]
@@ -168,11 +169,22 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
         valid = f"it is the {wanted} valid value, not the limit of the condition {bracket}"
         return f"{path} = {kind.text(value)} {meets}{follows}{gap}{there}; {valid}: {reason}{add}"
     beyond, why = tried[index + (1 if outcome.highest else -1)], ""
+    side = "above" if outcome.highest else "below"
     if beyond["oscillating"]:
-        why = "; beyond it the loop oscillates"
+        why = f"; {side} it the loop oscillates"
     elif not is_verdict and condition.is_kept(beyond["judged"]):
-        why = "; beyond it the reference is not followed"
+        why = f"; {side} it the reference is not followed: {_condition_alone(outcome, kind)}"
     return f"{lead}{there} {bracket}{why}"
+
+
+def _condition_alone(outcome: FindResult, kind: Kind) -> str:
+    """Return a clause on the outermost tried value that meets the condition, whether its run follows or not."""
+    values = outcome.tried["value"]
+    bound, row, step = ("up to", -1, 1) if outcome.highest else ("from", 0, -1)
+    index = int(np.flatnonzero(outcome.condition.is_kept(outcome.tried["judged"]))[row])
+    text = f"the condition alone is met {bound} {kind.text(values[index], '.4g')}"
+    outer = index + step
+    return f"{text} (not at {kind.text(values[outer], '.4g')})" if 0 <= outer < values.size else text
 
 
 def _remarks(outcome: FindResult, kind: Kind, missed: int) -> Iterator[str]:

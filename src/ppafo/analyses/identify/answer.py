@@ -19,7 +19,7 @@ from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.identification.unit_check import FAR_FROM_SET
 from ppafo.identification.wording import in_shown_unit, interval_texts, with_error
 from ppafo.parameters.loading import parameter_set_toml
-from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
@@ -69,10 +69,26 @@ class Identification:
 
     @property
     def is_good(self) -> bool:
-        """True if no recordings contradict each other, no unit is probably wrong, and the new set is a valid device."""
+        """True if the recordings agree, no unit is probably wrong, and the new set is a valid, consistent device."""
         is_fitted = self.trajectory is None or self.trajectory.is_good
         is_fitted &= all(estimate.verdict != WRONG_UNIT for estimate in self.estimates)
-        return is_fitted and not self.new_set.problem and not any(result.conflict for result in self.results)
+        is_valid = not self.new_set.problem and not self.kept_beside_fitted
+        return is_fitted and is_valid and not any(result.conflict for result in self.results)
+
+    @property
+    def kept_beside_fitted(self) -> list[str]:
+        """Paths that the new set keeps as they were, although its new values were fitted together with them."""
+        fitted_together = () if self.trajectory is None else self.trajectory.fit.estimates
+        new = {*self.new_set.written, *self.new_set.fitted}
+        if not any(estimate.path in new for estimate in fitted_together):
+            return []
+        return sorted(
+            estimate.path
+            for estimate in fitted_together
+            if estimate.path in self.before.declarations().keys() - new
+            # A set without the number has none of the effect, as a fit that ends at zero.
+            and estimate.value != (number_in_si(self.before, estimate.path) or 0.0)
+        )
 
     @property
     def kind(self) -> RecordingKind:
@@ -136,7 +152,7 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
 
 @in_units(lambda found: counted_from(found.before.shown, atmospheric_pressure(found.before)))
 def finding_of(identification: Identification) -> Finding[Identification]:
-    """Return an identification as a finding; passed if the recordings agree and the new set is a valid device."""
+    """Return an identification as a finding; passed if the recordings agree and the new set is valid and consistent."""
     name, new_set, before = identification.name, identification.new_set, identification.before
     parts = []
     for result in identification.results:
@@ -170,13 +186,10 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         count = f"{count_of(len(written), 'value')} of the set identified: {', '.join(written)}"
     fitted_text = f"; for this model only: {', '.join(fitted)}" if fitted else ""
     problem = [f"the new set is not a complete device yet: {new_set.problem}"] if new_set.problem else []
-    fitted_together = () if identification.trajectory is None else identification.trajectory.fit.estimates
-    is_new = {estimate.path: estimate.path in (*written, *fitted) for estimate in fitted_together}
-    kept = [path for path in is_new.keys() & before.declarations().keys() if not is_new[path]]
-    if kept and any(is_new.values()):
+    if kept := identification.kept_beside_fitted:
         problem.append(
-            f"the new set keeps its own {' and '.join(sorted(kept))}, with which its other values were not fitted: fix "
-            "these by device.overrides, and fit the others again"
+            f"not passed (exit code 1): the new set keeps its own {' and '.join(kept)}, with which its other values "
+            "were not fitted: fix these by device.overrides, and fit the others again"
         )
     # As they are remarks among others, these that prevent a pass are repeated at the end.
     of_fit = () if identification.trajectory is None else identification.trajectory.fit.remarks

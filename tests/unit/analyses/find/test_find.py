@@ -278,7 +278,7 @@ def test_the_error_that_decides_is_named_beside_the_metric_and_so_is_what_ends_t
         highest=True,
         grid=8,
     )
-    assert gain.said[0].endswith("; beyond it the loop oscillates")
+    assert gain.said[0].endswith("; above it the loop oscillates")
 
 
 def test_one_instant_of_a_loop_that_settles_is_its_error() -> None:
@@ -324,6 +324,19 @@ def test_a_torque_that_the_actuator_does_not_give_is_not_followed(tmp_path: Path
     assert at_limit * 6894.757 * volume == pytest.approx(5.7, abs=0.05)
     assert errors[-1] < 0.2
     assert axes.get_ylabel().replace("\n", " ") == "Largest tracking number over its limit"
+
+
+@pytest.mark.parametrize("upper", [62, 54])
+def test_the_condition_alone_is_told_where_the_reference_is_not_followed(upper: int) -> None:
+    """The supply limits the torque at 57.6 psi_g less 5 %; an RMS error below 1.2 N m asks less."""
+    answer = find(TASK, vary=f"supply.pressure=30..{upper} psi_g", such_that="rms_error <= 1.2 N m", grid=9)
+    told = re.search(r"the condition alone is met from ([\d.]+) psi_g \(not at ([\d.]+) psi_g\)$", answer.said[0])
+    assert told is not None
+    metrics = {f"{(sample.value - 101325.0) / 6894.757:.4g}": sample.metric for sample in answer.found.tried}
+    met, unmet = (metrics[text] for text in told.groups())
+    assert met <= 1.2 < unmet
+    assert "and follows its reference" in answer.said[0]
+    assert ("; below it the reference is not followed: " in answer.said[0]) == (answer.found.value is not None)
 
 
 def test_a_run_that_follows_is_a_condition_of_its_own() -> None:
