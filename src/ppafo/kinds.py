@@ -197,22 +197,21 @@ def kind_at(location: str) -> Any:
 
 
 def _installed_path() -> tuple[str, ...]:
+    """Return the search path without the working folder, whose files somebody else may have made."""
     return tuple(folder for folder in sys.path if not is_working_folder(folder))
 
 
 @lru_cache(maxsize=32)
-def _entry_points(group: str, _path: tuple[str, ...]) -> tuple["EntryPoint", ...]:
-    """Return the entry points of a group for a search path, sorted by name."""
-    from importlib.metadata import entry_points
+def _entry_points(group: str, path: tuple[str, ...]) -> tuple["EntryPoint", ...]:
+    """Return the entry points of a group of the packages on a search path, sorted by name."""
+    from importlib.metadata import distributions
 
-    # The path is part of the key, as it may grow while the program runs. What lies in the working folder is no package
-    # that somebody installed, but a file of whoever made the folder.
-    found = [
-        point
-        for point in entry_points(group=group)
-        if not (point.dist is not None and is_working_folder(str(point.dist.locate_file(""))))
-    ]
-    return tuple(sorted(found, key=lambda point: (point.name, point.value)))
+    found: dict[tuple[str, str], EntryPoint] = {}
+    for package in distributions(path=list(path)):
+        for point in package.entry_points.select(group=group):
+            # Of a package that lies on the path twice the first counts, as for imports.
+            found.setdefault((package.name, point.name), point)
+    return tuple(sorted(found.values(), key=lambda point: (point.name, point.value)))
 
 
 def _package(point: "EntryPoint") -> str:

@@ -180,6 +180,18 @@ def test_the_folder_of_an_editable_package_is_searched_from_within_as_from_elsew
     assert not plugins.is_working_folder(own)
 
 
+def test_metadata_of_an_editable_package_in_the_working_folder_do_not_hide_the_installed_ones(
+    install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install("other_laws", LAW.format(name="on_off", call="mine"), controllers="mine")
+    about = tmp_path / "project" / "other_laws.egg-info"
+    about.mkdir(parents=True)
+    (about / "PKG-INFO").write_text("Metadata-Version: 2.1\nName: other_laws\nVersion: 1.0\n")
+    monkeypatch.chdir(about.parent)
+    monkeypatch.syspath_prepend("")
+    assert load_scenario("torque-task-proportional", ["controller.kind=mine"]).controller.kind == "mine"
+
+
 def test_profiles_and_metrics_are_found_too(install: Install) -> None:
     profile = "from dataclasses import replace\nfrom ppafo.control.profiles import SINE\n"
     install("other_profiles", profile + 'KIND = replace(SINE, name="wave")\n', profiles="wave")
@@ -211,10 +223,10 @@ def test_kinds_are_a_mapping_that_can_be_changed_for_a_while() -> None:
 
 def test_help_looks_for_commands_of_other_packages_and_a_scenario_of_the_package_for_nothing() -> None:
     code = (
-        "import importlib.metadata as m\n"
-        "looked, original = [], m.entry_points\n"
-        "def scan(group):\n    looked.append(group)\n    return original(group=group)\n"
-        "m.entry_points = scan\n"
+        "import ppafo.kinds as kinds\n"
+        "looked, original = [], kinds._entry_points\n"
+        "def scan(group, path):\n    looked.append(group)\n    return original(group, path)\n"
+        "kinds._entry_points = scan\n"
         "import ppafo.cli.main as main\n"
         "try:\n    main.main(['--help'])\nexcept SystemExit:\n    pass\n"
         "assert [one for one in looked if one.startswith('ppafo')] == ['ppafo.commands'], looked\n"

@@ -262,7 +262,8 @@ def _nearest_value(override: Override, allowed: Sequence[str]) -> str:
         return f", did you mean '{SPECIES_PATH}={override.text}'?"
     if section == SECTION and name not in EFFECTS.loaded():
         return (
-            f": no effect '{name}'{known_names(name, EFFECTS.loaded())}; your own needs an entry point 'ppafo.effects'"
+            f": no effect '{name}'{known_names(name, EFFECTS.loaded())}; your own needs an entry point 'ppafo.effects' "
+            "of an installed package, not of the current folder"
         )
     section = f"{section}.{name}" if section == SECTION else section
     # Compared without their section, which all values in it have in common and which makes strangers look alike.

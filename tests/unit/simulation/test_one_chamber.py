@@ -117,3 +117,8 @@ def test_the_audit_asks_for_no_second_chamber() -> None:
     findings = {finding.id: finding for finding in ppafo.audit(str(BLADDER)).found.findings}
     assert "missing-values" not in findings
     assert "With the chamber at supply or at atmosphere" in findings["torque-ceiling"].paragraph
+
+
+def test_the_torque_of_a_spring_is_not_said_to_be_the_supplys() -> None:
+    (finding,) = (item for item in ppafo.audit(str(BLADDER)).found.findings if item.id == "torque-ceiling")
+    assert finding.title == "the actuator gives at most 25.7 N m up and 2.36 N m down"

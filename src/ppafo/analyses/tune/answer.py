@@ -55,17 +55,17 @@ def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
         reference = recording[controlled.reference]
         followed.append(Mark("line", recording.time, reference, label="reference", colour=BLACK, style=dashed))
     return [
-        Panel(TIME, level, followed, legend="above"),
-        Panel(TIME, _COMMAND, _traces("command", before, after), legend=""),
-        Panel(TIME, _GAS, _traces("supplied_mass", before, after), legend=""),
+        Panel(TIME, level, followed, legend="figure", shares_x=True),
+        Panel(TIME, _COMMAND, _traces("command", before, after), legend="", shares_x=True),
+        Panel(TIME, _GAS, _traces("supplied_mass", before, after), legend="", shares_x=True),
     ]
 
 
 def _traces(channel: str, before: GainResult, after: GainResult) -> list[Mark]:
     """Return the curves of a channel over time, with the gains before and after tuning."""
     marks = []
-    # Broad below, so that both show where they agree.
-    for setting, colour, label, width in ((before, VERMILION, "before", 2.8), (after, BLUE, "after", 1.1)):
+    # Broader below, so that both show where they agree.
+    for setting, colour, label, width in ((before, VERMILION, "before", 1.8), (after, BLUE, "after", 1.1)):
         recording = setting.result.recording
         style = {"linewidth": width, "drawstyle": "steps-post" if channel == "command" else "default"}
         marks.append(Mark("line", recording.time, recording[channel], label=label, colour=colour, style=style))

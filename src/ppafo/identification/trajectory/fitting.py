@@ -169,7 +169,11 @@ def _result(
     outliers: tuple[str, ...],
 ) -> TrajectoryFit:
     """Return the result of a finished search: estimates, updated tolerances, and the model beside each recording."""
-    conflict = conflict_in_words(fitted, "the model is incomplete") or _wandering(fitted, numbers)
+    remedy = "the model is incomplete"
+    is_free = any(number.path == _STATIC and not number.is_tolerance for number in numbers)
+    if fitted.conflict is not None and fitted.conflict.group == "angle" and not is_free:
+        remedy += f", or {_STATIC} is to be fitted too"
+    conflict = conflict_in_words(fitted, remedy) or _wandering(fitted, numbers)
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
     rows = [row for row, number in enumerate(numbers) if not number.is_tolerance]
     estimates = tuple(_estimate(problem, fitted, numbers[row], row, conflict) for row in rows)

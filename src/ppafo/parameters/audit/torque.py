@@ -95,22 +95,23 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
     lowest, highest = float(device.actuator.angle_min), float(device.actuator.angle_max)
     angles = [lowest + (highest - lowest) * number / _ANGLES for number in range(_ANGLES + 1)]
     downward, upward = zip(*(torque_reach(device, angle) for angle in angles), strict=True)
-    texts, sides, ceiling = [], [], 0.0
+    texts, sides = [], []
     for direction, torques in (("up", list(upward)), ("down", [-torque for torque in downward])):
         largest = max(torques)
         angle = math.degrees(angles[torques.index(largest)])
         texts.append(
-            f"{evidence.torque(largest, '#.3g')} {direction} at {angle:.3g} deg (over the range at least "
+            f"{evidence.torque(largest, '#.3g')} {direction} at {angle:.3g} deg (at other angles less, down to "
             f"{evidence.torque(min(torques), '#.3g')})"
         )
         sides.append(ComparedNumber(f"most {direction}", largest, "N m"))
-        ceiling = max(ceiling, largest)
+    ceiling = max(side.value for side in sides)
     static = evidence.number(_STATIC)
     sticks = static is not None and static >= ceiling
     yield AuditFinding(
         id="torque-ceiling",
         severity="error" if sticks else "note",
-        title=f"the supply allows at most {evidence.torque(ceiling, '#.3g')}",
+        title="the actuator gives at most "
+        + " and ".join(f"{evidence.torque(side.value, '#.3g')} {side.label.removeprefix('most ')}" for side in sides),
         values=evidence.values_of(*_SUPPLIES, _STATIC),
         sides=tuple(sides),
         paragraph=(

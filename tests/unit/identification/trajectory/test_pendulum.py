@@ -70,12 +70,11 @@ def swing(tmp_path_factory: pytest.TempPathFactory) -> FittedExperiment:
     return FittedExperiment("swing", hanging, recording, channels=("angle",))
 
 
-def fitted(swing: FittedExperiment, dynamic: FreeParameter, static: FreeParameter) -> TrajectoryFit:
+def fitted(swing: FittedExperiment, *friction: FreeParameter) -> TrajectoryFit:
     parameters = (
         FreeParameter("foot_plate.inertia", 0.1, 0.01, 1.0),
         FreeParameter("friction.viscous_damping", None, 0.0, 0.5),
-        dynamic,
-        static,
+        *friction,
     )
     tolerances = tolerance_parameters(Tolerances(held=0.0), (swing,), parameters)
     return fit(TrajectoryProblem((*parameters, *tolerances), (swing,)))
@@ -105,6 +104,11 @@ def test_friction_at_rest_keeps_the_bounds_that_it_was_given(swing: FittedExperi
     static = fitted(swing, dynamic, FreeParameter("friction.static_torque", None, 0.25, 0.5)).estimates[3]
     assert static.low == static.value == pytest.approx(0.25)
     assert not static.is_usable
+
+
+def test_friction_at_rest_of_the_set_that_stays_in_force_is_named(swing: FittedExperiment) -> None:
+    found = fitted(swing, FreeParameter("friction.dynamic_torque", **LOOSE))
+    assert found.conflict.endswith("the model is incomplete, or friction.static_torque is to be fitted too")
 
 
 def test_bounds_without_any_friction_at_rest_above_that_in_motion_are_refused(swing: FittedExperiment) -> None:

@@ -69,7 +69,13 @@ def alternatives_to(
     weak.sort(key=lambda candidate: -candidate.pair.torque)
     low.sort(key=lambda candidate: -candidate.pair.toes)
     nearest = [] if able else [_as_walked(group[0], bottle, shelf, report) for group in (weak, low) if group]
-    alternatives = list(filter(None, (_thriftiest(able, bottle, shelf, report), *nearest)))
+    thriftiest = _thriftiest(able, bottle, shelf, report)
+    # Where less pressure does not last either, the time at the required pressure is offered beside it.
+    if thriftiest is not None and thriftiest.requirements.seconds < requirements.seconds:
+        at_pressure = [candidate for candidate in able if candidate.requirements.pressure == requirements.pressure]
+        if thriftiest.requirements.pressure < requirements.pressure and at_pressure:
+            nearest.append(_thriftiest(at_pressure, bottle, shelf, report))
+    alternatives = list(filter(None, (thriftiest, *nearest)))
     yield from alternatives
     if not able:
         stronger = (

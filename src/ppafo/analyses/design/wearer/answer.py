@@ -31,10 +31,8 @@ from ppafo.wording import argument_text, override_text
 
 _HEAD = ("valve", "actuator", ("push-off peak", TORQUE), ("lowest toes", CLEARANCE))
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
-_NONE = (
-    "No device in the catalogue meets these requirements. Alternatives (examples), on the largest bottle (a design "
-    "takes the lightest that lasts):"
-)
+_NONE = "No device in the catalogue meets these requirements"
+_INSTEAD = "Alternatives (examples), on the largest bottle (a design takes the lightest that lasts):"
 _READING = (
     "Every pair of valve and actuator in the catalogue is simulated for a few strides at this pressure. Pairs with at "
     "least 95 % of the torque in the mean stride and the toes above the ground are simulated on bottles, lightest "
@@ -77,7 +75,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
             f"the lowest height of the toes in the healthy gait itself is {CLEARANCE.text(sizing.healthy_toes)}"
         )
     sections = (
-        (finding.Section(remarks=(_NONE, *sizing.instead)), table)
+        (finding.Section(remarks=(f"{_NONE}{_on_bottle(sizing)}. {_INSTEAD}", *sizing.instead)), table)
         if device is None
         else (*_sections(requirements, device), table, part_titles(sizing.parts))
     )
@@ -94,6 +92,19 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
         ),
         found=sizing,
         passed=device is not None,
+    )
+
+
+def _on_bottle(sizing: WearerSizing) -> str:
+    """Return a clause on the lightest pair that lacks only a bottle for the required time; empty without one."""
+    requirements = sizing.requirements
+    able = [pair for pair in sizing.tried if pair.has(requirements)]
+    if not able:
+        return ""
+    pair = min(able, key=lambda pair: pair.mass)
+    return (
+        f": {pair.valve.name} with {pair.actuator.name} has the torque and the toes, but on no bottle for "
+        f"{duration_text(requirements.seconds)}"
     )
 
 
