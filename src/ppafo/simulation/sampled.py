@@ -113,7 +113,15 @@ class SampledRun:
         pressures = program.actuator.pressures(self._plant, angle, mass_1, mass_2)
         if program.ideal_sensors:
             torque = program.actuator.torque(self._plant, angle, *pressures)
-            return GaitMeasurement(angle, *pressures, torque, heel_force, toe_force)
+            pressure_1, pressure_2 = pressures
+            return GaitMeasurement(
+                angle=angle,
+                pressure_1=pressure_1,
+                pressure_2=pressure_2,
+                torque=torque,
+                heel_force=heel_force,
+                toe_force=toe_force,
+            )
         measurement, self._last_measurement = measure_gait(
             self._sensors,
             self._gait_sensors,
