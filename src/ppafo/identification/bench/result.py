@@ -102,7 +102,7 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
     bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
     # Not 1e-17 where 0 is meant.
     value = value if bound is None else bound
-    # A part whose interval begins at its bound of zero is none, or not told from none.
+    # A part whose interval begins at its bound of zero cannot be distinguished from no part.
     is_part = reported.size is not None and number.low == 0.0 >= low
     if is_part and value < _NONE * (reported.size or 0.0):
         value = bound = 0.0

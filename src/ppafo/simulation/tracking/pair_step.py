@@ -57,7 +57,7 @@ def quicker_text(scenario: Scenario, dead_time: float) -> str:
     sampled = SAMPLES_LATE * scenario.controller.period
     if not is_pair(scenario):
         return "a higher `controller.rate`" if sampled > 0.5 * dead_time else "a faster valve"
-    # A pair accepts a command after its interval, and is told one after the samples: the longer of both counts.
+    # The longer of the valves' switching interval and the delay of sampling decides.
     interval = float(scenario.device.valve.settings["switching_interval"])
     return "faster valves together with a higher `controller.rate`" if sampled > interval else "faster valves"
 

@@ -1,7 +1,6 @@
 """Remarks on a run beside its verdict: stops that the joint reaches, and overridden sensor values without effect."""
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -82,14 +81,14 @@ def earlier_swing(result: "RecordedResult", follows: bool) -> str:
     limit, said = float(deviation_limit(settled, is_switched=False)), ""
     worst = limit if np.isfinite(limit) else 2.0 * LARGEST_SHARE * settled.wanted_change
     changes = np.flatnonzero(np.abs(np.diff(reference)) > SAME_LEVEL * extent(recording)) + 1
+    lengths = np.diff(changes, prepend=0)
     # Of each rest the second half is judged, as of the last one, which has the verdict.
-    for first, end in pairwise((0, *changes.tolist())):
+    for index in np.flatnonzero(lengths >= SHORTEST_HOLD * len(recording)).tolist():
+        first, end = int(changes[index] - lengths[index]), int(changes[index])
         half = slice((first + end) // 2, end)
-        error, turned = (value - reference)[half], float(np.ptp(recording["angle"][half]))
-        is_disturbed = scenario.controlled != ANGLE and turned > MOVED_JOINT
-        if end - first < SHORTEST_HOLD * len(recording) or is_disturbed or np.ptp(error) <= worst:
-            continue
-        if reversals(error, OSCILLATION_THRESHOLD * settled.wanted_change) > 1:
+        error = (value - reference)[half]
+        swings = np.ptp(error) > worst and reversals(error, OSCILLATION_THRESHOLD * settled.wanted_change) > 1
+        if swings and (scenario.controlled == ANGLE or np.ptp(recording["angle"][half]) <= MOVED_JOINT):
             worst, times = float(np.ptp(error)), f"from {recording.time[first]:.3g} s to {recording.time[end]:.3g} s"
             swing = f"the {CONTROLLED[scenario.controlled].words} swings by {change_text(scenario.controlled, worst)}"
             said = f"while the reference rests {times}, {swing}: the verdict is about the end of the run alone"
