@@ -76,11 +76,11 @@ class VariedPath:
             raise UnitError("a temperature difference must be given in K")
         return self._in_si(value, replace(self.quantity, unit=unit))
 
-    def quote(self, value: float) -> str:
-        """Format a value [SI] of the path for messages: six digits, in the unit in which it was given."""
+    def quote(self, value: float, digits: str = ".6g") -> str:
+        """Format a value [SI] of the path for messages: in the unit in which it was given."""
         unit = self.given or shown_unit(self.quantity.unit)
         unit, zero = (f"{split_pressure_kind(unit)[0]}_g", 0.0) if self.is_gauge else (unit, self.atmosphere)
-        return f"{shown_value(value, self.quantity.unit, unit, zero):.6g} {unit}".rstrip()
+        return f"{shown_value(value, self.quantity.unit, unit, zero):{digits}} {unit}".rstrip()
 
     def _in_si(self, value: str | float, quantity: Quantity) -> float:
         if isinstance(value, str):

@@ -142,7 +142,7 @@ def _verdict(outcome: FindResult, kind: Kind, missed: int) -> str:
         # The nearest one says whether a wider range could.
         row = int(np.searchsorted(tried["value"], outcome.nearest))
         nearest = f"{_SETTLED} of " if tried["judged"][row] > tried["metric"][row] else nearest
-        there = "" if outcome.verdicts else f"{nearest}{of_condition.text(tried['judged'][row])} at "
+        there = "" if is_verdict and outcome.verdicts else f"{nearest}{of_condition.text(tried['judged'][row])} at "
         ends = f"from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}"
         # Inside the range this number alone does not decide.
         other = ", inside the range: a finer grid, or other gains (ppafo tune), may meet it"
@@ -196,10 +196,9 @@ def _remarks(outcome: FindResult, kind: Kind, missed: int) -> Iterator[str]:
     evenly = np.count_nonzero(tried["is_of_grid"])
     met = np.count_nonzero(is_met)
     where = "everywhere" if is_met.all() else f"at {met} of them" if met else "nowhere"
-    yield (
-        f"{evenly} values from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}, evenly spaced, then "
-        f"{tried.size - evenly} more in the bracket; the condition is met {where}"
-    )
+    more = f", then {tried.size - evenly} more in the bracket" if tried.size > evenly else ""
+    ends = f"from {kind.text(tried['value'][0])} to {kind.text(tried['value'][-1])}"
+    yield f"{evenly} values {ends}, evenly spaced{more}; the condition is met {where}"
     if (changes := np.count_nonzero(np.diff(is_met))) > 1:
         side = "below" if outcome.highest else "above"
         yield f"the condition changes {changes} times over the range, so it is not met everywhere {side} this value"

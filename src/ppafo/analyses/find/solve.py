@@ -119,7 +119,8 @@ class FindResult:
     """Search result: tried values, ascending, as a structured array of ``TRIED``, and the counted ``runs``.
 
     ``remarks`` are on gains that follow the varied number, and on values kept from another kind or set. ``verdicts``
-    are values [SI] with the verdict of a run of their own, for the condition that the run follows. ``refusal`` is the
+    are values [SI] with the verdict of a run of their own: for the condition that the run follows, and for a loop that
+    fails at the nearest value. ``refusal`` is the
     reason why the outer neighbour of the value found is no valid value, and the path of the number that allows it; ""
     for a valid neighbour.
     """
@@ -247,20 +248,30 @@ def outermost(
     if neighbour is not None:
         search = replace(search, refusal=_refusal(base, path, neighbour, high if highest else low))
     # With noise a single run does not represent the mean over the noise streams.
-    if condition.text != FOLLOWS or seeds.size:
+    if seeds.size:
         return search
-    # The value found and its outer neighbour, or else the nearest value.
-    values = [search.nearest if index is None else float(search.tried["value"][index])]
-    values += [] if neighbour is None or any(search.refusal) else [neighbour]
-    verdicts = []
-    for value in values:
-        result = simulate(with_overrides(base, [f"{path.path}={value!r} {SI}"]))
-        said = result.following if result.tracking is None else result.tracking.found
-        lacking = float(np.max(shortfall(result.scenario)))
-        if result.tracking is None and lacking > 0.0 and changes_reach([path.path]):
-            said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
-        verdicts.append((value, "; ".join(filter(None, (said, standing_still(result, result.tracking is None))))))
-    return replace(search, verdicts=tuple(verdicts))
+    values: list[float] = []
+    if index is None:
+        # A loop that fails even at the nearest value is why no value meets the condition.
+        near = search.nearest
+        values = [] if search.tried["follows"][search.tried["value"] == near].all() else [near]
+    elif condition.text == FOLLOWS:
+        # The value found and its outer neighbour.
+        outer = [] if neighbour is None or any(search.refusal) else [neighbour]
+        values = [float(search.tried["value"][index]), *outer]
+    return replace(search, verdicts=tuple((value, _verdict(base, path, value)) for value in values))
+
+
+def _verdict(base: Scenario, path: VariedPath, value: float) -> str:
+    """Return the verdict on the run at a value [SI], a torque beyond the actuator's included."""
+    # Given in the unit of the range, the value and what is said of it are in that unit.
+    result = simulate(with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
+    tracking = result.tracking
+    said = result.following if tracking is None else "; ".join(filter(None, (tracking.found, tracking.cause)))
+    lacking = float(np.max(shortfall(result.scenario)))
+    if tracking is None and lacking > 0.0 and changes_reach([path.path]):
+        said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
+    return "; ".join(filter(None, (said, standing_still(result, tracking is None))))
 
 
 def _refusal(base: Scenario, path: VariedPath, value: float, end: float) -> tuple[str, str]:

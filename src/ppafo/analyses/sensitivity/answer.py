@@ -30,7 +30,7 @@ _MOST_SIZES = 3
 _TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
 _CAPTION = (
     "Left: indices with confidence bands, {filled} filled{open}. Right: convergence of the largest indices with the "
-    "sample size, in the colours and markers of the left panel."
+    "sample size, in the colours and markers of the left panel.{settings}"
 )
 
 
@@ -53,7 +53,9 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         panels=partial(_panels, influences),
         name="sensitivity",
         caption=_CAPTION.format(
-            filled=_TITLES[method.shown[0]], open="".join(f", {_TITLES[name]} open" for name in method.shown[1:])
+            filled=_TITLES[method.shown[0]],
+            open="".join(f", {_TITLES[name]} open" for name in method.shown[1:]),
+            settings=" Settings of the controller are recomputed in every run." if any(influences.gains[:1]) else "",
         ),
         across=2,
         size=(3.0, max(2.5, 0.9 + _INCHES_OF_A_BAR * len(influences.paths))),

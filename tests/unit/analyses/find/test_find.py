@@ -200,7 +200,15 @@ def test_the_command_prints_the_value_and_fails_where_there_is_none(capsys: pyte
         "4",
     ]
     assert main(words) == 1
-    assert "no supply.pressure from 40 psi_g to 55 psi_g meets" in capsys.readouterr().out
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith("no supply.pressure from 40 psi_g to 55 psi_g meets")
+    # The cause that the loop fails at the nearest value, in the unit of the range.
+    bar = [*words[:3], "supply.pressure=2..3 bar_g", *words[4:]]
+    assert main(bar) == 1
+    assert capsys.readouterr().out.splitlines()[1] == (
+        "at 3 bar_g the torque stays 1.65 N m below its reference (0.3 N m allowed); "
+        "at 75 deg and 3 bar_g the actuator gives at most 4.35 N m"
+    )
     assert main([*words, "--set", "reference.level=4 N m", "--highest", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["wanted"] == "highest"
 

@@ -3,12 +3,13 @@
 import itertools
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from ppafo.analyses.sensitivity.answer import overlapping_pairs, remarks
+from ppafo.analyses.sensitivity.answer import finding_of, overlapping_pairs, remarks
 from ppafo.analyses.sensitivity.methods import METHODS, EvaluatedBlocks, changes
 from ppafo.analyses.sensitivity.question import sensitivity
 from ppafo.analyses.sensitivity.solve import Influences, SensitivitySettings, analyse
@@ -275,6 +276,10 @@ def test_what_matters_for_the_error_and_what_for_the_gas() -> None:
     found = sensitivity(
         STUDY, metrics=["rms_error", "gas_supplied"], samples=256, configuration="proportional", independent=True
     ).found
+    # The figure says where the gains know the drawn device; those of this study are given.
+    assert finding_of(found).parts[-1].caption.endswith("of the left panel.")
+    following = replace(found, gains=("the gain is recomputed from the varied values", ""))
+    assert finding_of(following).parts[-1].caption.endswith("Settings of the controller are recomputed in every run.")
     error, gas = (dict(zip(found.paths, metric.indices.values["total"], strict=True)) for metric in found.metrics)
     assert {path for path, share in error.items() if share > 0.1} == {"supply.pressure", "actuator.torque_constant"}
     assert max(gas, key=lambda path: gas[path]) == "actuator.leak.area"
