@@ -1,6 +1,7 @@
 """Execution of scenarios by name, file or object: a vane alone or a walking leg."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from ppafo.simulation.simulate import Result
 
 if TYPE_CHECKING:
     from ppafo.simulation.gains import Gains
+    from ppafo.simulation.tracking import Tracking
 
 
 @checked
@@ -42,7 +44,14 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
     0.196 N m
     """
     name_plugins(plugins)
-    return of_loaded.simulate(scenario_or_load(scenario, overrides))
+    return replace(of_loaded.simulate(scenario_or_load(scenario, overrides)), tries=_tried)
+
+
+def _tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
+    """Return a verdict with the first of its remedies that succeeds in a further run."""
+    from ppafo.remedy_trials import tried
+
+    return tried(scenario, verdict)
 
 
 def gains(scenario: Scenario) -> "Gains | None":
@@ -77,4 +86,5 @@ def simulate_many(
     ['4.16e-04 kg', '1.16e-03 kg']
     """
     name_plugins(plugins)
-    return of_loaded.simulate_many([scenario_or_load(scenario) for scenario in scenarios], threads)
+    results = of_loaded.simulate_many([scenario_or_load(scenario) for scenario in scenarios], threads)
+    return [replace(result, tries=_tried) for result in results]

@@ -40,9 +40,13 @@ class Metric:
     def in_unit(self, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
         """Return the value in a unit, such as ``g`` or ``psi_g``; gauge relative to ``atmosphere`` [Pa absolute].
 
+        The metric's own ``unit`` gives the SI value, also ``-`` of a number without dimension; a ``Pa`` is absolute.
+
         Raises UnitError for a unit that does not fit.
         """
-        return from_si(self.value, unit, "Pa_a" if self.unit == "Pa" else self.unit, atmosphere)
+        if unit == self.unit:
+            return self.value
+        return from_si(self.value, unit, {"Pa": "Pa_a", "-": ""}.get(self.unit, self.unit), atmosphere)
 
 
 class Metrics(dict[str, Metric]):

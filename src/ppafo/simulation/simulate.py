@@ -2,7 +2,7 @@
 
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -86,18 +86,27 @@ class DeferredResult:
         return DeferredResult, (self(),)
 
 
+def _untried(_scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
+    """Return a verdict as it is."""
+    return verdict
+
+
 _in_own_units = in_units(lambda result, *_, **__: result.scenario.device.shown)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Result:
-    """Result of a finished run; ``versions`` are package versions, ``engine`` has step size and numbers of steps."""
+    """Result of a finished run; ``versions`` are package versions, ``engine`` has step size and numbers of steps.
+
+    ``tries`` gives a verdict a remedy that was tried in further runs; by default remedies are named untried.
+    """
 
     scenario: Scenario
     status: Status
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
     measured: DeferredResult
+    tries: "Callable[[Scenario, Tracking | None], Tracking | None]" = field(default=_untried, compare=False, repr=False)
 
     @property
     def recording(self) -> Recording:
@@ -125,9 +134,16 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Remarks on the use of the run: a missed reference, a stop, a too coarse pair of valves, replaced values."""
+        """Remarks on the use of the run: a missed reference, a stop, a too coarse pair of valves, replaced values.
+
+        Remedies of a missed reference are tried in further runs.
+        """
         no_warnings = (self.following, changed_text(changes_in(self.scenario)))
-        return tuple(sentence for sentence in self.sentences(self.tracking) if sentence not in no_warnings)
+        return tuple(sentence for sentence in self._said() if sentence not in no_warnings)
+
+    def _said(self) -> list[str]:
+        """Sentences on the run, with remedies that were tried."""
+        return self.sentences(self.tries(self.scenario, self.tracking))
 
     @_in_own_units
     def sentences(self, verdict: "Tracking | None") -> list[str]:
@@ -207,7 +223,7 @@ class Result:
         """Return the content of ``run.json`` as plain data in SI units, except the fields added by storage."""
         return {
             "status": plain(self.status),
-            "verdict": self.sentences(self.tracking),
+            "verdict": self._said(),
             "metrics": {name: plain(metric) for name, metric in self.metrics.items()},
             "versions": dict(self.versions),
             "seed": self.scenario.sensors.seed,

@@ -210,6 +210,10 @@ def test_times_and_units_are_at_hand(result: Result) -> None:
     assert result._ipython_key_completions_()[0] == "time"
     assert Metric(4.2e-4, "kg", "gas").in_unit("g") == pytest.approx(0.42)
     assert Metric(301325.0, "Pa", "pressure").in_unit("bar_g") == pytest.approx(2.0)
+    # The unit that a metric states is one that it takes.
+    for unit in ("Pa", "-", "kg", "J/kg"):
+        assert Metric(3.0, unit, "").in_unit(unit) == 3.0
+    assert (Metric(3.0, "-", "").in_unit(""), Metric(0.3, "-", "").in_unit("%")) == (3.0, 30.0)
     with pytest.raises(ppafo.ArgumentError, match=r"units='psi_g': must be units by channel"):
         result.to_dataframe("psi_g")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"plot\(\) got an unexpected keyword argument 'ax'"):

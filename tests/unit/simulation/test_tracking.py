@@ -1134,6 +1134,30 @@ def test_an_angle_that_lags_behind_a_wave_does_not_oscillate_in_a_sweep_either()
     assert metered.oscillates.tolist() == [0.0, 1.0]
 
 
+PULSES = {"kind": "smooth", "level": "0 N m", "period": "1.25 s", "value_01": "0 N m", "value_02": "3 N m"}
+PULSES |= {f"time_{number:02}": f"{time} s" for number, time in enumerate((0.3, 0.6, 0.9, 1.15), 2)}
+PULSED = ["controller.kind=pid", *(f"reference.{name}={text}" for name, text in PULSES.items()), "run.duration=8 s"]
+"""Pulses of torque with rests in between, followed with computed gains."""
+
+
+def test_a_table_that_a_late_loop_follows_late_does_not_oscillate_in_a_run_or_a_search() -> None:
+    base = load_scenario("torque-task-solenoid", ["device.valve=proportional", "controller.rate=1 kHz", *PULSED])
+    late = {"sensors.delay": np.array([0.0, 0.08, 0.1])}
+    alone = [simulate(with_numbers(base, {"sensors.delay": delay})).tracking for delay in late["sensors.delay"]]
+    assert [verdict and verdict.kind for verdict in alone] == [None, "does not follow", "does not follow"]
+    metered = excess(run_ensemble(base, late, with_companions([], base)).metrics, base, late)
+    assert (metered.follows.tolist(), metered.oscillates.tolist()) == ([1.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+
+
+def test_python_names_a_remedy_that_was_tried_as_the_command_does() -> None:
+    changes = ["device.valve=proportional", "controller.rate=1 kHz", *PULSED, "sensors.delay=80 ms"]
+    result = ppafo.simulate("torque-task-solenoid", changes)
+    assert result.tracking is not None
+    assert "as a further run shows" not in result.tracking.sentence
+    assert "as a further run shows" in result.warnings[0]
+    assert result.warnings[0] in str(result)
+
+
 QUICK = ["controller.proportional_gain=1 1/(N m)", "controller.integral_gain=10 1/(N m s)", "run.duration=10 s"]
 WAVE = ["reference.kind=sine", "reference.level=0 N m", "reference.frequency=0.2 Hz", *QUICK]
 """Torque task whose reference is a slow sine."""

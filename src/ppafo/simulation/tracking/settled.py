@@ -6,6 +6,7 @@ is all samples with a requested torque.
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,10 +18,11 @@ from ppafo.metrics.metric import Floats, controlled_in, extent, followed, hold_s
 from ppafo.metrics.settled import SHORTEST_HOLD, is_long_enough
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.metrics.tracking import SUSTAINED
+from ppafo.model.columns import first
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.parameters.reach import torque_reach
 from ppafo.signals import Recording
-from ppafo.simulation.profiles import limits_of, profile_bounds
+from ppafo.simulation.profiles import limits_of, profile_bounds, profile_values
 from ppafo.simulation.scenario import Scenario
 
 FEWEST_PERIODS = 0.5
@@ -54,7 +56,7 @@ class SettledPart(NamedTuple):
     largest_error: float = 0.0
     """Largest absolute error [SI]."""
     error_reversals: float = 0.0
-    """Number of reversals of the error beyond those of a moving reference; 0 below ``SUSTAINED``."""
+    """Number of reversals of the error beyond those of a lag behind a moving reference; 0 below ``SUSTAINED``."""
     value_range: float = 0.0
     """Range of the controlled quantity over the whole run [SI]."""
     peak: float = 0.0
@@ -139,8 +141,7 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
     rests = has_hold and (is_angle or float(np.ptp(recording["angle"][samples])) <= MOVED_JOINT)
     error_reversals = reversals(error, OSCILLATION_THRESHOLD * wanted)
     if not rests:
-        # The error of a loop that lags reverses whenever its reference does.
-        error_reversals -= reversals(np.asarray(settled_reference), OSCILLATION_THRESHOLD * wanted)
+        error_reversals -= _reversals_of_lag(settled_reference, np.gradient(settled_reference, time[samples]), wanted)
     steps = np.diff(reference)
     is_monotone = bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
     return SettledPart(
@@ -181,9 +182,10 @@ def settled_tasks(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
     rms, mean, error_reversals = (metrics[f"settled_{name}"] for name in ("error", "missing", "turns"))
     is_angle, hold = scenario.controlled == ANGLE, metrics["settled_share_of_hold"]
     rests = (hold >= SHORTEST_HOLD) & (is_angle or (metrics["settled_angle_range"] <= MOVED_JOINT))
-    # The error of a loop that lags reverses whenever its reference does, a sine twice a period.
     periods = _settled_periods(scenario)
-    error_reversals = error_reversals - np.where(rests | np.isinf(periods), 0.0, np.ceil(2.0 * periods))
+    if not np.all(rests):
+        of_lag = np.ceil(2.0 * periods) if np.isfinite(periods).all() else _profile_reversals(scenario, first(wanted))
+        error_reversals = error_reversals - np.where(rests, 0.0, of_lag)
     profile = PROFILES[scenario.reference.kind]
     numbers: dict[str, Any] = {
         "wanted_change": wanted,
@@ -212,6 +214,24 @@ def _settled_periods(scenario: Scenario) -> Any:
     """
     frequency = scenario.reference.settings.get("frequency")
     return math.inf if frequency is None else 0.5 * np.asarray(scenario.run.duration) * frequency
+
+
+def _reversals_of_lag(reference: Floats, rate: Floats, wanted: float) -> int:
+    """Reversals of the error of a loop that lags: those of the reference, or of its rate, with which the error goes."""
+    of_rate = reversals(rate, OSCILLATION_THRESHOLD * float(np.max(np.abs(rate))))
+    return max(reversals(reference, OSCILLATION_THRESHOLD * wanted), of_rate)
+
+
+def _profile_reversals(scenario: Scenario, wanted: float) -> int:
+    """``_reversals_of_lag`` in the second half of a run, from the profile of its reference.
+
+    Those of the first run hold for all: a level that varies leaves them as they are.
+    """
+    choice, duration = scenario.reference, float(first(scenario.run.duration))
+    single = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
+    times = np.arange(0.5 * duration, duration, float(first(scenario.run.output_interval)))
+    values, rate, _ = profile_values(single, times)
+    return _reversals_of_lag(values, rate, wanted)
 
 
 def _peak(scenario: Scenario, reference: Floats, value: Floats) -> float:
