@@ -61,8 +61,8 @@ class ReportedNumber:
 
 _AT_BOUND = 1.0e-6
 """Relative distance from a bound [-] up to which an estimate counts as at its bound."""
-_NONE = 0.01
-"""Size of a part [typical magnitudes] below which it is none if its interval begins at zero."""
+_NONE = 0.1
+"""Upper end of an interval that begins at zero [typical magnitudes], below which the part is none."""
 
 
 def result_of(
@@ -104,7 +104,7 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
     value = value if bound is None else bound
     # A part whose interval begins at its bound of zero cannot be distinguished from no part.
     is_part = reported.size is not None and number.low == 0.0 >= low
-    if is_part and value < _NONE * (reported.size or 0.0):
+    if is_part and high < _NONE * (reported.size or 0.0):
         value = bound = 0.0
     verdict: Verdict = "identified"
     sentence = f"{reported.text}; {widened_by(fitted, reported.path)}."

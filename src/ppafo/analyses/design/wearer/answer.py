@@ -104,7 +104,7 @@ def _on_bottle(sizing: WearerSizing) -> str:
     pair = min(able, key=lambda pair: pair.mass)
     return (
         f": {pair.valve.name} with {pair.actuator.name} has the torque and the toes, but on no bottle for "
-        f"{duration_text(requirements.seconds)}"
+        f"{requirements.seconds / 60.0:.4g} min"
     )
 
 

@@ -29,10 +29,15 @@ from ppafo.analyses.design.wearer.requirements import (
 from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of_wearer
 from ppafo.analyses.endurance.solve import WITHOUT_REST, endurance_of_walk_gas
 from ppafo.analyses.endurance.walk_gas import walk_gas
-from ppafo.parameters.bottles.bottle import bottle_part
+from ppafo.errors import StudyError
+from ppafo.parameters.bottles.bottle import bottle_part, load_bottle
+from ppafo.parameters.device import Device
 from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import DEFAULT, rated_pressure
 from ppafo.progress import Progress, Report
+from ppafo.units import SI
+from ppafo.units.shown import shown_text
+from ppafo.walking.bottle.supply import SET_PRESSURE, other_pressure
 from ppafo.walking.loading import load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import healthy_metrics
@@ -58,9 +63,11 @@ def size_for_wearer(
     Raises StudyError for impossible requirements, ParameterError for an invalid catalogue or bottle.
     """
     check_requirements(requirements)
-    shelf, walking = shelf_of(catalogue), load_walk(next(iter(WALKS.values())), of_wearer(requirements))
+    supply = f"supply.pressure={requirements.pressure!r} {SI}"
+    shelf, walking = shelf_of(catalogue), load_walk(next(iter(WALKS.values())), [*of_wearer(requirements), supply])
     if bottle is not None:
         part, species = bottle_part(bottle)
+        _check_regulator(bottle, walking.device)
         groups = {**shelf.groups, "bottles": {part.name: part}}
         shelf = replace(shelf, groups=groups, chosen_bottle=str(bottle))
         if species != walking.device.gas.species:
@@ -95,6 +102,19 @@ def size_for_wearer(
             f"{argument_text('catalogue')}",
         )
     return replace(sized, instead=instead)
+
+
+def _check_regulator(name: str | Path, device: Device) -> None:
+    """Raise StudyError if a bottle file sets its regulator to another pressure than that of the device."""
+    bottle = load_bottle(name)
+    if (own := other_pressure(name, bottle, device)) is None:
+        return
+    room, unit = device.supply.atmospheric_pressure, bottle.entries[SET_PRESSURE].unit
+    own_text, wanted = (
+        shown_text(pressure, "Pa_a", atmosphere=room, unit=unit) for pressure in (own, device.supply.pressure)
+    )
+    given = f"{argument_text('bottle', str(name))}: sets {SET_PRESSURE} to {own_text}"
+    raise StudyError(f"{given}, not to {argument_text('pressure')} = {wanted}: write {wanted} in the file")
 
 
 def _device(
