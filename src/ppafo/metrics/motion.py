@@ -164,7 +164,7 @@ METRICS = (
     MetricKind(
         "largest_speed",
         "rad/s",
-        "largest absolute angular velocity",
+        "largest absolute angular velocity of the samples",
         ("angular_velocity",),
         largest_speed,
         ReadAt(("meters.extremes.speed",)),

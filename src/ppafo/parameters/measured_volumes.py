@@ -251,7 +251,8 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
         raise ParameterError(
             f"{file}: {name} decreases with pressure at {_point_text(angles[row], pressures[column + 1])}, by "
             f"{shown_text(fall, 'm^3', '.3g')}; at most the last digit, {shown_text(resolution, 'm^3', '.3g')}, is "
-            "allowed: correct the volume, or round the volumes to the resolution of the measurement"
+            "allowed: correct the volume; round measured volumes to their resolution; for volumes from torques fit "
+            "a straight line of the torque over pressure, as rounding changes the torque"
         )
     sign, direction = (1.0, "grow") if name == "volume_1" else (-1.0, "shrink")
     wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= -unseen)

@@ -86,11 +86,6 @@ class DeferredResult:
         return DeferredResult, (self(),)
 
 
-def _untried(_scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
-    """Return a verdict as it is."""
-    return verdict
-
-
 _in_own_units = in_units(lambda result, *_, **__: result.scenario.device.shown)
 
 
@@ -98,7 +93,7 @@ _in_own_units = in_units(lambda result, *_, **__: result.scenario.device.shown)
 class Result:
     """Result of a finished run; ``versions`` are package versions, ``engine`` has step size and numbers of steps.
 
-    ``tries`` gives a verdict a remedy that was tried in further runs; by default remedies are named untried.
+    ``tries`` gives a verdict a remedy that was tried in further runs; without it remedies are named untried.
     """
 
     scenario: Scenario
@@ -106,7 +101,9 @@ class Result:
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
     measured: DeferredResult
-    tries: "Callable[[Scenario, Tracking | None], Tracking | None]" = field(default=_untried, compare=False, repr=False)
+    tries: "Callable[[Scenario, Tracking | None], Tracking | None] | None" = field(
+        default=None, compare=False, repr=False
+    )
 
     @property
     def recording(self) -> Recording:
@@ -139,11 +136,7 @@ class Result:
         Remedies of a missed reference are tried in further runs.
         """
         no_warnings = (self.following, changed_text(changes_in(self.scenario)))
-        return tuple(sentence for sentence in self._said() if sentence not in no_warnings)
-
-    def _said(self) -> list[str]:
-        """Sentences on the run, with remedies that were tried."""
-        return self.sentences(self.tries(self.scenario, self.tracking))
+        return tuple(sentence for sentence in self.to_dict()["verdict"] if sentence not in no_warnings)
 
     @_in_own_units
     def sentences(self, verdict: "Tracking | None") -> list[str]:
@@ -221,9 +214,10 @@ class Result:
     @_in_own_units
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``run.json`` as plain data in SI units, except the fields added by storage."""
+        verdict = self.tracking if self.tries is None else self.tries(self.scenario, self.tracking)
         return {
             "status": plain(self.status),
-            "verdict": self._said(),
+            "verdict": self.sentences(verdict),
             "metrics": {name: plain(metric) for name, metric in self.metrics.items()},
             "versions": dict(self.versions),
             "seed": self.scenario.sensors.seed,

@@ -141,7 +141,7 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
     rests = has_hold and (is_angle or float(np.ptp(recording["angle"][samples])) <= MOVED_JOINT)
     error_reversals = reversals(error, OSCILLATION_THRESHOLD * wanted)
     if not rests:
-        error_reversals -= _reversals_of_lag(settled_reference, np.gradient(settled_reference, time[samples]), wanted)
+        error_reversals -= int(_reversals_of_lag(scenario, wanted))
     steps = np.diff(reference)
     is_monotone = bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
     return SettledPart(
@@ -182,10 +182,8 @@ def settled_tasks(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
     rms, mean, error_reversals = (metrics[f"settled_{name}"] for name in ("error", "missing", "turns"))
     is_angle, hold = scenario.controlled == ANGLE, metrics["settled_share_of_hold"]
     rests = (hold >= SHORTEST_HOLD) & (is_angle or (metrics["settled_angle_range"] <= MOVED_JOINT))
-    periods = _settled_periods(scenario)
     if not np.all(rests):
-        of_lag = np.ceil(2.0 * periods) if np.isfinite(periods).all() else _profile_reversals(scenario, first(wanted))
-        error_reversals = error_reversals - np.where(rests, 0.0, of_lag)
+        error_reversals = error_reversals - np.where(rests, 0.0, _reversals_of_lag(scenario, first(wanted)))
     profile = PROFILES[scenario.reference.kind]
     numbers: dict[str, Any] = {
         "wanted_change": wanted,
@@ -201,7 +199,7 @@ def settled_tasks(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
         "ends_on_ramp": (hold <= 0.0) & profile.is_monotone,
         "reference_range": np.maximum(change, highest - lowest) if is_angle else 0.0,
         "reference_deviation": metrics["settled_wave"],
-        "reference_periods": periods,
+        "reference_periods": _settled_periods(scenario),
         "is_reference_smooth": profile.is_smooth,
     }
     return SettledPart(samples=slice(None), **numbers)
@@ -216,22 +214,21 @@ def _settled_periods(scenario: Scenario) -> Any:
     return math.inf if frequency is None else 0.5 * np.asarray(scenario.run.duration) * frequency
 
 
-def _reversals_of_lag(reference: Floats, rate: Floats, wanted: float) -> int:
-    """Reversals of the error of a loop that lags: those of the reference, or of its rate, with which the error goes."""
-    of_rate = reversals(rate, OSCILLATION_THRESHOLD * float(np.max(np.abs(rate))))
-    return max(reversals(reference, OSCILLATION_THRESHOLD * wanted), of_rate)
+def _reversals_of_lag(scenario: Scenario, wanted: float) -> Any:
+    """Reversals of the error of a loop that lags, in the second half of a run; an array (runs,) for a varied frequency.
 
-
-def _profile_reversals(scenario: Scenario, wanted: float) -> int:
-    """``_reversals_of_lag`` in the second half of a run, from the profile of its reference.
-
-    Those of the first run hold for all: a level that varies leaves them as they are.
+    They are those of the reference, or of its rate, with which such an error goes: twice a period of a sine. Of another
+    reference, those of the first run hold for all: a level that varies leaves them as they are.
     """
+    periods = _settled_periods(scenario)
+    if np.isfinite(periods).all():
+        return np.ceil(2.0 * periods)
     choice, duration = scenario.reference, float(first(scenario.run.duration))
     single = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
     times = np.arange(0.5 * duration, duration, float(first(scenario.run.output_interval)))
     values, rate, _ = profile_values(single, times)
-    return _reversals_of_lag(values, rate, wanted)
+    of_rate = reversals(rate, OSCILLATION_THRESHOLD * float(np.max(np.abs(rate))))
+    return max(reversals(values, OSCILLATION_THRESHOLD * wanted), of_rate)
 
 
 def _peak(scenario: Scenario, reference: Floats, value: Floats) -> float:

@@ -105,7 +105,7 @@ def size_for_wearer(
 
 
 def _check_regulator(name: str | Path, device: Device) -> None:
-    """Raise StudyError if a bottle file sets its regulator to another pressure than that of the device."""
+    """Raise StudyError if a bottle file sets its regulator to another pressure than the supply pressure."""
     bottle = load_bottle(name)
     if (own := other_pressure(name, bottle, device)) is None:
         return
