@@ -21,6 +21,8 @@ _NAME_LINE = re.compile(r"""^name *= *(["'])(.*?)\1""", re.MULTILINE)
 _PARENT_LINE = re.compile(r"^parent *=.*\n", re.MULTILINE)
 _TITLE_LINE = re.compile(r"^title *=.*$", re.MULTILINE)
 _NOTES = re.compile(r'^notes *= *""".*?"""\n', re.MULTILINE | re.DOTALL)
+_TABLE = re.compile(r"^(?=\[)", re.MULTILINE)
+_OF_THE_OTHER = "[reported.", "[[accepted]]"
 _FIRST_TABLE = re.compile(r"^\s*\[", re.MULTILINE)
 
 
@@ -190,6 +192,8 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
         # Title and notes are of the other device; the citation stays, to which the sources of its values refer.
         title = f"title = {value_text(f'{name}, from {Path(parent).stem}')}"
         rest = _NOTES.sub("", _TITLE_LINE.sub(lambda _: title, rest, count=1), count=1)
+        # What was reported of the other device, and accepted of it, is no evidence on this one.
+        rest = "".join(part for part in _TABLE.split(rest) if not part.startswith(_OF_THE_OTHER))
     text = f'{head}name = "{name}"{rest}'
     # A file of the package shows in its first lines how it is run.
     renamed = {named[2]: shlex.quote(str(path)), f"out/{named[2]}": f"out/{name}"}

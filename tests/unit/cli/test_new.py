@@ -53,8 +53,9 @@ def test_the_set_of_the_template_passes_the_audit() -> None:
 def test_what_a_copy_of_a_set_accepts_lapses_where_it_changes_a_value_of_the_finding(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    main(["new", "set", "own", "--from", "ppafo2011"])
-    assert "written: own.toml, still with values, sources and citation of ppafo2011; next: " in capsys.readouterr().out
+    shipped = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text("utf-8")
+    of_child = re.sub(r"^parent = .*$", 'parent = "ppafo2011"', shipped, count=1, flags=re.MULTILINE)
+    Path("own.toml").write_text(of_child.replace('name = "ppafo2011"', 'name = "own"', 1), encoding="utf-8")
     same = {finding.id: finding.accepted for finding in findings_of(load_parameter_set("own.toml"))}
     assert same["flow-of-solenoid"].startswith("As for the proportional valve")
     text = Path("own.toml").read_text(encoding="utf-8")
@@ -70,6 +71,16 @@ def test_what_a_copy_of_a_set_accepts_lapses_where_it_changes_a_value_of_the_fin
     assert "of them concern no changed value; --all shows them" in few
     assert main(["sets", "audit", "own.toml", "--all"]) == 1
     assert "[flow-of-proportional]" in capsys.readouterr().out
+
+
+def test_what_was_reported_of_the_paper_s_device_is_no_evidence_on_a_copy(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["new", "set", "own", "--from", "ppafo2011"])
+    assert "written: own.toml, still with values, sources and citation of ppafo2011; next: " in capsys.readouterr().out
+    text = Path("own.toml").read_text(encoding="utf-8")
+    assert ("[reported." in text, "[[accepted]]" in text) == (False, False)
+    # A valve of one's own, whose flow nobody reported.
+    Path("own.toml").write_text(text.replace("value = 12.6\n", "value = 5.0\n", 1), encoding="utf-8")
+    assert not [one.id for one in findings_of(load_parameter_set("own.toml")) if one.id.startswith("flow-of")]
 
 
 @pytest.mark.parametrize("device", ["ppafo2011", "my-device.toml"])
@@ -100,6 +111,8 @@ def test_every_file_of_the_package_is_copied_under_a_new_name_and_loads(kind: st
         assert f'title = "my-own, from {source}"' in made.split("\n")
         own = r'^(parent|title) = [^\n]*\n|^notes = """.*?"""\n'
         made, first = (re.sub(own, "", text, flags=re.MULTILINE | re.DOTALL) for text in (made, first))
+        parts = re.split(r"^(?=\[)", first, flags=re.MULTILINE)
+        first = "".join(part for part in parts if not part.startswith(("[reported.", "[[accepted]]")))
     differing = [line for old, line in zip(first.split("\n"), made.split("\n"), strict=True) if old != line]
     assert 'name = "my-own"' in differing
     assert all(line == 'name = "my-own"' or line.startswith("#   ppafo ") for line in differing)
