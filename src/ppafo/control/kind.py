@@ -98,7 +98,8 @@ class ProfileKind:
     rises, only falls or is constant, so that its extremes over an interval are at both ends. ``is_smooth`` is True for
     a profile without corners: a corner in the motion of the shank would be an impact on the foot.
     ``until_jump(parameters, time)`` returns the time [s], above 0, until the next jump of the second derivative of a
-    smooth profile; None without jumps.
+    smooth profile; None without jumps. ``period(parameters)`` returns the time [s] after which a table repeats; None
+    for other profiles.
     """
 
     name: str
@@ -111,6 +112,7 @@ class ProfileKind:
     is_monotone: bool = False
     is_smooth: bool = False
     until_jump: Callable[[Any, float], float] | None = None
+    period: Callable[[Any], float] | None = None
 
 
 class PythonController(Protocol):

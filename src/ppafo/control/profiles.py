@@ -167,6 +167,11 @@ def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, f
     return profile.level + segment.first + rate * (place - segment.start), rate, 0.0
 
 
+def table_period(profile: TabulatedProfile) -> float:
+    """Return the time [s] after which a table repeats."""
+    return profile.period
+
+
 def table_bounds(profile: TabulatedProfile) -> tuple[float, float]:
     """Lowest and highest value [N m or rad] of the used knots, with the offset ``level``."""
     lowest, highest = profile.value_01, profile.value_01
@@ -312,6 +317,7 @@ TABLE = ProfileKind(
     value=table_value,
     bounds=table_bounds,
     differences=_VALUES,
+    period=table_period,
 )
 
 SMOOTH = ProfileKind(
@@ -324,4 +330,5 @@ SMOOTH = ProfileKind(
     differences=_VALUES,
     is_smooth=True,
     until_jump=until_knot,
+    period=table_period,
 )

@@ -1,6 +1,7 @@
 """Settled part of a run without recording: numbers for the tracking verdict.
 
-The settled part is the second half of the hold, or of the run if the reference rests for less than a tenth of the run.
+The settled part is the second half of the hold, or of the run if the reference rests for less than a tenth of the run,
+or repeats within it.
 These numbers are for verdicts only: no table and no study lists them.
 """
 
@@ -89,7 +90,8 @@ def update_settled(state: _SettledSums, course: ReferenceSummary, sample: Sample
     # The first sample of a half is that from which on twice its number is at least this.
     of_run, of_hold = course.samples - 1.0, course.hold_start + course.samples - 1.0
     twice = 2.0 * sample.number
-    rests = course.hold_start <= sample.number and is_long_enough(course.hold_start, course.samples)
+    is_hold = course.is_repeated == 0.0 and is_long_enough(course.hold_start, course.samples)
+    rests = course.hold_start <= sample.number and is_hold
     half_of_run = twice >= of_run and twice < of_run + 2.0
     half_of_hold = rests and twice >= of_hold and twice < of_hold + 2.0
     anew = half_of_run or half_of_hold
@@ -156,8 +158,9 @@ def read_reversals(readings: Readings) -> Floats:
 
 
 def read_share_of_hold(readings: Readings) -> Floats:
-    """Metric ``settled_share_of_hold`` [-]: duration of the hold divided by duration of the run."""
-    return np.asarray((readings.samples - 1 - readings.course.hold_start) / (readings.samples - 1))
+    """Metric ``settled_share_of_hold`` [-]: duration of the hold divided by that of the run; 0 between repetitions."""
+    share = (readings.samples - 1 - readings.course.hold_start) / (readings.samples - 1)
+    return np.asarray(share * (1.0 - readings.course.is_repeated))
 
 
 def _of_sums(*names: str, by: Callable[..., Floats] | None = None) -> ReadAt:

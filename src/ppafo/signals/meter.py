@@ -98,7 +98,7 @@ class ReferenceSummary(NamedTuple):
     ``last`` is the last value. ``largest`` is the largest distance over all samples from 0 for a torque, otherwise from
     the initial value of the controlled quantity. ``tolerance`` is the difference from the last value up to which the
     reference rests. ``hold_start`` is the number of the sample after the last one not at rest, ``samples`` the number
-    of samples.
+    of samples. ``is_repeated`` is 1 for a table that repeats within the run, whose last rest is one of many, else 0.
     """
 
     last: float
@@ -106,6 +106,7 @@ class ReferenceSummary(NamedTuple):
     tolerance: float
     hold_start: float
     samples: float
+    is_repeated: float = 0.0
 
 
 SAME_LEVEL = 1.0e-9

@@ -1149,6 +1149,22 @@ def test_a_table_that_a_late_loop_follows_late_does_not_oscillate_in_a_run_or_a_
     assert (metered.follows.tolist(), metered.oscillates.tolist()) == ([1.0, 0.0, 0.0], [0.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize("duration", ["3.75 s", "4 s"])
+def test_a_table_that_repeats_is_judged_by_its_pulses_and_not_by_its_last_rest(duration: str) -> None:
+    pulses = [*(text for text in PULSED if not text.startswith(("run.", "reference.kind"))), "reference.kind=tabulated"]
+    task = ["device.valve=proportional", "controller.rate=10 Hz", *pulses, f"run.duration={duration}"]
+    base = load_scenario("torque-task-solenoid", task)
+    columns = {"sensors.delay": np.array([0.0])}
+    assert simulate(base).tracking is not None
+    metered = run_ensemble(base, columns, with_companions([], base)).metrics
+    assert excess(metered, base, columns).follows.tolist() == [0.0]
+    # A table that ends once is judged by where it ends.
+    once = load_scenario("torque-task-solenoid", [text.replace("=1.25 s", "=9 s") for text in task])
+    assert simulate(once).tracking is None
+    metered = run_ensemble(once, columns, with_companions([], once)).metrics
+    assert excess(metered, once, columns).follows.tolist() == [1.0]
+
+
 def test_python_names_a_remedy_that_was_tried_as_the_command_does() -> None:
     changes = ["device.valve=proportional", "controller.rate=1 kHz", *PULSED, "sensors.delay=80 ms"]
     result = ppafo.simulate("torque-task-solenoid", changes)

@@ -144,8 +144,17 @@ def begin_reference_summary(parts: Program, lane: Lane, interval: float, last_in
     first, last = reference_of_sample(parts, lane, 0, interval), reference_of_sample(parts, lane, last_index, interval)
     origin = reference_origin(parts, lane)
     largest = max(abs(first - origin), abs(last - origin))
+    is_repeated = 0.0
+    if parts.reference.period is not None:
+        duration = last_index * interval * lane.timing.step
+        is_repeated = 1.0 if parts.reference.period(lane.reference) < duration else 0.0
     lane.course = ReferenceSummary(
-        last=last, largest=largest, tolerance=SAME_LEVEL * largest, hold_start=0.0, samples=last_index + 1.0
+        last=last,
+        largest=largest,
+        tolerance=SAME_LEVEL * largest,
+        hold_start=0.0,
+        samples=last_index + 1.0,
+        is_repeated=is_repeated,
     )
 
 

@@ -22,7 +22,7 @@ from ppafo.model.columns import first
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.parameters.reach import torque_reach
 from ppafo.signals import Recording
-from ppafo.simulation.profiles import limits_of, profile_bounds, profile_values
+from ppafo.simulation.profiles import limits_of, profile_bounds, profile_parameters, profile_values
 from ppafo.simulation.scenario import Scenario
 
 FEWEST_PERIODS = 0.5
@@ -129,7 +129,10 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
     reference, value = followed(recording)
     time, count = recording.time, len(recording)
     hold = hold_start(recording)
-    has_hold = hold is not None and is_long_enough(hold, count)
+    period = PROFILES[scenario.reference.kind].period
+    # A rest between repetitions is not what the task ends with.
+    is_repeated = period is not None and period(profile_parameters(scenario.reference)) < time[-1] - time[0]
+    has_hold = hold is not None and is_long_enough(hold, count) and not is_repeated
     first = hold if has_hold and hold is not None else 0
     samples, last_half = slice((first + count) // 2, None), slice((first + 3 * count) // 4, None)
     error, settled_reference, start = (value - reference)[samples], reference[samples], float(time[samples][0])

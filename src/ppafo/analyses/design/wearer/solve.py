@@ -35,7 +35,6 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import DEFAULT, rated_pressure
 from ppafo.progress import Progress, Report
-from ppafo.units import SI
 from ppafo.units.shown import shown_text
 from ppafo.walking.bottle.supply import SET_PRESSURE, other_pressure
 from ppafo.walking.loading import load_walk
@@ -63,11 +62,10 @@ def size_for_wearer(
     Raises StudyError for impossible requirements, ParameterError for an invalid catalogue or bottle.
     """
     check_requirements(requirements)
-    supply = f"supply.pressure={requirements.pressure!r} {SI}"
-    shelf, walking = shelf_of(catalogue), load_walk(next(iter(WALKS.values())), [*of_wearer(requirements), supply])
+    shelf, walking = shelf_of(catalogue), load_walk(next(iter(WALKS.values())), of_wearer(requirements))
     if bottle is not None:
         part, species = bottle_part(bottle)
-        _check_regulator(bottle, walking.device)
+        _check_regulator(bottle, walking.device, requirements.pressure)
         groups = {**shelf.groups, "bottles": {part.name: part}}
         shelf = replace(shelf, groups=groups, chosen_bottle=str(bottle))
         if species != walking.device.gas.species:
@@ -104,15 +102,14 @@ def size_for_wearer(
     return replace(sized, instead=instead)
 
 
-def _check_regulator(name: str | Path, device: Device) -> None:
-    """Raise StudyError if a bottle file sets its regulator to another pressure than the supply pressure."""
+def _check_regulator(name: str | Path, device: Device, pressure: float) -> None:
+    """Raise StudyError if a bottle file sets its regulator to another pressure than the required one [Pa absolute]."""
     bottle = load_bottle(name)
+    device = replace(device, supply=replace(device.supply, pressure=pressure))
     if (own := other_pressure(name, bottle, device)) is None:
         return
     room, unit = device.supply.atmospheric_pressure, bottle.entries[SET_PRESSURE].unit
-    own_text, wanted = (
-        shown_text(pressure, "Pa_a", atmosphere=room, unit=unit) for pressure in (own, device.supply.pressure)
-    )
+    own_text, wanted = (shown_text(number, "Pa_a", atmosphere=room, unit=unit) for number in (own, pressure))
     given = f"{argument_text('bottle', str(name))}: sets {SET_PRESSURE} to {own_text}"
     raise StudyError(f"{given}, not to {argument_text('pressure')} = {wanted}: write {wanted} in the file")
 
