@@ -40,6 +40,7 @@ class Fit:
     that the recordings do not determine, as weights of variables relative to their values. ``shares``: for each
     variable, the tolerances that contribute to its variance, with fractions [-], largest first. ``evaluations``: number
     of model runs.
+    ``log_likelihood``: log-likelihood [-] of whitened residuals and priors, up to a constant of the readings.
     ``sensors``: noise model by channel. ``jacobian``: whitened Jacobian [1/SI]. ``edge``: unknowns that the search
     drives to values at which no run succeeds, with the direction, 1 upwards or -1 downwards; such a search has not
     converged.
@@ -59,6 +60,7 @@ class Fit:
     shares: Mapping[str, tuple[tuple[str, float], ...]]
     evaluations: int
     has_converged: bool
+    log_likelihood: float
     sensors: Mapping[str, Noise]
     jacobian: Floats
     confidence: float
@@ -143,7 +145,7 @@ def fit(
     for start in _other_starts(runs, best):
         report(Progress("fit: another start, which fits better than the first result"))
         other = _fit_from(runs, start, confidence)
-        if _likelihood(runs, other) > _likelihood(runs, best) + _BETTER:
+        if other.log_likelihood > best.log_likelihood + _BETTER:
             best = other
     return replace(best, evaluations=runs.evaluations)
 
@@ -191,6 +193,7 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         evaluations=runs.evaluations,
         # A search whose steps all leave the region in which runs succeed has no minimum.
         has_converged=-math.inf < end.gain < _CONVERGED,
+        log_likelihood=_log_likelihood(runs, point, linear.sensors),
         sensors=linear.sensors,
         jacobian=jacobian / runs.scale,
         confidence=confidence,
@@ -357,13 +360,13 @@ def _edge(runs: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
     return {runs.numbers[index].name: int(np.sign(step[index])) for index in indices.tolist()}
 
 
-def _likelihood(runs: FitRuns, fitted: Fit) -> float:
-    """Return the log-likelihood [-] of whitened residuals and priors, up to a constant."""
+def _log_likelihood(runs: FitRuns, point: Floats, sensors: Mapping[str, Noise]) -> float:
+    """Return the log-likelihood [-] of whitened residuals and priors at a scaled point, up to a constant."""
     size = 0.0
     for block in runs.blocks:
-        noise, count = fitted.sensors[block.channel], block.rows.stop - block.rows.start
+        noise, count = sensors[block.channel], block.rows.stop - block.rows.start
         size += count * (math.log(noise.deviation) + math.log(noise.innovation))
-    return -size - 0.5 * float(np.square((fitted.values / runs.scale - runs.start) * runs.prior).sum())
+    return -size - 0.5 * float(np.square((point - runs.start) * runs.prior).sum())
 
 
 def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:

@@ -27,7 +27,7 @@ from ppafo.identification.bench.static_torque import static_torque
 from ppafo.identification.bench.torque_readings import FORCE, TORQUE
 from ppafo.identification.bench.valve_map import CHANNELS as VALVE_MAP_CHANNELS
 from ppafo.identification.bench.valve_map import valve_map
-from ppafo.identification.bench.vane_leak import vane_leak
+from ppafo.identification.bench.vane_leak import GAP, vane_leak
 from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import RecordingSource
@@ -246,9 +246,9 @@ class VaneLeakProblem(StrictTable):
     start: _Start = None
     end: _End = None
     angle: Text | None = Field(None, description="vane angle, from which the set's volumes follow")
-    law: Literal["orifice", "laminar", "both"] = Field(
+    law: Literal["orifice", "iso6358", "laminar", "both"] = Field(
         "orifice",
-        description="flow law; an orifice in the form of the set; 'both': orifice and laminar gap in parallel",
+        description="flow law; an orifice in the form of the set; 'iso6358': C and b; 'both': orifice and laminar gap",
     )
     volume_1: Text | None = Field(
         None, description="volume of chamber 1 with its line, '40 cm^3'; known to 5 %, or to bench.held"
@@ -289,9 +289,10 @@ class VaneLeakProblem(StrictTable):
         """Identify the leak between the chambers from recordings."""
         first, second, deviation = self.volumes_of(context)
         start, end = times_of(self, context.label)
-        return vane_leak(
+        gas = context.gas(self, sources)
+        result = vane_leak(
             sources,
-            context.gas(self, sources),
+            gas,
             first,
             second,
             discharge_coefficient=number_in_si(context.parameter_set, "actuator.leak.discharge_coefficient"),
@@ -303,6 +304,19 @@ class VaneLeakProblem(StrictTable):
             tolerances=context.tolerances,
             volume_deviation=deviation,
         )
+        own = number_in_si(with_followers(context.parameter_set), "gas.molar_mass")
+        gap = next((each for each in result.estimates if each.path == GAP and each.is_usable and each.value), None)
+        if gap is None or own is None or abs(own / gas.molar_mass - 1.0) < _SAME_GAS:
+            return result
+        # The flow of a laminar gap goes with 1 / (R T viscosity), that of an orifice needs no viscosity.
+        remark = (
+            f"{GAP} is not written to the set: the coefficient is for the gas of the bench, and the gas of the set is "
+            f"another; multiply it by {own / gas.molar_mass:.3g} (ratio of the molar masses) and by the viscosity of "
+            "the gas of the bench over the viscosity of the gas of the set, and give the product in device.overrides"
+        )
+        of_bench = replace(gap, path="vane_leak.laminar_coefficient")
+        estimates = tuple(of_bench if item is gap else item for item in result.estimates)
+        return replace(result, estimates=estimates, remarks=(*result.remarks, remark))
 
 
 class ValveMapProblem(StrictTable):

@@ -405,6 +405,29 @@ def test_a_leak_in_the_form_of_the_standard_is_written_in_that_form(bench: Path)
     assert numbers["actuator.leak.critical_ratio"].origin == "assumed"
     assert "actuator.leak.area" not in numbers
     assert outcome.new_set.problem == ""
+    # The law seeks both numbers, whichever form the starting set has.
+    for name in ("sonic.toml", "ppafo2011"):
+        (bench / "problem.toml").write_text(f'{HEAD.replace("ppafo2011", name)}{LEAK}law = "iso6358"\n')
+        outcome = identify(bench / "problem.toml").found
+        assert outcome.new_set.written == ("actuator.leak.sonic_conductance", "actuator.leak.critical_ratio")
+        numbers = outcome.new_set.parameter_set.numbers
+        leak = {path.removeprefix("actuator.leak.") for path in numbers if path.startswith("actuator.leak.")}
+        assert leak == {"sonic_conductance", "critical_ratio"}
+        assert outcome.new_set.problem == ""
+        assert outcome.is_good
+
+
+def test_a_laminar_coefficient_of_another_gas_is_not_written_to_the_set(bench: Path, solved: Solve) -> None:
+    write_csv(bench / "laminar.csv", planted.leak("laminar", 0.64e-16).recording)
+    both = LEAK.replace("leak.csv", "laminar.csv") + 'law = "both"\n'
+    gap = "effects.laminar_leak.coefficient"
+    assert gap in solved(f'{both}gas = "CO2"\n').new_set.written
+    of_air = solved(f'{both}gas = "air"\n')
+    assert gap not in of_air.new_set.parameter_set.numbers
+    assert of_air.results[0]["vane_leak.laminar_coefficient"].is_identified
+    (remark,) = of_air.results[0].remarks
+    assert f"{gap} is not written to the set" in remark
+    assert "multiply it by 1.52 (ratio of the molar masses)" in remark
 
 
 @pytest.mark.parametrize(

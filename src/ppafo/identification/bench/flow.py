@@ -7,9 +7,11 @@ With r the ratio of downstream to upstream pressure and k the heat capacity rati
     ISO 6358   C rho_0 sqrt(T_0 / T) P_up phi(r),   phi = 1 up to b, then sqrt(1 - ((r - b) / (1 - b))^2)
     laminar    c (P_a^2 - P_b^2)
     both       a laminar gap in parallel with an orifice, or with ISO 6358 of known critical ratio
+
+Of ISO 6358, C is the choked flow, and b is observable only from both choked and subsonic flow.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, NamedTuple
@@ -18,6 +20,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
+from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import PooledReadings, Values, solve, sought, tolerance, within
 from ppafo.identification.bench.result import ReportedNumber
 from ppafo.identification.fit import Fit
@@ -39,8 +42,10 @@ PRODUCT_ONLY = 1.0
 """Known factor of an orifice if neither Cd [-] nor the area [m^2] is known: the fitted size is the product Cd A."""
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358 [-] in an estimation: start, lowest and highest value."""
+_SPAN, _SUBSONIC = 0.15, 0.6
+"""Least span and least maximum of the pressure ratios [-] needed to fit both parameters of ISO 6358."""
 NEXT_LAW: Mapping[Law, str] = {
-    "orifice": "try law = 'both', or law = 'iso6358' for a valve",
+    "orifice": "try law = 'both' or law = 'iso6358'",
     "laminar": "try law = 'both'",
     "iso6358": "try law = 'both'",
     "both": "neither an orifice nor a laminar gap nor both in parallel explain the readings",
@@ -151,6 +156,24 @@ def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> 
     return np.asarray(np.sign(first - second) * flow * np.minimum((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0))
 
 
+def has_both_regimes(ratio: Floats) -> bool:
+    """Return True if the pressure ratios [-] cover choked and subsonic flow, which C and b of ISO 6358 need."""
+    return bool(np.ptp(ratio) >= _SPAN and ratio.max() >= _SUBSONIC)
+
+
+def check_both_regimes(ratio: Floats, name: str, procedure: str) -> None:
+    """Raise IdentificationError if the pressure ratios [-] do not determine both C and b of ISO 6358.
+
+    ``name`` is the recording in the message.
+    """
+    if not has_both_regimes(ratio):
+        raise IdentificationError(
+            f"{name}: {procedure}: C and b need readings with choked and with subsonic flow: the pressure ratios must "
+            f"cover a range of at least {_SPAN:g} and reach {_SUBSONIC:g}, but lie between {ratio.min():.3g} and "
+            f"{ratio.max():.3g}; measure at more pressures, or check the units of the pressures"
+        )
+
+
 class OpeningSizes(NamedTuple):
     """Sizes of an opening, the unknowns of a flow fit.
 
@@ -177,6 +200,11 @@ class Opening:
     known: float = PRODUCT_ONLY
     critical_ratio: float | None = None
 
+    @property
+    def has_sought_ratio(self) -> bool:
+        """True if the critical ratio b of ISO 6358 is estimated."""
+        return self.law == "iso6358" and self.critical_ratio is None
+
     def flow(self, sizes: OpeningSizes, first: Floats, second: Floats) -> Floats:
         """Return the mass flow [kg/s] for pressures [Pa], positive from first to second."""
         laminar = np.asarray(first**2 - second**2)
@@ -190,13 +218,17 @@ class Opening:
             through = sizes.size * per_size * orifice_shape(first, second, self.gas.heat_capacity_ratio)
         return through + sizes.beside * laminar if self.law == "both" else through
 
-    def rough_sizes(self, first: Floats, second: Floats, flow: Floats) -> tuple[OpeningSizes, OpeningSizes]:
+    def rough_sizes(
+        self, first: Floats, second: Floats, flow: Floats, ratios: Sequence[float] = CRITICAL_RATIOS[:1]
+    ) -> tuple[OpeningSizes, OpeningSizes]:
         """Return start sizes by non-negative least squares, and the sizes if each part alone carried the whole flow.
 
-        The flow is linear in the sizes; the nonlinear critical ratio is set to its usual value.
+        The flow is linear in the sizes; the nonlinear critical ratio is the best of ``ratios``, by default its usual
+        value.
         """
-        ratio = CRITICAL_RATIOS[0]
-        parts = [self.flow(OpeningSizes(1.0, ratio), first, second)]
+        units = {ratio: self.flow(OpeningSizes(1.0, ratio), first, second) for ratio in ratios}
+        ratio = max(units, key=lambda each: abs(float(units[each] @ flow)) / float(np.linalg.norm(units[each])))
+        parts = [units[ratio]]
         parts += [self.flow(OpeningSizes(0.0, ratio, 1.0), first, second)] if self.law == "both" else []
         columns = np.stack(parts, axis=1)
         alone = np.linalg.norm(flow) / np.linalg.norm(columns, axis=0)
@@ -220,7 +252,7 @@ class Paths(NamedTuple):
         scale = alone.size if self.beside else 0.0
         return (
             sought(self.size, start.size, 0.0, scale=scale),
-            *((sought(self.critical_ratio, *CRITICAL_RATIOS),) if self.critical_ratio else ()),
+            *(sought(name, start.critical_ratio, *CRITICAL_RATIOS[1:]) for name in (self.critical_ratio,) if name),
             *((sought(self.beside, start.beside, 0.0, scale=alone.beside),) if self.beside else ()),
         )
 
@@ -228,11 +260,16 @@ class Paths(NamedTuple):
 def reported_parts(
     opening: Opening, size: ReportedNumber, gap: ReportedNumber, alone: OpeningSizes
 ) -> tuple[list[ReportedNumber], Paths]:
-    """Return the reported sizes of an opening, for the law ``both`` also of its gap, and their names in the fit.
+    """Return the reported sizes of an opening, with its gap or its sought critical ratio, and their names in the fit.
 
+    The critical ratio has its path in the section of ``size``.
     The magnitudes of parallel parts are the sizes ``alone``, as if each part carried the whole flow: either part may be
     zero, which is a valid result.
     """
+    if opening.has_sought_ratio:
+        section = size.path.rpartition(".")[0]
+        ratio = ReportedNumber(f"{section}.critical_ratio", "", "Critical ratio b of ISO 6358")
+        return [size, ratio], Paths(size.path, ratio.path)
     if opening.law != "both":
         return [size], Paths(size.path)
     return [replace(size, size=alone.size), replace(gap, size=alone.beside)], Paths(size.path, beside=gap.path)
@@ -253,14 +290,16 @@ def solve_flow(
     readings: PooledReadings,
     tolerances: Tolerances,
     confidence: float,
+    ratios: Sequence[float] = CRITICAL_RATIOS[:1],
 ) -> tuple[Fit, Floats]:
     """Fit an opening to measured flow. Returns the fit and the fitted flow [kg/s].
 
+    A sought critical ratio starts from the best of ``ratios`` [-].
     ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second.
     """
     (first_name, shown_first), (second_name, shown_second) = pressures.items()
     flow = readings.measured
-    start, alone = opening.rough_sizes(shown_first, shown_second, flow)
+    start, alone = opening.rough_sizes(shown_first, shown_second, flow, ratios)
     numbers = (
         *paths.sought(start, alone),
         *flow_tolerances(opening.gas, tolerances, (first_name, second_name), float(np.abs(flow).max())),

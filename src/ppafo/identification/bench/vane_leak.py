@@ -13,6 +13,7 @@ gain common to both sensors does not change the rate at which D falls.
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -28,9 +29,9 @@ from ppafo.identification.bench.chamber_decay import (
 )
 from ppafo.identification.bench.checks import check_moves, check_not_clipped, check_sources
 from ppafo.identification.bench.flow import (
+    CRITICAL_RATIOS,
     GAS_LAW,
     LAW_NAMES,
-    NEXT_LAW,
     PRODUCT_ONLY,
     TEMPERATURE,
     GasAt,
@@ -38,17 +39,21 @@ from ppafo.identification.bench.flow import (
     Opening,
     OpeningSizes,
     Paths,
+    check_both_regimes,
     gas_tolerances,
+    has_both_regimes,
     reported_parts,
     solve_flow,
 )
 from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, tolerance, within
+from ppafo.identification.bench.leak_laws import RIVALS, LawFit, next_law, with_rival
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, meter_readings, without_wrong_samples
 from ppafo.identification.residuals import FitVariable
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances
 from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Panel
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
@@ -56,11 +61,17 @@ from ppafo.wording import count_of
 
 _FEWEST_STEADY = 8
 """Least number of readings of steady flow."""
-_GAP = ReportedNumber(
-    "effects.laminar_leak.coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside the orifice"
-)
+GAP = "effects.laminar_leak.coefficient"
+"""Path of the coefficient of a laminar gap beside the orifice in a set."""
+_GAP = ReportedNumber(GAP, "kg/(s Pa^2)", "Laminar coefficient of a gap beside the orifice")
+_TRIAL_RATIOS = tuple(np.linspace(*CRITICAL_RATIOS[1:], 20).tolist())
+"""Critical ratios [-], the best of which starts the search for steady flow.
+
+From the usual one, a search may end at a wrong minimum, with zeros of the sensors for the bend of the curve."""
 _SHARP = 0.6
 """Discharge coefficient of a sharp-edged hole [-]."""
+_Laws = tuple[tuple[Opening, ReportedNumber], ...]
+"""Chosen law and its rival, if it has one, each with its reported size."""
 _REMEDY = "{}, or give a start and an end; gas may leak elsewhere, or exchange heat with the walls"
 
 
@@ -74,13 +85,15 @@ def vane_leak(
     end: float | None = None,
     confidence: float = 0.95,
     critical_ratio: float | None = None,
-    law: Literal["orifice", "laminar", "both"] = "orifice",
+    law: Literal["orifice", "iso6358", "laminar", "both"] = "orifice",
     tolerances: Tolerances = DEFAULTS,
     volume_deviation: float = deviation_of_limit(HELD["actuator.dead_volume_1"]),
 ) -> BenchResult:
     """Identify the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
 
-    Recordings with a ``mass_flow`` are steady: the flow that maintains the pressure, at several pressures.
+    Recordings with a ``mass_flow`` are steady: the flow that maintains the pressure, at several pressures. The laws
+    ``iso6358`` and ``both`` are compared with each other: the values of one hold for this model only if the other one
+    explains the readings clearly better.
 
     Arguments:
         sources: recordings of both chamber pressures
@@ -89,8 +102,9 @@ def vane_leak(
         discharge_coefficient: Cd [-], with which an orifice gives an area; None for the product Cd A
         start, end: samples used of closed chambers [s]
         confidence: confidence level of the intervals [-]
-        critical_ratio: b of ISO 6358 [-], which selects the sonic conductance
-        law: ``laminar`` for a laminar coefficient, ``both`` for a laminar gap in parallel with the orifice
+        critical_ratio: b of ISO 6358 [-], which selects the sonic conductance for ``orifice`` and ``both``
+        law: ``iso6358`` for C and b, ``laminar`` for a laminar coefficient, ``both`` for a laminar gap in parallel with
+            the orifice
         tolerances: limits of the errors of the bench
         volume_deviation: relative standard deviation of a volume [-]
 
@@ -100,11 +114,11 @@ def vane_leak(
     Raises:
         IdentificationError: recordings that do not determine the leak; names file, sample and remedy
     """
-    form: Law = law if law != "orifice" or critical_ratio is None else "iso6358"
-    opening = Opening(gas, form, discharge_coefficient or PRODUCT_ONLY, critical_ratio)
-    size = _size(opening, discharge_coefficient)
+    laws = tuple(
+        _law(gas, each, discharge_coefficient, critical_ratio) for each in (law, RIVALS.get(law)) if each is not None
+    )
     if sources and all("mass_flow" in source.recording for source in sources):
-        return _steady_leak(sources, opening, size, tolerances, confidence)
+        return _steady_leak(sources, laws, tolerances, confidence)
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
     sources, remarks = without_wrong_samples(sources, PROCEDURE, CHANNELS, start, end)
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS)
@@ -117,16 +131,28 @@ def vane_leak(
             "chamber 1 empties in some recordings and chamber 2 in others; give each chamber its own [[procedure]]"
         )
     volumes = volume_1, volume_2
-    result = _closed_leak(sources, decays, opening, size, volumes, volume_deviation, tolerances, confidence)
+    result = _closed_leak(sources, decays, laws, volumes, volume_deviation, tolerances, confidence)
     return replace(result, remarks=(*remarks, *result.remarks))
+
+
+def _law(
+    gas: GasAt, law: Law, discharge_coefficient: float | None, critical_ratio: float | None
+) -> tuple[Opening, ReportedNumber]:
+    """Return the law of the leak and its reported size: path in a set, unit and description."""
+    # An orifice has the form of the set; the law ``iso6358`` seeks b.
+    is_standard = law == "orifice" and critical_ratio is not None
+    known_ratio = None if law == "iso6358" else critical_ratio
+    opening = Opening(gas, "iso6358" if is_standard else law, discharge_coefficient or PRODUCT_ONLY, known_ratio)
+    return opening, _size(opening, discharge_coefficient)
 
 
 def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumber:
     """Return the reported size of the leak: path in a set, unit and description."""
     if opening.law == "laminar":
         return ReportedNumber("vane_leak.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the leak")
-    if opening.critical_ratio is not None:
-        text = f"Sonic conductance of the leak with the set's b = {opening.critical_ratio:g}"
+    if opening.law == "iso6358" or opening.critical_ratio is not None:
+        ratio = opening.critical_ratio
+        text = "Sonic conductance C of the leak" + ("" if ratio is None else f" with the set's b = {ratio:g}")
         return ReportedNumber("actuator.leak.sonic_conductance", "m^3/(s Pa)", text)
     if discharge_coefficient:
         text = (
@@ -138,11 +164,7 @@ def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumb
 
 
 def _steady_leak(
-    sources: tuple[RecordingSource, ...],
-    opening: Opening,
-    size: ReportedNumber,
-    tolerances: Tolerances,
-    confidence: float,
+    sources: tuple[RecordingSource, ...], laws: _Laws, tolerances: Tolerances, confidence: float
 ) -> BenchResult:
     """Identify the leak from steady flow at several pressures, which separate the zero of the flow meter."""
     channels = (*CHANNELS, "mass_flow")
@@ -158,30 +180,45 @@ def _steady_leak(
     # A wrong law gives different sizes at low and at high pressures.
     is_high = difference > np.median(difference)
     halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
-    _, alone = opening.rough_sizes(first, second, flow)
-    reported, paths = reported_parts(opening, size, _GAP, alone)
-    fitted, model = solve_flow(
-        opening,
-        paths,
-        {"pressure_1": first, "pressure_2": second},
-        PooledReadings(flow, ["mass_flow"] * flow.size, labels, (halves,)),
-        tolerances,
-        confidence,
-    )
-    scatter = float(np.std(flow - model) / np.abs(flow).max())
-    marks = readings_mark("measured", difference, flow), curve_mark(LAW_NAMES[opening.law], difference, model)
+    pressures = {"pressure_1": first, "pressure_2": second}
+    readings = PooledReadings(flow, ["mass_flow"] * flow.size, labels, (halves,))
+    ratio, fits = np.minimum(first, second) / np.maximum(first, second), list[LawFit]()
+    if laws[0][0].has_sought_ratio:
+        check_both_regimes(ratio, sources[0].name, PROCEDURE)
+    for opening, size in laws:
+        _, alone = opening.rough_sizes(first, second, flow)
+        reported, paths = reported_parts(opening, size, _GAP, alone)
+        fitted, model = solve_flow(opening, paths, pressures, readings, tolerances, confidence, _TRIAL_RATIOS)
+        is_wide = has_both_regimes(ratio)
+        fits.append(LawFit(opening=opening, reported=reported, fitted=fitted, model=model, has_both_regimes=is_wide))
+    chosen = fits[0]
+    scatter = float(np.std(flow - chosen.model) / np.abs(flow).max())
+    curve = curve_mark(LAW_NAMES[chosen.opening.law], difference, chosen.model)
+    marks = readings_mark("measured", difference, flow), curve
     axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind("Flow", "kg/s", "mass flow")
-    return result_of(
-        PROCEDURE,
+    return _result(
         sources,
-        fitted,
-        reported,
+        fits,
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
-        with_residuals("Steady leak", *axes, marks, difference, flow - model),
-        _REMEDY.format(NEXT_LAW[opening.law]),
+        with_residuals("Steady leak", *axes, marks, difference, flow - chosen.model),
         remarks,
         scatter,
     )
+
+
+def _result(
+    sources: tuple[RecordingSource, ...],
+    fits: list[LawFit],
+    summary: str,
+    panels: tuple[Panel, ...],
+    remarks: tuple[str, ...],
+    scatter: float = math.nan,
+) -> BenchResult:
+    """Return the result of the first of ``fits``, compared with its rival if there is one."""
+    chosen, rival = fits[0], fits[1] if len(fits) > 1 else None
+    remedy = _REMEDY.format(next_law(chosen, rival))
+    result = result_of(PROCEDURE, sources, chosen.fitted, chosen.reported, summary, panels, remedy, remarks, scatter)
+    return result if rival is None else with_rival(result, chosen, rival, remedy)
 
 
 # Closed chambers.
@@ -203,8 +240,7 @@ _SCATTER_OF_CHANGE, _LEAST_CHANGE = 0.01, 1.0e-9
 def _closed_leak(
     sources: tuple[RecordingSource, ...],
     decays: tuple[ChamberDecay, ...],
-    opening: Opening,
-    size: ReportedNumber,
+    laws: _Laws,
     volumes: tuple[float | None, float | None],
     volume_deviation: float,
     tolerances: Tolerances,
@@ -214,44 +250,45 @@ def _closed_leak(
     # The chamber whose pressure determines the leak empties, or fills from a room.
     chamber = decays[0].fuller if decays[0].changing == 0 else 3 - decays[0].fuller
     volume, other_volume = volumes if chamber == 1 else volumes[::-1]
-    gap = _GAP
+    ratio = np.concatenate([decay.second / decay.first for decay in decays])
+    if laws[0][0].has_sought_ratio:
+        check_both_regimes(ratio, sources[0].name, PROCEDURE)
+    assumed_volume, gap = volume or _UNIT_VOLUME, _GAP
     if volume is None:
-        size, gap = (_over_volume(part, chamber) for part in (size, gap))
-        opening = replace(opening, known=PRODUCT_ONLY)
-    assumed_volume = volume or _UNIT_VOLUME
-    start, alone = _rough_sizes(decays, opening, assumed_volume)
-    reported, paths = reported_parts(opening, size, gap, alone)
-    numbers = (
-        *paths.sought(start, alone),
+        laws = tuple((replace(opening, known=PRODUCT_ONLY), _over_volume(size, chamber)) for opening, size in laws)
+        gap = _over_volume(gap, chamber)
+    others = (
         *_unknowns(decays, volume, other_volume, volume_deviation),
-        *gas_tolerances(opening.gas, tolerances),
+        *gas_tolerances(laws[0][0].gas, tolerances),
         *tolerance(_VOLUME, volume_deviation if volume else 0.0),
         *(zero for sensor, _ in decays[0].sensors for zero in within(f"zero of {sensor}", tolerances.zero_of_pressure)),
     )
-    readings = _readings(sources, decays)
-    fitted, model = solve(
-        lambda at: _shown_pressures(at, decays, opening, paths, assumed_volume), readings, numbers, confidence
-    )
+    readings, fits = _readings(sources, decays), list[LawFit]()
+    for opening, size in laws:
+        start, alone = _rough_sizes(decays, opening, assumed_volume)
+        reported, paths = reported_parts(opening, size, gap, alone)
+        shown = partial(_shown_pressures, decays=decays, opening=opening, paths=paths, volume=assumed_volume)
+        fitted, model = solve(shown, readings, (*paths.sought(start, alone), *others), confidence)
+        is_wide = has_both_regimes(ratio)
+        fits.append(LawFit(opening=opening, reported=reported, fitted=fitted, model=model, has_both_regimes=is_wide))
+    model = fits[0].model
     times = [decay.time for decay in decays for _ in decay.fitted]
     time, models = np.concatenate(times), np.split(model, np.cumsum([values.size for values in times])[:-1])
     # The legend names the first curve only.
-    names = [LAW_NAMES[opening.law], *[""] * (len(times) - 1)]
+    names = [LAW_NAMES[laws[0][0].law], *[""] * (len(times) - 1)]
     marks = [readings_mark("measured", time, readings.measured)]
     marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
     is_room = all(decay.room is not None for decay in decays)
     room = (f"the pressure in chamber {3 - chamber} is constant, so it is treated as a reservoir",) if is_room else ()
     longest = max(float(decay.time[-1]) for decay in decays)
     fall = max(1.0 - last / first for first, last in (decay.ends for decay in decays))
-    return result_of(
-        PROCEDURE,
+    return _result(
         sources,
-        fitted,
-        reported,
+        fits,
         f"{count_of(len(decays), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
         with_residuals(
             "Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, readings.measured - model
         ),
-        _REMEDY.format(NEXT_LAW[opening.law]),
         room,
     )
 
@@ -269,7 +306,7 @@ def _rough_sizes(
 ) -> tuple[OpeningSizes, OpeningSizes]:
     """Return start sizes, and the sizes if each part of the leak alone caused the mean rate of the pressure change."""
     rate = opening.gas.specific_gas_constant * opening.gas.temperature / volume
-    orifice, gap_alone, alone = OpeningSizes(1.0), OpeningSizes(0.0, beside=1.0), []
+    orifice, gap_alone, alone = OpeningSizes(1.0, CRITICAL_RATIOS[0]), OpeningSizes(0.0, beside=1.0), []
     for unit in (orifice, gap_alone) if opening.law == "both" else (orifice,):
         sizes = []
         for decay in decays:
@@ -279,7 +316,7 @@ def _rough_sizes(
             sizes.append(change / (rate * flow * float(decay.time[-1])))
         alone.append(float(np.mean(sizes)))
     if opening.law != "both":
-        return OpeningSizes(*alone), OpeningSizes(*alone)
+        return OpeningSizes(alone[0], CRITICAL_RATIOS[0]), OpeningSizes(alone[0])
     size, gap = alone
     # The search starts from equal contributions of orifice and gap.
     return OpeningSizes(0.5 * size, beside=0.5 * gap), OpeningSizes(size, beside=gap)
