@@ -405,6 +405,16 @@ def test_a_swing_about_an_earlier_level_is_named_beside_the_verdict_on_the_last_
     assert not any("the reference rests" in text for text in calm.warnings)
 
 
+def test_a_limit_cycle_beside_the_reference_oscillates_in_a_run_and_in_a_study() -> None:
+    base = load_scenario("torque-task-solenoid", ["supply.pressure=4 bar_g"])
+    columns = {"reference.level": np.array([3.0, 4.0, 5.0, 6.0])}
+    alone = [simulate(with_numbers(base, {"reference.level": level})).tracking for level in (3.0, 4.0, 5.0, 6.0)]
+    # At 6 N m the valves stay open; at 4 N m the mean error is larger than the swing's standard deviation.
+    assert [verdict and verdict.kind for verdict in alone] == [*3 * ["oscillates"], None]
+    metered = excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns)
+    assert metered.oscillates.tolist() == [1.0, 1.0, 1.0, 0.0]
+
+
 def test_a_slow_approach_is_no_oscillation_and_needs_more_time() -> None:
     sets = ["reference.kind=constant", "reference.level=110 deg", "sensors.delay=10 ms"]
     found = simulate("cylinder-servo", [*sets, "run.duration=0.8 s"]).tracking

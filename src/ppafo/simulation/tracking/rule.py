@@ -197,6 +197,8 @@ def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
     # A joint that creeps has a range of its error, too, but a mean error above the standard deviation.
     swings = settled.error_deviation > mean_error
     if is_switched:
+        # A limit cycle beside the reference has a large mean error, and reverses.
+        swings |= np.asarray(settled.error_reversals) > 0
         oscillation, overshoot = np.where(swings, error, 0.0), np.zeros_like(error)
     else:
         oscillation = np.where(rests | (error > 1.0), np.asarray(settled.error_reversals) / (SUSTAINED - 1), 0.0)

@@ -197,15 +197,18 @@ def test_a_bottle_that_is_none_is_refused_before_any_walk() -> None:
         ppafo.design(mass=72.5, stature=1.75, torque=2.5, pressure=4.5e5, minutes=1.0, bottle="air-48ci-300psi")
 
 
-def test_a_bottle_whose_regulator_is_set_to_another_pressure_is_refused_before_any_walk(tmp_path: Path) -> None:
+@pytest.mark.parametrize("pressure", ["85 psi_g", "30 psi_g"])
+def test_a_bottle_whose_regulator_is_set_to_another_pressure_is_refused_before_any_walk(
+    pressure: str, tmp_path: Path
+) -> None:
     assert main(["new", "bottle", "big", "--from", "co2-24oz", "--out", str(tmp_path / "big.toml")]) == 0
-    said = r"sets regulator.set_pressure to 50 psi_g, not to pressure = 85 psi_g: write 85 psi_g in the file$"
+    said = f"sets regulator.set_pressure to 50 psi_g, not to pressure = {pressure}: write {pressure} in the file$"
     with pytest.raises(ppafo.StudyError, match=said):
         ppafo.design(
             mass="40 kg",
             stature=1.45,
             torque=8.0,
-            pressure="85 psi_g",
+            pressure=pressure,
             minutes=20.0,
             bottle=tmp_path / "big.toml",
         )
