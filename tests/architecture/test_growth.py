@@ -7,12 +7,13 @@ from pathlib import Path
 import ppafo
 
 SRC = Path(__file__).parents[2] / "src" / "ppafo"
-CEILING = {"definitions": 6103, "code": 48274, "public": 74, "splinters": 22}
+CEILING = {"definitions": 6121, "code": 48426, "public": 74, "splinters": 22}
 """Functions and classes; lines of code; public names; short files with a single importer.
 
 Lowered from 6,652 definitions and 47,381 lines: functions and records with one user went into it, studies on a cluster,
 the estimate of compile times and protocols with one implementation left. Raised by 27 and 280 where messages name all
-faults of a file, verdicts see earlier rests, and remedies are tried for as long as was asked; nothing left for it."""
+faults of a file, verdicts see earlier rests, and remedies are tried for as long as was asked, and by 18 and 152 where
+two laws of a leak are compared and a table that repeats is judged as one; nothing left for either."""
 SHORT = 80
 """Lines below which a file with a single importer is a splinter."""
 

@@ -1,7 +1,6 @@
 """Settled part of a run without recording: numbers for the tracking verdict.
 
-The settled part is the second half of the hold, or of the run if the reference rests for less than a tenth of the run,
-or repeats within it.
+The settled part is the second half of the hold, or of a run that repeats its reference or rests for less than a tenth.
 These numbers are for verdicts only: no table and no study lists them.
 """
 
@@ -158,7 +157,7 @@ def read_reversals(readings: Readings) -> Floats:
 
 
 def read_share_of_hold(readings: Readings) -> Floats:
-    """Metric ``settled_share_of_hold`` [-]: duration of the hold divided by that of the run; 0 between repetitions."""
+    """Metric ``settled_share_of_hold`` [-]: duration of hold divided by duration of run, 0 between repetitions."""
     share = (readings.samples - 1 - readings.course.hold_start) / (readings.samples - 1)
     return np.asarray(share * (1.0 - readings.course.is_repeated))
 

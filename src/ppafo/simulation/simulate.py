@@ -93,7 +93,7 @@ _in_own_units = in_units(lambda result, *_, **__: result.scenario.device.shown)
 class Result:
     """Result of a finished run; ``versions`` are package versions, ``engine`` has step size and numbers of steps.
 
-    ``tries`` gives a verdict a remedy that was tried in further runs; without it remedies are named untried.
+    ``tries(scenario, verdict)`` returns the verdict with a remedy that was tried; without it remedies are untried.
     """
 
     scenario: Scenario
@@ -101,9 +101,7 @@ class Result:
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
     measured: DeferredResult
-    tries: "Callable[[Scenario, Tracking | None], Tracking | None] | None" = field(
-        default=None, compare=False, repr=False
-    )
+    tries: "Callable[..., Tracking | None] | None" = field(default=None, compare=False, repr=False)
 
     @property
     def recording(self) -> Recording:
@@ -131,10 +129,7 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Remarks on the use of the run: a missed reference, a stop, a too coarse pair of valves, replaced values.
-
-        Remedies of a missed reference are tried in further runs.
-        """
+        """Remarks on a missed reference with tried remedies, a stop, a too coarse pair of valves, replaced values."""
         no_warnings = (self.following, changed_text(changes_in(self.scenario)))
         return tuple(sentence for sentence in self.to_dict()["verdict"] if sentence not in no_warnings)
 

@@ -1175,6 +1175,15 @@ def test_a_table_that_repeats_is_judged_by_its_pulses_and_not_by_its_last_rest(d
     assert excess(metered, once, columns).follows.tolist() == [1.0]
 
 
+def test_a_swing_in_the_rests_of_a_table_that_repeats_is_a_remark_however_long_the_run() -> None:
+    gains = ["controller.proportional_gain=0.5 1/(N m)", "controller.integral_gain=0 1/(N m s)"]
+    late = ["device.valve=proportional", "controller.rate=1 kHz", *gains, "sensors.delay=27 ms", *PULSED]
+    for duration in ("4 s", "10 s"):
+        changes = [text for text in late if not text.startswith("run.")]
+        said = ppafo.simulate("torque-task-solenoid", [*changes, f"run.duration={duration}"]).warnings
+        assert any("while the reference rests" in text and "all repetitions together" in text for text in said), said
+
+
 def test_python_names_a_remedy_that_was_tried_as_the_command_does() -> None:
     changes = ["device.valve=proportional", "controller.rate=1 kHz", *PULSED, "sensors.delay=80 ms"]
     result = ppafo.simulate("torque-task-solenoid", changes)

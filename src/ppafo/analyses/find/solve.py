@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, at_fault, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
+from ppafo.remedy_trials import tried
 from ppafo.running import simulate
 from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.remarks import standing_still
+from ppafo.simulation.simulate import Result
+from ppafo.simulation.tracking import Tracking
+from ppafo.simulation.tracking.remarks import earlier_swing, standing_still
 from ppafo.simulation.tracking.remedies import change_text
 from ppafo.simulation.tracking.rule import CRITERION_TEXTS
 from ppafo.simulation.tracking.shortfall import shortfall
@@ -231,10 +234,9 @@ def outermost(
     if not np.isfinite(search.tried["judged"]).any():
         ends = f"from {path.quote(low)} to {path.quote(high)}"
         if search.tried["oscillating"].any():
-            raise StudyError(
-                f"scenario '{base.name}': the loop oscillates in every run {ends}; omit the gains of the controller, "
-                "so that they are computed for each device"
-            )
+            _, verdict = _judged(base, path, low)
+            said = "" if verdict is None else f"; at {path.quote(low)} {verdict.sentence}"
+            raise StudyError(f"scenario '{base.name}': the loop oscillates in every run {ends}{said}")
         reason = f"; the first: {runs.reason}" if runs.reason else ""
         raise StudyError(f"scenario '{base.name}': no run {ends} gives the metric '{condition.metric}'{reason}")
     # The runs of a bracket are simulated side by side, which is faster than one run at a time by bisection.
@@ -262,16 +264,23 @@ def outermost(
     return replace(search, verdicts=tuple((value, _verdict(base, path, value)) for value in values))
 
 
-def _verdict(base: Scenario, path: VariedPath, value: float) -> str:
-    """Return the verdict on the run at a value [SI], a torque beyond the actuator's included."""
+def _judged(base: Scenario, path: VariedPath, value: float) -> tuple[Result, Tracking | None]:
+    """Return the run at a value [SI], and the verdict with its tried remedy; None if the run follows its reference."""
     # Given in the unit of the range, the value and what is said of it are in that unit.
     result = simulate(with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
-    tracking = result.tracking
+    # A remedy that succeeds tells the cause from less certain ones.
+    return result, tried(result.scenario, result.tracking)
+
+
+def _verdict(base: Scenario, path: VariedPath, value: float) -> str:
+    """Return the verdict on the run at a value [SI], a torque beyond the actuator's included."""
+    result, tracking = _judged(base, path, value)
     said = result.following if tracking is None else "; ".join(filter(None, (tracking.found, tracking.cause)))
     lacking = float(np.max(shortfall(result.scenario)))
     if tracking is None and lacking > 0.0 and changes_reach([path.path]):
         said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
-    return "; ".join(filter(None, (said, standing_still(result, tracking is None))))
+    remarks = (remark(result, tracking is None) for remark in (standing_still, earlier_swing))
+    return "; ".join(filter(None, (said, *remarks)))
 
 
 def _refusal(base: Scenario, path: VariedPath, value: float, end: float) -> tuple[str, str]:

@@ -146,8 +146,7 @@ def begin_reference_summary(parts: Program, lane: Lane, interval: float, last_in
     largest = max(abs(first - origin), abs(last - origin))
     is_repeated = 0.0
     if parts.reference.period is not None:
-        duration = last_index * interval * lane.timing.step
-        is_repeated = 1.0 if parts.reference.period(lane.reference) < duration else 0.0
+        is_repeated = 1.0 if parts.reference.period(lane.reference) < last_index * interval * lane.timing.step else 0.0
     lane.course = ReferenceSummary(
         last=last,
         largest=largest,

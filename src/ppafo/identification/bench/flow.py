@@ -262,9 +262,8 @@ def reported_parts(
 ) -> tuple[list[ReportedNumber], Paths]:
     """Return the reported sizes of an opening, with its gap or its sought critical ratio, and their names in the fit.
 
-    The critical ratio has its path in the section of ``size``.
-    The magnitudes of parallel parts are the sizes ``alone``, as if each part carried the whole flow: either part may be
-    zero, which is a valid result.
+    The critical ratio has its path in the section of ``size``. The magnitudes of parallel parts are the sizes
+    ``alone``, as if each part carried the whole flow: either part may be zero, which is a valid result.
     """
     if opening.has_sought_ratio:
         section = size.path.rpartition(".")[0]
@@ -294,8 +293,8 @@ def solve_flow(
 ) -> tuple[Fit, Floats]:
     """Fit an opening to measured flow. Returns the fit and the fitted flow [kg/s].
 
-    A sought critical ratio starts from the best of ``ratios`` [-].
-    ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second.
+    ``pressures`` are two channels [Pa absolute]; a positive flow [kg/s] runs from the first to the second. A sought
+    critical ratio starts from the best of ``ratios`` [-].
     """
     (first_name, shown_first), (second_name, shown_second) = pressures.items()
     flow = readings.measured

@@ -82,8 +82,12 @@ def earlier_swing(result: "RecordedResult", follows: bool) -> str:
     worst = limit if np.isfinite(limit) else 2.0 * LARGEST_SHARE * settled.wanted_change
     changes = np.flatnonzero(np.abs(np.diff(reference)) > SAME_LEVEL * extent(recording)) + 1
     lengths = np.diff(changes, prepend=0)
+    # Of a table that repeats, its repetition counts.
+    duration = min(float(scenario.reference.settings.get("period", np.inf)), recording.duration)
+    shortest = SHORTEST_HOLD * len(recording) * duration / recording.duration
+    about = "the end of the run alone" if duration == recording.duration else "all repetitions together"
     # Of each rest the second half is judged, as of the last one, which has the verdict.
-    for index in np.flatnonzero(lengths >= SHORTEST_HOLD * len(recording)).tolist():
+    for index in np.flatnonzero(lengths >= shortest).tolist():
         first, end = int(changes[index] - lengths[index]), int(changes[index])
         half = slice((first + end) // 2, end)
         error = (value - reference)[half]
@@ -91,7 +95,7 @@ def earlier_swing(result: "RecordedResult", follows: bool) -> str:
         if swings and (scenario.controlled == ANGLE or np.ptp(recording["angle"][half]) <= MOVED_JOINT):
             worst, times = float(np.ptp(error)), f"from {recording.time[first]:.3g} s to {recording.time[end]:.3g} s"
             swing = f"the {CONTROLLED[scenario.controlled].words} swings by {change_text(scenario.controlled, worst)}"
-            said = f"while the reference rests {times}, {swing}: the verdict is about the end of the run alone"
+            said = f"while the reference rests {times}, {swing}: the verdict is about {about}"
     return said
 
 

@@ -218,10 +218,9 @@ def _settled_periods(scenario: Scenario) -> Any:
 
 
 def _reversals_of_lag(scenario: Scenario, wanted: float) -> Any:
-    """Reversals of the error of a loop that lags, in the second half of a run; an array (runs,) for a varied frequency.
+    """Reversals of the error of a loop that lags, in the second half of a run: of the reference, or of its rate.
 
-    They are those of the reference, or of its rate, with which such an error goes: twice a period of a sine. Of another
-    reference, those of the first run hold for all: a level that varies leaves them as they are.
+    Twice a period of a sine, an array (runs,) if it varies; of another reference those of the first run hold for all.
     """
     periods = _settled_periods(scenario)
     if np.isfinite(periods).all():

@@ -250,21 +250,24 @@ def test_ideal_sensors_need_one_run_of_each_value(of_curve: Callable[..., Findin
 
 
 def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_error_is_there() -> None:
-    found = find(
-        "torque-task-solenoid", vary="supply.pressure=62..90 psi_g", such_that="final_error <= 0.5 N m", grid=15
-    ).found
+    few = {"vary": "supply.pressure=62..90 psi_g", "such_that": "final_error <= 0.5 N m", "grid": 15}
     alone = ppafo.simulate("torque-task-solenoid", ["supply.pressure=84 psi_g"])
+    assert alone.metrics["final_error"].value < 0.5
+    # The cause and the tried remedy of a run, not gains that a law without gains does not have.
+    said = r"in every run .*; at 62 psi_g the torque loop oscillates: .*valve.area=\S+ mm\^2'\] it follows, as a"
+    with pytest.raises(StudyError, match=said):
+        find("torque-task-solenoid", **few)
+    finer = ["valve.area=6 mm^2"]
+    found = find("torque-task-solenoid", overrides=finer, **few).found
+    alone = ppafo.simulate("torque-task-solenoid", [*finer, "supply.pressure=84 psi_g"])
     final_error, there = alone.metrics["final_error"].value, settled_task(alone.scenario, alone.recording).rms_error
-    assert final_error < 0.5
-    assert there > 1.0
-    assert found.value is None
     assert found.unsettled > 0
     assert f"in {found.unsettled} runs the loop still oscillates in the second half" in " ".join(found.remarks)
     assert "these runs must also meet the condition with the RMS error of that half" in " ".join(found.remarks)
     # What stands under the name of the metric is the metric, and what was asked of stands beside it.
     (tried,) = (each for each in found.tried if each.value == pytest.approx(101325.0 + 84.0 * 6894.757293168361))
     assert tried.metric == pytest.approx(final_error)
-    assert tried.judged == pytest.approx(there) or math.isnan(tried.judged)
+    assert tried.judged == pytest.approx(max(final_error, there)) or math.isnan(tried.judged)
 
 
 def test_the_error_that_decides_is_named_beside_the_metric_and_so_is_what_ends_the_range() -> None:
