@@ -178,15 +178,15 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
     return agreement_of(request, replayed, settings)
 
 
-def _held_command(recording: Recording) -> str:
-    """Return a clause on a held command that changes at most samples: half a sample late if it has no steps."""
+def _late_command(recording: Recording) -> str:
+    """Return a clause on a command with zero-order hold that changes at most samples, if there is one; else ""."""
     if "command" not in recording or not recording.is_held("command"):
         return ""
+    if np.mean(np.diff(recording["command"]) != 0.0) <= 0.5:
+        return ""
+    # Half a sample, on average.
     late = 500.0 * float(np.median(np.diff(recording.time)))
-    moves = np.mean(np.diff(recording["command"]) != 0.0) > 0.5
-    return (
-        f'; a command without steps, held between samples, is {late:.3g} ms late: between = "linear"' if moves else ""
-    )
+    return f'; a command without steps is read {late:.3g} ms late: give between = "linear" in its column'
 
 
 def agreement_of(
@@ -208,7 +208,7 @@ def agreement_of(
         remarks.append(
             f"the recorded signals lead the model by {1.0e3 * -delay.value:.3g} ms; sensors lag, so this was not "
             "removed: check the dynamics of the model (valve delay, friction, inertia), the clock and the columns"
-            f"{_held_command(measured.recording)}"
+            f"{_late_command(measured.recording)}"
         )
     return RecordingAgreement(
         file=measured.file,

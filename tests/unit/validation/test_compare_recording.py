@@ -12,8 +12,9 @@ from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
+from ppafo.signals.recording import Between
 from ppafo.simulation.loading import load_scenario
-from ppafo.validation.agreement import channel_agreement
+from ppafo.validation.agreement import _late_command, channel_agreement
 from ppafo.validation.compared import parse_thresholds
 from ppafo.validation.delay import ComparedCurve
 
@@ -290,3 +291,14 @@ def test_another_actuator_is_replayed_with_its_own_pressures_and_torque(agree: A
     assert not np.allclose(recording["torque"], constant, rtol=0.05)
     friction = dataclasses.replace(scenario.device.friction, viscous_damping=2.0)
     assert not agree(recording, dataclasses.replace(scenario.device, friction=friction)).passes
+
+
+def test_a_command_that_changes_at_most_samples_is_said_to_be_read_half_a_sample_late() -> None:
+    time = 2.0e-3 * np.arange(50)
+
+    def said(command: np.ndarray, between: Between | None = None) -> str:
+        return _late_command(Recording("made", time, {"command": Channel(command, "-", between)}, "synthetic"))
+
+    wave, steps = np.sin(20.0 * time), np.where(time > 0.05, 1.0, 0.0)
+    assert said(wave) == '; a command without steps is read 1 ms late: give between = "linear" in its column'
+    assert (said(wave, "linear"), said(steps)) == ("", "")

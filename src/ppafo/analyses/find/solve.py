@@ -123,9 +123,8 @@ class FindResult:
 
     ``remarks`` are on gains that follow the varied number, and on values kept from another kind or set. ``verdicts``
     are values [SI] with the verdict of a run of their own: for the condition that the run follows, and for a loop that
-    fails at the nearest value. ``refusal`` is the
-    reason why the outer neighbour of the value found is no valid value, and the path of the number that allows it; ""
-    for a valid neighbour.
+    fails at the nearest value. ``refusal`` is the reason why the outer neighbour of the value found is no valid value,
+    and the path of the number that allows it; "" for a valid neighbour.
     """
 
     scenario: str
