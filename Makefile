@@ -21,7 +21,7 @@ validation: $(READY)
 test: check
 	$(TESTS) -m "not long"
 
-# What `make test` leaves out. Continuous integration runs a fifth of LONG="long and not thorough" and a tenth of LONG="thorough"
+# What `make test` leaves out. Continuous integration runs a fifth of LONG="long and not thorough", a twentieth of "thorough"
 # after each change, to end in 25 minutes: PART=I/5 is the I-th of five parts of about equal cost.
 LONG ?= long
 PART ?= 0/1

@@ -10,7 +10,7 @@ import gc
 import json
 import os
 import tomllib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +28,8 @@ NOTED = 5.0
 LARGEST = 10.0
 """CPU seconds above which a file that is not recorded is named: twice ``NOTED``, for a slower or busy computer."""
 SHOWN = 2.0
+PIECE = 30
+"""Number of tests from which a file is dealt to several parts."""
 HEADING = """\
 # CPU seconds of the costly files of tests, models not counted, and their long tests, which `make test` leaves out.
 # Written by
@@ -119,11 +121,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: -known.get(file_and_function(item.nodeid)[0], NOTHING).seconds)
     if part := config.getoption("--part"):
         number, parts = map(int, part.split("/"))
-        # The costliest files are dealt one by one, so that the parts cost about the same.
-        places = {
-            file: place for place, file in enumerate(dict.fromkeys(file_and_function(item.nodeid)[0] for item in items))
-        }
-        items[:] = [item for item in items if places[file_and_function(item.nodeid)[0]] % parts == number % parts]
+        # The costliest files are dealt one by one, so that the parts cost about the same; one of many tests in pieces.
+        counted, pieces = Counter[str](), list[tuple[str, int]]()
+        for item in items:
+            file, _ = file_and_function(item.nodeid)
+            pieces.append((file, counted[file] // PIECE))
+            counted[file] += 1
+        places = {piece: place for place, piece in enumerate(dict.fromkeys(pieces))}
+        items[:] = [item for item, piece in zip(items, pieces, strict=True) if places[piece] % parts == number % parts]
 
 
 @pytest.hookimpl(wrapper=True)
