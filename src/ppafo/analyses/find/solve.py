@@ -267,7 +267,7 @@ def _judged(base: Scenario, path: VariedPath, value: float) -> tuple[Result, Tra
     """Return the run at a value [SI], and the verdict with its tried remedy; None if the run follows its reference."""
     # Given in the unit of the range, the value and what is said of it are in that unit.
     result = simulate(with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
-    # A remedy that succeeds tells the cause from less certain ones.
+    # The remedy that succeeds decides between possible causes.
     return result, tried(result.scenario, result.tracking)
 
 

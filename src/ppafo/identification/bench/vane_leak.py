@@ -185,11 +185,11 @@ def _steady_leak(
     ratio, fits = np.minimum(first, second) / np.maximum(first, second), list[LawFit]()
     if laws[0][0].has_sought_ratio:
         check_both_regimes(ratio, sources[0].name, PROCEDURE)
+    is_wide = has_both_regimes(ratio)
     for opening, size in laws:
         _, alone = opening.rough_sizes(first, second, flow)
         reported, paths = reported_parts(opening, size, _GAP, alone)
         fitted, model = solve_flow(opening, paths, pressures, readings, tolerances, confidence, _TRIAL_RATIOS)
-        is_wide = has_both_regimes(ratio)
         fits.append(LawFit(opening=opening, reported=reported, fitted=fitted, model=model, has_both_regimes=is_wide))
     chosen = fits[0]
     scatter = float(np.std(flow - chosen.model) / np.abs(flow).max())
@@ -253,6 +253,7 @@ def _closed_leak(
     ratio = np.concatenate([decay.second / decay.first for decay in decays])
     if laws[0][0].has_sought_ratio:
         check_both_regimes(ratio, sources[0].name, PROCEDURE)
+    is_wide = has_both_regimes(ratio)
     assumed_volume, gap = volume or _UNIT_VOLUME, _GAP
     if volume is None:
         laws = tuple((replace(opening, known=PRODUCT_ONLY), _over_volume(size, chamber)) for opening, size in laws)
@@ -269,7 +270,6 @@ def _closed_leak(
         reported, paths = reported_parts(opening, size, gap, alone)
         shown = partial(_shown_pressures, decays=decays, opening=opening, paths=paths, volume=assumed_volume)
         fitted, model = solve(shown, readings, (*paths.sought(start, alone), *others), confidence)
-        is_wide = has_both_regimes(ratio)
         fits.append(LawFit(opening=opening, reported=reported, fitted=fitted, model=model, has_both_regimes=is_wide))
     model = fits[0].model
     times = [decay.time for decay in decays for _ in decay.fitted]
