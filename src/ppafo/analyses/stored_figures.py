@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FIGURE = "figure"
-_PICTURES = (".png", ".gif")
 _NAMED = 6
 
 
@@ -71,7 +70,7 @@ def what_is_there(folder: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
     if MARK not in names:
         raise DataError(f"{folder}: is not a result folder of ppafo; give a folder written by a ppafo command")
     command = marking_command(folder)
-    pictures = [name for name in names if name.endswith(_PICTURES)]
+    pictures = [name for name in names if name.endswith(".png")]
     page = next((name for name in names if name.endswith(".html")), None)
     named = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
     has = f"has its figures ({named})" if pictures else "has no figures"

@@ -102,7 +102,7 @@ class Section:
 
     Figure: ``name`` is the stem of its files, empty without a figure. It is drawn from ``panels``, or from a function
     that returns panels on demand, with ``across`` panels per row, a panel ``size`` [inches], a ``title`` and a
-    ``note``. Alternatively ``draw`` returns the complete figure, or the bytes of an animation (GIF). ``caption`` is
+    ``note``. Alternatively ``draw`` returns the complete figure. ``caption`` is
     printed on the page.
 
     ``code`` is a text to be copied. A section with ``is_detail`` is on the page only.
@@ -123,7 +123,7 @@ class Section:
     left: int = 1
     marked: Collection[int] = ()
     is_detail: bool = False
-    draw: "Callable[[], matplotlib.figure.Figure | bytes] | None" = None
+    draw: "Callable[[], matplotlib.figure.Figure] | None" = None
 
     @property
     def has_head(self) -> bool:
@@ -149,7 +149,7 @@ class Section:
             lines = [(mark, *line) for mark, line in zip(marks, lines, strict=True)]
         return align_columns(lines, self.left + bool(self.marked))
 
-    def drawn(self, kind: RecordingKind) -> "matplotlib.figure.Figure | bytes":
+    def drawn(self, kind: RecordingKind) -> "matplotlib.figure.Figure":
         """Draw the figure of the section, marked as simulated or synthetic unless ``kind`` is measured."""
         if self.draw is not None:
             return self.draw()
@@ -247,9 +247,7 @@ class Finding(Generic[T_co]):
         chosen = figures.get(name or next(iter(figures), ""))
         with drawn_at(width):
             drawn = None if chosen is None else chosen.drawn(self.kind)
-        if drawn is None or isinstance(drawn, bytes):
-            if drawn is not None:
-                raise ArgumentError(f"'{name}' is an animation, not a figure: save() writes it as {name}.gif")
+        if drawn is None:
             named = f"no figure '{name}'" if name else "no figure"
             available = (
                 f"; available: {', '.join(figures)}" if figures else "; print the result, or save() its text and page"
@@ -296,10 +294,9 @@ def page_files(finding: Finding[Any]) -> dict[str, bytes]:
     files = {name: content() for name, content in finding.files.items()}
     on_page = {}
     for name, section in finding.figures.items():
-        figure = section.drawn(finding.kind)
-        formats = {"gif": figure} if isinstance(figure, bytes) else render_figure(figure, FORMATS)
+        formats = render_figure(section.drawn(finding.kind), FORMATS)
         files |= {f"{name}.{file_format}": content for file_format, content in formats.items()}
-        on_page[name] = formats.get("svg") or formats["gif"]
+        on_page[name] = formats["svg"]
     if finding.page is not None:
         return files | {REPORT: finding.page(on_page)}
     parts = []

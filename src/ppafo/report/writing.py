@@ -118,6 +118,5 @@ def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.
 
 
 def inline_figure(content: bytes) -> str:
-    """Return an SVG or GIF file as a data URL, for an image embedded in a page."""
-    kind = "gif" if content.startswith(b"GIF8") else "svg+xml"
-    return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
+    """Return an SVG file as a data URL, for an image embedded in a page."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(content).decode('ascii')}"

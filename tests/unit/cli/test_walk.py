@@ -24,9 +24,6 @@ from ppafo.walking.loading import load_walk
 
 SHORT = ["--minutes", "0.1"]
 FILES = [
-    "gait-phases.png",
-    "gait-phases.svg",
-    "legs-moving.gif",
     "legs.png",
     "legs.svg",
     "mean-stride-off.csv",
@@ -116,23 +113,10 @@ def test_tables_and_recordings_say_the_same_and_that_they_are_simulated(walked: 
 
 def test_the_report_holds_figures_and_numbers(walked: Path) -> None:
     page = (walked / "report.html").read_text()
-    assert page.count("data:image/svg+xml;base64,") == 3
+    assert page.count("data:image/svg+xml;base64,") == 2
     assert "Gas per stride (g)" in page
-    assert "data:image/gif;base64," in page
     assert page.count("<script>") == 1
     assert digest(bundled("loader.js")) in page.split("</head>")[0]
-
-
-def test_the_animation_is_small_and_moves(walked: Path) -> None:
-    from PIL import Image
-
-    content = (walked / "legs-moving.gif").read_bytes()
-    assert len(content) < 3_000_000
-    with Image.open(io.BytesIO(content)) as picture:
-        assert picture.n_frames >= 30  # type: ignore[attr-defined]
-        first = np.asarray(picture.convert("RGB")).copy()
-        picture.seek(20)
-        assert (np.asarray(picture.convert("RGB")) != first).any()
 
 
 def test_the_list_names_every_walk_and_every_task_sequence(capsys: pytest.CaptureFixture[str]) -> None:
@@ -273,7 +257,7 @@ def test_a_walk_that_diverges_is_a_status_and_exit_code_1(tmp_path: Path, capsys
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())
     assert document["status"]["kind"] == "diverged"
     assert "diverged at t" in (tmp_path / "walk" / "report.html").read_text()
-    assert "legs-moving.gif" not in names(tmp_path / "walk")
+    assert "legs.png" not in names(tmp_path / "walk")
 
 
 @pytest.mark.usefixtures("bursting")

@@ -40,7 +40,6 @@ CATALOGUE: dict[str, Callable[[], Figure]] = {
     ),
     "bottle": lambda: ppafo.bottle(gas_per_stride="0.3 g").plot(width="84 mm"),
     "legs": lambda: walked("legs"),
-    "strip": lambda: walked("gait-phases"),
     "mean stride": lambda: walked("mean-stride"),
 }
 

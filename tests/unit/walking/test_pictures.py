@@ -1,6 +1,5 @@
 """Pictures of a walk: what they show is what was walked."""
 
-import io
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any
@@ -12,13 +11,10 @@ from matplotlib.figure import Figure
 from ppafo.analyses.walk.answer import comparison_table
 from ppafo.analyses.walk.wearers import wearers_finding
 from ppafo.report.finding import Section, text_of
-from ppafo.report.style import drawn_at
 from ppafo.signals import Channel, Recording
 from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.figures import task_sequence, whole_walk
-from ppafo.walking.figures.animation import animation
-from ppafo.walking.figures.gait_strip import strip_figure
-from ppafo.walking.figures.legs import frames_figure, last_phases, legs_of
+from ppafo.walking.figures.legs import frames_figure, legs_of, phases_of_last_stride
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.population import population_figure
 from ppafo.walking.figures.whole_walk import whole_walk_figure
@@ -44,7 +40,7 @@ def texts(figure: "Figure") -> list[str]:
 @pytest.mark.parametrize("name", CONFIGURATIONS)
 def test_a_drop_foot_is_seen_without_the_device_and_lifted_with_it(name: str) -> None:
     pair = compared(name)
-    turns = last_phases(pair.with_device, 1, 100)
+    turns = phases_of_last_stride(pair.with_device, 100)
     late = np.flatnonzero(turns % 1.0 > 0.7)
     bare, worn = legs_of(pair.without_device, turns), legs_of(pair.with_device, turns)
     lowest = [legs.worn.toe[late, 1].min() for legs in (bare, worn)]
@@ -58,7 +54,7 @@ def test_toes_of_the_figures_drag_where_the_verdict_says_so() -> None:
     # The pair drags by millimetres, the proportional valve by nothing; the healthy stance is no drag.
     for name in ("solenoid", "proportional"):
         for result in (compared(name).with_device, compared(name).without_device):
-            legs = legs_of(result, last_phases(result, 1, 200))
+            legs = legs_of(result, phases_of_last_stride(result, 200))
             assert any(legs.drags) == (result.metrics["lowest_toes"].value < 0.0), name
             assert not any(np.array(legs.drags)[legs.turns % 1.0 < 0.6])
 
@@ -69,40 +65,6 @@ def test_the_strip_of_frames_marks_toes_that_drag() -> None:
     assert marks[0] >= 1
     assert marks[0] >= marks[1]
     assert {"without the device", "with the device", "simulated", "90 %"} <= set(texts(figure))
-
-
-@pytest.mark.parametrize("name", CONFIGURATIONS)
-def test_the_strip_of_phases_names_the_tasks_in_the_order_of_the_stride(name: str) -> None:
-    figure = strip_figure(compared(name).with_device)
-    controller, foot, valve = figure.axes[1:4]
-    shown = sorted((text.get_position()[0], text.get_text()) for text in controller.texts)
-    assert [text for _, text in shown if text[0] in "42"] == ["4 free motion", "2 push-off"]
-    assert shown[-1][1] == "3 swing"
-    assert [text.get_text() for text in sorted(foot.texts, key=lambda item: item.get_position()[0])] == [
-        "heel",
-        "flat",
-        "on the toes",
-        "in the air",
-    ]
-    assert {"vented", "plantar", "dorsi"} <= {text.get_text() for text in valve.texts}
-
-
-@pytest.mark.parametrize("width", ["84 mm", None])
-@pytest.mark.parametrize("stature", ["1.75 m", "2.2 m"])
-def test_no_leg_of_the_strip_of_phases_is_cut_at_its_edges(stature: str, width: str | None) -> None:
-    walked = walk(load_walk("proportional", [f"wearer.stature={stature}"]), minutes=0.15)
-    with drawn_at(width):
-        figure = strip_figure(walked)
-    (legs,) = figure.axes[0].child_axes
-    drawn = [line.get_xydata() for line in legs.lines[1:]] + [patch.get_xy() for patch in legs.patches]
-    points = np.concatenate(drawn)
-    (left, right), (bottom, top) = legs.get_xlim(), legs.get_ylim()
-    assert left < points[:, 0].min() < points[:, 0].max() < right
-    assert bottom < points[:, 1].min() < points[:, 1].max() < top
-    # The picture itself lies within the figure, and a metre is as long in both directions.
-    box = legs.get_window_extent()
-    assert figure.bbox.x0 < box.x0 < box.x1 < figure.bbox.x1
-    assert box.width / (right - left) == pytest.approx(box.height / (top - bottom), rel=1e-6)
 
 
 def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:
@@ -138,8 +100,8 @@ def failing() -> WalkResult:
 
 def test_pictures_of_the_leg_show_a_stride_with_help_where_there_was_one() -> None:
     result = failing()
-    turns = last_phases(result, 2, 100)
-    assert turns.size == 200
+    turns = phases_of_last_stride(result, 100)
+    assert turns.size == 100
     assert turns[-1] * walk_of(result.scenario).gait.stride_time < result.events[0].time
     inside = np.flatnonzero((turns % 1.0 > 0.75) & (turns % 1.0 < 0.95))
     assert legs_of(result, turns).worn.toe[inside, 1].min() > -0.01
@@ -179,18 +141,6 @@ def test_the_table_has_a_cell_for_each_walk() -> None:
     assert rows["Strides that begin on the toes (%)"] == ["0", "0", "0"]
     assert float(rows["... of the healthy ankle's positive work (%)"][0]) == pytest.approx(7.3, abs=0.1)
     assert {len(cells) for cells in rows.values()} == {3}
-
-
-def test_the_animation_has_two_strides_of_frames_at_half_speed() -> None:
-    from PIL import Image
-
-    content = animation(compared("solenoid"))
-    assert 50_000 < len(content) < 3_000_000
-    with Image.open(io.BytesIO(content)) as picture:
-        frames = picture.n_frames  # type: ignore[attr-defined]
-        assert frames * picture.info["duration"] / 1000.0 == pytest.approx(2.0 * 2.0 * 1.0384, rel=0.06)
-        corner = picture.convert("RGB").getpixel((2, 60))
-        assert corner == (255, 255, 255)
 
 
 def test_histograms_hold_every_wearer() -> None:

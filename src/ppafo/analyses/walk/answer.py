@@ -30,8 +30,6 @@ from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import duration_text, lasted
 from ppafo.walking.bottle.supply import is_of_bottle
-from ppafo.walking.figures.animation import animation
-from ppafo.walking.figures.gait_strip import strip_figure
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.whole_walk import whole_walk_figure
@@ -89,11 +87,6 @@ _EXPLAINED = (
 _LEGS = (
     "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground in mid-swing: they "
     "would drag."
-)
-_MOVING = "Two strides at half speed. A dark red foot has its toes below the ground in mid-swing."
-_PHASES = (
-    "The functional tasks of the paper's figure 1A: 1 control of the foot at heel strike, 2 propulsion, 3 support of "
-    "the foot in the swing, 4 free motion. A block that does not fill the height occurs only in some of the strides."
 )
 _MEAN = (
     "Mean over the strides with the standard deviation as a band. A deterministic walk on a perfectly regular gait "
@@ -272,8 +265,6 @@ def _pictures(comparison: WalkComparison) -> Sequence[Section]:
         walks = {"with the device": worn, "without": bare}
         figures += [
             ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
-            ("", "legs-moving", _MOVING, partial(animation, comparison)),
-            ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
             ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
         ]
     return [

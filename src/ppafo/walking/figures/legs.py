@@ -1,20 +1,11 @@
 """Stick figures of the leg in a walk and in the healthy gait, and instants of a stride as single frames."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.report.style import (
-    CHAMBER_1,
-    CHAMBER_2,
-    GREY,
-    font_size,
-    house_style,
-    print_scale,
-    printed_width,
-    write_head,
-)
+from ppafo.report.style import GREY, font_size, house_style, print_scale, printed_width, write_head
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.gait_series import Posture, ankle_path, gait_timing
@@ -25,16 +16,11 @@ from ppafo.walking.walk import WalkComparison
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Polygon
 
-GHOST = "#5a5a5a"
+_GHOST = "#5a5a5a"
 """Colour of the healthy foot: dark enough to be visible in front of a coloured foot."""
-DRAGS, DRAGGING = "#a4001d", "toes below ground in mid-swing"
-"""Colour of a foot whose toes would drag, and its words in the pictures."""
-
-CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
-"""Channel, name and line style of each chamber."""
+_DRAGS = "#a4001d"
+"""Colour of the cross on toes that would drag."""
 
 _WIDTH, _EDGE, _HEAD = 5.7, 0.015, 0.66
 """Width of the figure [inch], margin at its sides [widths], and height of its title and remark [inch]."""
@@ -75,59 +61,36 @@ def legs_of(result: WalkResult, turns: Floats) -> LegPostures:
     return LegPostures(turns, worn, path.posture(turns, shank, healthy), drags)
 
 
-def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
-    """Return evenly spaced running phases [strides] in a number of strides near the end of a walk.
-
-    These are the last consecutive assisted strides, if there are enough.
-    """
+def phases_of_last_stride(result: WalkResult, count: int) -> Floats:
+    """Return ``count`` evenly spaced running phases [strides] in the last assisted stride, or else in the last one."""
     # 1e-6: a last stride that is short by rounding counts.
     last = int(result.recording.time[-1] / walk_of(result.scenario).gait.stride_time + 1.0e-6)
-    count = min(strides, max(1, last - 1))
-    if not result.helped.all():
-        # The first heel strike of a walk begins stride 1 and is not counted.
-        ends = range(last, count, -1)
-        last = next((end for end in ends if result.helped[end - count - 1 : end - 1].sum() == count), last)
-    return np.asarray(last - count + np.arange(count * per_stride) / per_stride)
+    # The first heel strike of a walk begins stride 1 and is not counted.
+    assisted = 2 + np.flatnonzero(result.helped[: max(last - 1, 0)])
+    end = int(assisted[-1]) if assisted.size else last
+    return np.asarray(end - 1 + np.arange(count) / count)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _LegArtists:
-    """Matplotlib lines of one leg: shank, foot as a wedge of ankle, heel and toes, and ankle joint."""
-
-    shank: "Line2D"
-    foot: "Polygon"
-    joint: "Line2D"
-
-    def place(self, posture: Posture, index: int, offset: float) -> None:
-        """Move the leg to the posture at ``index``, with x shifted by -``offset`` [m]."""
-        joints = posture.knee, posture.ankle, posture.heel, posture.toe
-        knee, ankle, heel, toe = (points[index] - (offset, 0.0) for points in joints)
-        self.shank.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
-        self.foot.set_xy([ankle, heel, toe])
-        self.joint.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
-
-
-def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False) -> _LegArtists:
-    """Add the lines of one leg to the axes, with a line width [points]; ``place`` sets their position."""
+def _draw_leg(
+    axes: "Axes", posture: Posture, index: int, offset: float, colour: str, width: float, is_ghost: bool = False
+) -> None:
+    """Draw the leg at ``index``, shifted by -``offset`` [m]: shank, foot as a wedge of ankle, heel and toes, joints."""
     from matplotlib.patches import Polygon
 
+    joints = posture.knee, posture.ankle, posture.heel, posture.toe
+    knee, ankle, heel, toe = (points[index] - (offset, 0.0) for points in joints)
+    shank = [knee[0], ankle[0]], [knee[1], ankle[1]]
+    # The ghost is an outline: its shank is behind the other leg, its foot in front of it.
     order, foot_order = (2.0, 3.2) if is_ghost else (3.0, 3.0)
-    (shank,) = axes.plot([], [], color=colour, linewidth=width, zorder=order, solid_capstyle="round")
-    foot = Polygon(
-        np.zeros((3, 2)),
-        facecolor="none" if is_ghost else colour,
-        edgecolor=colour,
-        linewidth=0.6 * width,
-        joinstyle="round",
-        zorder=foot_order,
-    )
-    axes.add_patch(foot)
-    size = 0.0 if is_ghost else 1.6 * width
-    (joint,) = axes.plot([], [], "o", color="white", markeredgecolor=colour, markersize=size, zorder=3.5)
-    return _LegArtists(shank, foot, joint)
+    axes.plot(*shank, color=colour, linewidth=width, zorder=order, solid_capstyle="round")
+    face = "none" if is_ghost else colour
+    look: dict[str, Any] = {"edgecolor": colour, "linewidth": 0.6 * width, "joinstyle": "round", "zorder": foot_order}
+    axes.add_patch(Polygon([ankle, heel, toe], facecolor=face, **look))
+    if not is_ghost:
+        axes.plot(*shank, "o", color="white", markeredgecolor=colour, markersize=1.6 * width, zorder=3.5)
 
 
-def draw_ground(axes: "Axes", left: float, right: float) -> None:
+def _draw_ground(axes: "Axes", left: float, right: float) -> None:
     """Draw the ground from ``left`` to ``right`` [m]."""
     axes.plot([left, right], [0.0, 0.0], color=GREY, linewidth=1.0, zorder=1)
     axes.fill_between([left, right], [-0.25, -0.25], [0.0, 0.0], color="#f1f1f1", linewidth=0.0, zorder=0)
@@ -148,7 +111,7 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
         rows = figure.subplots(2, 1, sharex=True)
         _draw_frames(rows[0], comparison.without_device, "without the device", WITHOUT, count)
         _draw_frames(rows[1], comparison.with_device, "with the device", WITH, count)
-        remark = f"outline: healthy foot; cross: {DRAGGING}"
+        remark = "outline: healthy foot; cross: toes below ground in mid-swing"
         worn = comparison.with_device
         write_head(figure, f"{worn.scenario.name}: one stride", remark, worn.recording.kind)
         return figure
@@ -156,20 +119,20 @@ def frames_figure(comparison: WalkComparison) -> "Figure":
 
 def _draw_frames(axes: "Axes", result: WalkResult, label: str, colour: str, count: int) -> None:
     """Draw ``count`` legs of one stride side by side, each with the healthy leg and its percent of the stride."""
-    turns = last_phases(result, 1, count)
+    turns = phases_of_last_stride(result, count)
     if count < _FRAMES:
         # Of few instants some are in the middle of stance, of push-off and of the swing.
         turns = turns + 0.5 / count
     legs = legs_of(result, turns)
-    draw_ground(axes, 0.0, _SLOT * turns.size)
+    _draw_ground(axes, 0.0, _SLOT * turns.size)
     for index in range(turns.size):
         middle = _SLOT * (index + 0.47)
         offset = legs.healthy.ankle[index, 0] - middle
-        leg_artists(axes, GHOST, 1.0, is_ghost=True).place(legs.healthy, index, offset)
-        leg_artists(axes, colour, 2.2).place(legs.worn, index, offset)
+        _draw_leg(axes, legs.healthy, index, offset, _GHOST, 1.0, is_ghost=True)
+        _draw_leg(axes, legs.worn, index, offset, colour, 2.2)
         if legs.drags[index]:
             toe = legs.worn.toe[index] - (offset, 0.0)
-            axes.plot(toe[0], toe[1], "x", color=DRAGS, markersize=7, markeredgewidth=1.8, zorder=5)
+            axes.plot(toe[0], toe[1], "x", color=_DRAGS, markersize=7, markeredgewidth=1.8, zorder=5)
         percent = f"{100.0 * (turns[index] % 1.0):.0f} %"
         axes.text(middle, -0.19, percent, ha="center", va="top", fontsize=font_size(8.5), color=GREY)
     axes.text(0.0, 0.8, label, ha="left", va="top", color=colour, fontsize=font_size(10.0))
