@@ -252,7 +252,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
 NOT_JUDGED = (
     "No recording of the paper's device: its curves are not available, so its validation cannot be repeated.",
     "No person has worn anything that ppafo designed; the gait is prescribed and does not answer the device.",
-    "No board: firmware has run on simulators of the processors, and the plant in real time only against software.",
+    "No board: firmware has run on simulators of the processors only.",
     "No graphics card: kernels for one have run on the processor.",
     "No Mac, and Windows and 64-bit ARM only as emulated.",
     "How far the gas is from that of the paper's device, whose volumes and gains are not printed.",

@@ -7,9 +7,6 @@ the record between two blocks.
 
 import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -64,28 +61,3 @@ def _without_interrupts(kind: type[BaseException], error: BaseException, traceba
     """Suppress the report of a KeyboardInterrupt lost in Cython code, as in SciPy's Sobol sequence."""
     if not issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, traceback)
-
-
-@contextmanager
-def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
-    """Turn the first termination signal into a stop request; a second signal raises KeyboardInterrupt."""
-    requested = threading.Event()
-
-    def request(_number: int, _frame: object) -> None:
-        if requested.is_set():
-            raise KeyboardInterrupt
-        # The first signal lets the run vent and end in order; only the second one breaks it off.
-        requested.set()
-
-    if threading.current_thread() is not threading.main_thread():
-        yield requested.is_set
-        return
-    known = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
-    # A shell has background jobs ignore Ctrl-C; they end all the same when they are sent the signal.
-    handled = [number for number in known if number == signal.SIGINT or signal.getsignal(number) != signal.SIG_IGN]
-    before = {number: signal.signal(number, request) for number in handled}
-    try:
-        yield requested.is_set
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

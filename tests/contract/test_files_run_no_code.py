@@ -187,9 +187,7 @@ OF_A_SCENARIO = (
     "linearise",
     "export c --out out",
     "export fmu --out out",
-    "export controller --out out",
     "export firmware --out out",
-    "hil --port udp:127.0.0.1:9",
     "new scenario mine --from",
 )
 OF_A_SET = (

@@ -105,7 +105,6 @@ def test_a_report_says_in_one_line_that_the_page_is_not_installed(bare: Path, tm
     [
         (["workbench"], "ppafo.page"),
         (["export", "firmware", "torque-task-proportional", "--out", "firmware"], "ppafo.processor"),
-        (["export", "controller", "torque-task-proportional", "--out", "controller"], "ppafo.processor"),
         (["simulate", "torque-task-proportional", "--set", "controller.kind=pid_fixed_point"], "ppafo.processor"),
     ],
     ids=lambda given: " ".join(given[:2]) if isinstance(given, list) else given,

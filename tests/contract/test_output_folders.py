@@ -8,7 +8,6 @@ import pytest
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
 from ppafo.storage.owned_folder import MARK
-from tests.virtual_wire import free_port, sending_bench
 
 FOLDERS: dict[str, list[str]] = {
     "reproduce": [],
@@ -39,10 +38,8 @@ FOLDERS: dict[str, list[str]] = {
     "export c": ["c", "step-response"],
     "export fmu": ["fmu", "step-response"],
     "export opensim": ["opensim", "solenoid", "--minutes", "0.05"],
-    "export controller": ["controller", "torque-task-solenoid"],
     "export firmware": ["firmware", "torque-task-solenoid"],
     "export firmware --try": ["firmware", "torque-task-solenoid", "--try"],
-    "hil": ["torque-task-solenoid", "--port", "udp:127.0.0.1:5000"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
 
@@ -51,13 +48,12 @@ FILES = {
     "new scenario": (["mine"], "mine.toml"),
     "gait record": (["falisse2019-subject1", "--strides", "1"], "walk.csv"),
     "workbench": (["step-response"], "page.html"),
-    "rig record": (["--port", "udp:127.0.0.1:{port}"], "bench.csv"),
 }
 """The words of every command that writes one file, and the file."""
 
 QUICK = (
     *("sets list", "sets show", "sets parts", "sets audit", "doctor --schema", "doctor", "gait", "bottle"),
-    *("export c", "export controller", "export firmware"),
+    *("export c", "export firmware"),
 )
 
 
@@ -190,12 +186,10 @@ def test_file_that_is_there_is_not_replaced(name: str, tmp_path: Path, capsys: p
     if "{result}" in words:
         assert main(["simulate", "torque-task-proportional", "--set", "run.duration=0.1 s", "--out", str(result)]) == 0
     out.write_text("mine")
-    port = free_port()
-    given = [word.format(result=result, port=port) for word in words]
+    given = [word.format(result=result) for word in words]
     assert main([*name.split(), *given, "--out", str(out)]) == 2
     assert "already exists" in capsys.readouterr().err
     assert out.read_text() == "mine"
     out.unlink()
-    with sending_bench(port):
-        assert main([*name.split(), *given, "--out", str(out)]) == 0
+    assert main([*name.split(), *given, "--out", str(out)]) == 0
     assert out.read_bytes() not in (b"", b"mine")

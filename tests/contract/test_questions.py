@@ -21,8 +21,6 @@ from ppafo.cli import output
 from ppafo.cli.command_line import Command, CommandGroup, option_of, parameters_of
 from ppafo.cli.commands import COMMANDS, OTHERS
 from ppafo.cli.main import build_parser, main
-from ppafo.exports.hil.ports import DEFAULT_BAUD
-from ppafo.exports.hil.wire import RATE
 from ppafo.validation.settings import DEFAULT_LIMIT
 from tests.page_code import block_with, write_package
 
@@ -87,12 +85,6 @@ def test_defaults_that_are_written_in_a_signature_are_those_of_the_modules() -> 
     for words, value in defaults.items():
         name, argument = words.split()
         assert inspect.signature(VERBS[name].function()).parameters[argument].default == value, words
-
-
-def test_defaults_of_the_wire_are_those_of_the_protocol() -> None:
-    hil = inspect.signature(VERBS["hil"].function()).parameters
-    record = inspect.signature(VERBS["rig record"].function()).parameters
-    assert (hil["rate"].default, hil["baud"].default, record["baud"].default) == (RATE, DEFAULT_BAUD, DEFAULT_BAUD)
 
 
 @pytest.mark.parametrize("name", QUESTIONS)

@@ -28,9 +28,7 @@ from ppafo.arguments.words import Metrics as Metrics
 from ppafo.arguments.words import Minutes as Minutes
 from ppafo.arguments.words import Name as Name
 from ppafo.arguments.words import Overrides as Overrides
-from ppafo.arguments.words import Patience as Patience
 from ppafo.arguments.words import Point as Point
-from ppafo.arguments.words import Port as Port
 from ppafo.arguments.words import Pressure as Pressure
 from ppafo.arguments.words import Scenario as Scenario
 from ppafo.arguments.words import Seed as Seed

@@ -46,10 +46,9 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     },
     "from bench to model": {
         "rig": CommandGroup(
-            "record a bench, or synthetic data on the simulated test bench",
+            "record synthetic data on the simulated test bench",
             {
                 "simulate": Command(f"{_BENCH}:rig_simulate", listing=f"{_BENCH}:list_rig", listed="experiment"),
-                "record": Command(f"{_BENCH}:rig_record"),
             },
         ),
         "identify": Command(
@@ -123,14 +122,12 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
             "write a scenario or a walk for other tools: C, an FMU, OpenSim, firmware; figures of a result",
             {
                 "c": _of_scenario(f"{_EXPORTS}:export_c"),
-                "controller": _of_scenario("ppafo.processor.commands:export_controller"),
                 "firmware": _of_scenario("ppafo.processor.commands:export_firmware"),
                 "fmu": _of_scenario(f"{_EXPORTS}:export_fmu"),
                 "opensim": Command("ppafo.cli.opensim:export_opensim", library="ppafo.walking.loading:FILE"),
                 "figure": Command("ppafo.cli.figure:export_figure"),
             },
         ),
-        "hil": _of_scenario("ppafo.cli.hil:hil"),
         "doctor": Command("ppafo.cli.doctor:doctor"),
     },
 }

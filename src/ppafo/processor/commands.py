@@ -1,4 +1,4 @@
-"""``ppafo export firmware`` and ``export controller``: the controller of a scenario for a small processor."""
+"""``ppafo export firmware``: the controller of a scenario for a small processor."""
 
 import shlex
 from collections.abc import Sequence
@@ -83,25 +83,3 @@ def export_firmware(
     if out is not None:
         output.write_files(out, output.files_of_output(answer), COMMAND)
     return answer
-
-
-def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Folder) -> CommandOutput:
-    """Write a scenario's integer controller in C behind the protocol of 'ppafo hil'.
-
-    scenario: name of a scenario, or a .toml file
-    out: the folder to write
-
-    >>> from pathlib import Path
-    >>> print(export_controller("torque-task-solenoid", out=Path("law")).text)
-    written: law (LICENSE, Makefile, README.md, controller.c, controller.h, host.c, link.c, link.h, parameters.h,
-    plant.h); next: make -C law
-    """
-    from ppafo.processor.link import example_controller
-    from ppafo.simulation.loading import load_scenario
-
-    return output.export(
-        out,
-        "export controller",
-        lambda: example_controller(load_scenario(scenario, overrides)),
-        lambda _: f"make -C {shlex.quote(str(out))}",
-    )

@@ -4,7 +4,7 @@ import math
 from typing import Any, final
 
 from ppafo.engine.in_python import in_program
-from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, RunnableProgram, effort_for, load_program, samples_in
+from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, effort_for, load_program, samples_in
 from ppafo.engine.rows import group_of, row_numbers
 from ppafo.errors import ScenarioError
 from ppafo.model.ports import shown_signals
@@ -18,17 +18,13 @@ class SampledRun:
     ``samples`` is the number of samples of the whole run, ``sample`` the index of the current one.
     """
 
-    def __init__(self, batch: Batch, module: "RunnableProgram | None" = None) -> None:
+    def __init__(self, batch: Batch) -> None:
         program, clock = batch.program, batch.clock
         self.samples = math.ceil(clock.step_count / clock.steps_per_sample)
         self.sample = 0
         self._batch = batch
         self._block = LaneBlock(
-            load_program(program, effort_for(batch)) if module is None else module,
-            program,
-            clock,
-            batch.parameters,
-            batch.states,
+            load_program(program, effort_for(batch)), program, clock, batch.parameters, batch.states
         )
         self._reference, self._step = _parameter_group(batch, "reference"), _parameter_group(batch, "timing").step
         self._rows = row_numbers(program.state_rows())

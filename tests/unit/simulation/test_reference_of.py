@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.plant import plant_of
 from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, REFUSED, run_ensemble
@@ -240,8 +239,6 @@ def test_the_pressure_loop_that_ships_settles_on_its_level() -> None:
 
 def test_what_knows_a_torque_alone_says_so() -> None:
     pressure = load_scenario("pressure-loop", ["run.duration=0.1 s"])
-    with pytest.raises(ScenarioError, match="the link transmits torque references only"):
-        plant_of(pressure)
     with pytest.raises(
         ScenarioError,
         match="a fixed-point controller follows a torque only; give a scenario",

@@ -1,4 +1,4 @@
-"""Commands for test benches: simulated experiments, and recording of a bench over a link."""
+"""Command of the simulated test bench."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ppafo.arguments import Count, File, Folder, Name, Overrides, Patience, Port, Time, Whole, Word
+from ppafo.arguments import Folder, Name, Overrides, Whole, Word
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
@@ -56,54 +56,6 @@ def rig_simulate(
         lines.append(f"to compare: {shlex.join([*words, '--motion', rig_recording.motion])}")
     text = "\n".join((*filter(None, lines), f"written: {out} ({', '.join(files)})"))
     return CommandOutput(text, {"folder": str(out), "files": list(files), **rig_recording.truth})
-
-
-def rig_record(
-    *, port: Port, baud: Count = 921600, duration: Time | None = None, patience: Patience = 5.0, out: File
-) -> CommandOutput:
-    """Record a bench that speaks the protocol of 'ppafo hil'.
-
-    Exit code 1 where the port failed, 130 where Ctrl-C stopped it.
-
-    port: where the bench sends: udp:HOST:PORT or serial:DEVICE (extra 'hil'); UDP listens at the address
-    baud: bits per second of a serial line; default 921600
-    duration: end after this time of the bench, for example '10 s'
-    patience: end, or give up, after this time without a sample; default '5 s'
-    out: the .csv file to write
-
-    >>> rig_record(port="udp:127.0.0.1:49317", patience=0.2, out=Path("bench.csv"))  # no bench sends there
-    Traceback (most recent call last):
-    ...
-    ppafo.errors.DataError: no sample arrived within 0.2 s; received: nothing; check the connection and the sender
-    """
-    from ppafo.cli import output
-    from ppafo.errors import DataError
-
-    if duration is not None and duration <= 0.0:
-        raise DataError("--duration: must be above 0 s")
-    if out.suffix != ".csv":
-        raise DataError(f"--out {out}: the name must end in .csv")
-    # What a bench did cannot be recorded a second time.
-    output.check_new_file(out)
-    from ppafo.exports.hil.ports import open_port
-    from ppafo.exports.hil.recording import kept_aside, record
-    from ppafo.interrupts import stop_by_interrupt
-    from ppafo.storage.comma_separated import write_csv
-
-    link = open_port(port, baud, listens=True)
-    try:
-        output.tell(f"listening at {port}")
-        with stop_by_interrupt() as is_stopped, kept_aside(out) as keep:
-            collected = record(link, out.stem, duration, patience, is_stopped, keep=keep)
-            write_csv(out, collected.recording)
-        is_broken = bool(link.failure)
-    finally:
-        link.close()
-    code, aside = output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD, ""
-    if collected.is_stopped:
-        code, aside = output.EXIT_INTERRUPTED, f"stopped; {out} is complete"
-    document = {"file": str(out), **collected.document()}
-    return output.CommandOutput(f"{collected.text()}\nwritten: {out}", document, exit_code=code, aside=aside)
 
 
 def list_rig() -> CommandOutput:
