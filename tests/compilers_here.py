@@ -49,10 +49,6 @@ class ScriptCompiler:
         """Always the same."""
         return "script"
 
-    def described(self) -> str:
-        """What it is."""
-        return "a script"
-
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
         """Run the text."""
         if self.says:

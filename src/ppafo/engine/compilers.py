@@ -62,9 +62,6 @@ class Compiler(Protocol):
     def identity(self) -> str:
         """Return the dependencies of a compiled program besides its text: compiler, version, flags, processor."""
 
-    def described(self) -> str:
-        """Return name and version of the compiler for messages."""
-
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
         """Compile a text, and store next to ``path`` the files that ``run_text`` needs."""
 

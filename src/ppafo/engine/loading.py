@@ -71,12 +71,6 @@ def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
     return working or (tuple(compilers[-1:]) if name else ())
 
 
-def backend_described() -> str:
-    """Return the name and version of the backend that runs the models."""
-    compilers = compilers_to_try()
-    return compilers[0].described() if compilers else "Python itself, which compiles nothing"
-
-
 def compiled(source: str, effort: Effort = Effort.FULL) -> ModuleType | None:
     """Return the compiled module of a composed text; None if Python has to run the text, which is then logged.
 

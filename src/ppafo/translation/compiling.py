@@ -19,8 +19,6 @@ from ppafo.wording import one_line, reason
 
 LONGEST_COMPILING = 300.0
 """Time limit of a compilation [s]; the longest program takes a tenth of it."""
-LONGEST_ANSWER = 10.0
-"""Time limit of a compiler's version report [s]."""
 # Between two looks at an interrupt while a compiler runs [s].
 _PAUSE = 0.25
 
@@ -30,17 +28,15 @@ def asked(
     remedy: str = "",
     folder: str | None = None,
     scratch: Path | None = None,
-    limit: float | None = None,
 ) -> "subprocess.CompletedProcess[str]":
     """Run a compiler in ``folder``; return its output and exit status. Raises CompilerError if it cannot be run.
 
     ``scratch`` is the folder for temporary files, which remain there if the compiler is killed. A compiler that runs
-    longer than ``limit`` [s] (``LONGEST_COMPILING`` by default) is stopped with its child processes, and raises
+    longer than ``LONGEST_COMPILING`` is stopped with its child processes, and raises
     CompilerError, with ``remedy``.
     """
     # A compiler that is killed leaves its files here, where the whole folder goes away.
     temporary = {} if scratch is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))
-    seconds = LONGEST_COMPILING if limit is None else limit
     # zig needs a home folder, which the environment may not set.
     home: dict[str, str] = {}
     if not os.environ.get("HOME") and os.name == "posix":
@@ -62,15 +58,17 @@ def asked(
     except OSError as error:
         raise CompilerError(f"{line[0]} cannot be run: {reason(error)}{remedy and '; '}{remedy}") from error
     with process:
-        end = time.monotonic() + seconds
+        end = time.monotonic() + LONGEST_COMPILING
         try:
             while True:
                 with contextlib.suppress(subprocess.TimeoutExpired):
-                    said, complained = process.communicate(timeout=min(_PAUSE, seconds))
+                    said, complained = process.communicate(timeout=min(_PAUSE, LONGEST_COMPILING))
                     return subprocess.CompletedProcess(line, process.returncode, said, complained)
                 interrupts.check()
                 if time.monotonic() > end:
-                    raise CompilerError(f"{Path(line[0]).name} did not finish within {seconds:g} s and was stopped")
+                    raise CompilerError(
+                        f"{Path(line[0]).name} did not finish within {LONGEST_COMPILING:g} s and was stopped"
+                    )
         finally:
             # Ended by an interrupt or its time, the driver's children would go on.
             if process.poll() is None or process.returncode < 0:

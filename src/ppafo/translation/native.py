@@ -64,17 +64,6 @@ class CCompiler:
         """Return the identity of compiler file, flags, processor features and translator, for cache keys."""
         return repr((_file_identity(self.command[0]), self.flags, described_processor(), translator_hash()))
 
-    def described(self) -> str:
-        """Return name and version of the compiler, as it reports them."""
-        from ppafo.translation.compiling import LONGEST_ANSWER, asked  # a run asks no compiler
-
-        try:
-            answer = asked([*self.command, "--version"], limit=LONGEST_ANSWER).stdout
-        except CompilerError as failure:
-            answer = str(failure)
-        version = next(iter(answer.splitlines()), "")
-        return f"C by {self.name}: {version}" if version else f"C by {self.name}"
-
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
         """Compile composed text through C into a module; the library is kept next to an absolute ``path``."""
         # Most programs are there: they are loaded without the translator.
