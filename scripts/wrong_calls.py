@@ -113,6 +113,7 @@ PLUGINS = (
     "sensitivity",
     "simulate",
     "simulate_many",
+    "start",
     "sweep",
     "tune",
     "validate",
@@ -195,6 +196,7 @@ ARGUMENTS: Mapping[str, str] = {
     ),
     "simulate": "scenario overrides",
     "simulate_many": "scenarios threads?",
+    "start": "scenario overrides",
     "sweep": "overrides seed? threads? progress? study draws? out? agreed",
     "tune": "overrides seed? threads? progress? tuning",
     "validate": (
@@ -246,6 +248,7 @@ def right_values(recording: Path) -> dict[str, dict[str, Any]]:
         "sensitivity": {"study": STUDY, "samples": 64, "configuration": "proportional"},
         "simulate": {"scenario": TASK},
         "simulate_many": {"scenarios": [TASK]},
+        "start": {"scenario": TASK},
         "sweep": {"study": STUDY, "draws": 8},
         "tune": {"tuning": "pid-gains"},
         "validate": {"parameter_set": SET, "recordings": [recording]},

@@ -67,7 +67,7 @@ _HOMES = {
     "ppafo.analyses.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.analyses.validate.question": ("validate",),
     "ppafo.analyses.validate.result": ("Validation",),
-    "ppafo.running": ("simulate", "simulate_many"),
+    "ppafo.running": ("SteppedRun", "simulate", "simulate_many", "start"),
     "ppafo.signals": ("Channel", "Recording"),
     "ppafo.simulation.loading": ("list_scenarios",),
     "ppafo.simulation.scenario": ("Scenario",),

@@ -58,8 +58,10 @@ from ppafo.parameters.parts import Part as Part
 from ppafo.parameters.parts import load_catalogue as load_catalogue
 from ppafo.report.finding import Finding as Finding
 from ppafo.report.stored_figure import read_result as read_result
+from ppafo.running import SteppedRun as SteppedRun
 from ppafo.running import simulate as simulate
 from ppafo.running import simulate_many as simulate_many
+from ppafo.running import start as start
 from ppafo.signals import Channel as Channel
 from ppafo.signals import Recording as Recording
 from ppafo.simulation.loading import list_scenarios as list_scenarios
@@ -105,6 +107,7 @@ __all__ = [
     "SimulationError",
     "Sizing",
     "Status",
+    "SteppedRun",
     "StudyError",
     "StudyResults",
     "UnitError",
@@ -145,6 +148,7 @@ __all__ = [
     "sensitivity",
     "simulate",
     "simulate_many",
+    "start",
     "sweep",
     "tune",
     "validate",

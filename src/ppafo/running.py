@@ -3,14 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, final
 
 from ppafo.arguments import Overrides, Threads, checked
+from ppafo.engine.run import batch_of
+from ppafo.errors import SimulationError
 from ppafo.loading import scenario_or_load
+from ppafo.model.sensors import GaitMeasurement, Measurement
+from ppafo.model.valves.kind import VENT
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import simulate as of_loaded
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import Result
+from ppafo.simulation.simulate import Result, result_of
 
 if TYPE_CHECKING:
     from ppafo.simulation.gains import Gains
@@ -88,3 +94,125 @@ def simulate_many(
     name_plugins(plugins)
     results = of_loaded.simulate_many([scenario_or_load(scenario) for scenario in scenarios], threads)
     return [replace(result, tries=_tried) for result in results]
+
+
+class GivenCommands:
+    """Controller that repeats the commands [-] of a stepped run, and then holds the last one."""
+
+    def __init__(self) -> None:
+        self.commands: list[float] = []
+        self._sample = 0
+
+    def reset(self) -> None:
+        """Begin at the first command."""
+        self._sample = 0
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
+        """Return the command of the next sample."""
+        self._sample += 1
+        return self.commands[min(self._sample, len(self.commands)) - 1]
+
+
+@final
+class SteppedRun:
+    """Run in progress whose commands the caller gives, sample by sample; made by ``start``.
+
+    ``period`` is the time between two samples [s]; ``measurement`` the sensor readings at the present one, a
+    ``Measurement``, or in a walk a ``GaitMeasurement``.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._given = GivenCommands()
+        self._scenario = scenario.controlled_by(self._given)
+        self._planned = plan_run(self._scenario)
+        batch = batch_of(self._planned)
+        if batch.program.walks:
+            from ppafo.walking.contradictions import check_no_bottle
+
+            check_no_bottle(scenario)
+        self._allowed = (-1.0, 1.0, VENT) if batch.program.walks else (-1.0, 1.0)
+        self._run = SampledRun(batch)
+        self.period = scenario.controller.period
+        self.measurement: Measurement | GaitMeasurement = self._run.measurement()
+
+    @property
+    def time(self) -> float:
+        """Time of the present sample [s]."""
+        return self._run.time
+
+    @property
+    def reference(self) -> float:
+        """Reference at the present sample: torque [N m], angle [rad] or pressure [Pa], as ``reference.of`` says."""
+        return self._run.reference
+
+    @property
+    def state(self) -> Any:
+        """True state: ``angle`` [rad], ``angular_velocity`` [rad/s], ``mass_1``, ``supplied_mass`` [kg] and others."""
+        return self._run.state
+
+    @property
+    def has_diverged(self) -> bool:
+        """True if the numerical solution has failed, as ``Result.status`` tells."""
+        return self._run.has_diverged
+
+    @property
+    def is_over(self) -> bool:
+        """True at the end of the scenario, and for a run that has diverged."""
+        return self._run.sample >= self._run.samples or self.has_diverged
+
+    def step(self, command: float) -> Measurement | GaitMeasurement:
+        """Apply a command [-] until the next sample, and return the measurement there.
+
+        A command is -1 to 1, or ``VENT`` (2) in a walk, which vents both chambers. Raises SimulationError for any
+        other, and for a run that is over.
+        """
+        if self.is_over:
+            raise SimulationError(f"{self._scenario.name}: the run is over at t = {self.time:.6g} s; start another one")
+        given = float(command)
+        lowest, highest, *vent = self._allowed
+        if not (lowest <= given <= highest or given in vent):
+            also = f", or {VENT:g} to vent both chambers" if vent else ""
+            raise SimulationError(f"command = {command!r} at t = {self.time:.6g} s: must be -1 to 1{also}")
+        self._given.commands[self._run.sample :] = [given]
+        self._run.advance(given)
+        self.measurement = self._run.measurement()
+        return self.measurement
+
+    def result(self) -> Result:
+        """Return the result up to the present sample; its scenario repeats the given commands in ``simulate``.
+
+        Raises SimulationError before the first step.
+        """
+        if not self._run.sample:
+            raise SimulationError(f"{self._scenario.name}: no command has been given yet, so there is nothing recorded")
+        return result_of(self._scenario, self._planned, self._run.result())
+
+
+@checked
+def start(scenario: Scenario | str | Path, overrides: Overrides = (), *, plugins: Plugins = ()) -> SteppedRun:
+    """Start a run whose valve commands the caller gives, one for each sample of the controller.
+
+    It has the sensors, sample period and duration of the scenario, without its controller. Start another run to begin
+    again, with another ``sensors.seed`` for other noise.
+
+    Arguments:
+        scenario: a Scenario, the name of a shipped one, or a .toml file
+        overrides: values to change, as in ``simulate``
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        a SteppedRun at time 0
+
+    Raises:
+        ScenarioError: a scenario that cannot be used
+        ParameterError: a parameter set, or a value of it, that cannot be used
+
+    >>> import ppafo
+    >>> run = ppafo.start("torque-task-proportional", {"run.duration": "0.1 s"})
+    >>> while not run.is_over:
+    ...     measurement = run.step(max(-1.0, min(1.0, 0.3 * (run.reference - run.measurement.torque))))
+    >>> print(f"{run.time:.1f} s, {measurement.torque:.2f} N m, {run.state.supplied_mass:.1e} kg of gas")
+    0.1 s, 0.35 N m, 2.2e-05 kg of gas
+    """
+    name_plugins(plugins)
+    return SteppedRun(scenario_or_load(scenario, overrides))

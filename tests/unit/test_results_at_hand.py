@@ -91,8 +91,8 @@ IN_A_FOLDER: dict[str, Callable[[Path], Any]] = {
     ),
     "reproduce": lambda _: ppafo.reproduce(),
 }
-PLAIN = {"workbench", "scenario_from_dict", *(name for name in dir(ppafo) if name.startswith("list_"))}
-"""Functions whose results are bytes or names, and one that has the result of another."""
+PLAIN = {"workbench", "scenario_from_dict", "start", *(name for name in dir(ppafo) if name.startswith("list_"))}
+"""Functions whose results are bytes, names or a run in progress, and one that has the result of another."""
 COPIES: dict[str, Callable[[Any], Any]] = {
     "pickled": lambda result: pickle.loads(pickle.dumps(result)),
     "copied": copy.copy,

@@ -6,6 +6,7 @@ from typing import Any, final
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, effort_for, load_program, samples_in
 from ppafo.engine.rows import group_of, row_numbers
+from ppafo.engine.run import NEVER_FAILED
 from ppafo.errors import ScenarioError
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import NOTHING_SEEN, GaitMeasurement, Measurement, measure, measure_gait
@@ -53,6 +54,16 @@ class SampledRun:
         """Reference at the current sample [N m]."""
         reference: float = self._batch.program.reference.value(self._reference, self.time)[0]
         return reference
+
+    @property
+    def state(self) -> Any:
+        """True state at the current sample [SI]: angle, masses of gas and others, as a NamedTuple."""
+        return group_of("state", self._batch.program.state_rows(), self._block.states[:, 0].tolist())
+
+    @property
+    def has_diverged(self) -> bool:
+        """True if the numerical solution has failed."""
+        return bool(self._block.states[self._rows["result.failure_time"], 0] < NEVER_FAILED)
 
     def measurement(self) -> Any:
         """Sensor readings at the current sample: a ``Measurement``, or in a walk a ``GaitMeasurement``.
