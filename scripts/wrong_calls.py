@@ -97,7 +97,6 @@ PLUGINS = (
     "bottle",
     "compare",
     "design",
-    "estimate",
     "find",
     "identify",
     "linearise",
@@ -138,7 +137,7 @@ KINDS: Mapping[str, str] = {
     "overrides": "overrides",
     "name": (
         "baseline bottle catalogue columns configuration folder gait method metric "
-        "motion part path problem statistic such_that task_sequence valve vary width"
+        "motion part path problem such_that task_sequence valve vary width"
     ),
     "names": "also configurations initial metrics recordings scenarios thresholds",
     "positive": "atmosphere gas_per_stride mass minutes peak_flow pressure stature stride_time torque volume",
@@ -167,10 +166,6 @@ ARGUMENTS: Mapping[str, str] = {
         "problem:object? threads? mass? stature? gait? torque? pressure? minutes? toes? catalogue? bottle? progress?"
     ),
     "endurance_of_walk": "result bottle?",
-    "estimate": (
-        "overrides seed? threads? progress? confidence maximum_failed study metric statistic width? also "
-        "configuration first_draws draws"
-    ),
     "evaluate": "recording columns?",
     "find": "scenario vary such_that highest grid overrides threads? progress?",
     "identify": "problem progress",
@@ -224,7 +219,6 @@ def right_values(recording: Path) -> dict[str, dict[str, Any]]:
         "compare_walks": {"scenario": WALK},
         "design": {"mass": 72.5, "torque": 2.5, "pressure": 4.46e5, "minutes": 5.0},
         "endurance_of_walk": {"result": ppafo.walk(WALK, minutes=0.1)},
-        "estimate": {"study": STUDY, "metric": "rms_error", "draws": 512, "configuration": "proportional"},
         "evaluate": {"recording": recording},
         "find": {
             "scenario": TASK,

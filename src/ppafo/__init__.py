@@ -63,7 +63,6 @@ _HOMES = {
     "ppafo.analyses.sweep.answer": ("load_study_results",),
     "ppafo.analyses.sweep.results": ("StudyResults",),
     "ppafo.analyses.sweep.solve": ("sweep",),
-    "ppafo.analyses.sweep.statistic": ("estimate",),
     "ppafo.analyses.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.analyses.validate.question": ("validate",),
     "ppafo.analyses.validate.result": ("Validation",),

@@ -21,7 +21,6 @@ from ppafo.analyses.sets.audit import audit as audit
 from ppafo.analyses.sweep.answer import load_study_results as load_study_results
 from ppafo.analyses.sweep.results import StudyResults as StudyResults
 from ppafo.analyses.sweep.solve import sweep as sweep
-from ppafo.analyses.sweep.statistic import estimate as estimate
 from ppafo.analyses.tune.problem import list_tunings as list_tunings
 from ppafo.analyses.tune.problem import load_tuning as load_tuning
 from ppafo.analyses.tune.question import tune as tune
@@ -119,7 +118,6 @@ __all__ = [
     "compare_walks",
     "design",
     "endurance_of_walk",
-    "estimate",
     "evaluate",
     "find",
     "identify",

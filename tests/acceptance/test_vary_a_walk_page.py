@@ -9,7 +9,6 @@ import pytest
 
 import ppafo
 from ppafo.analyses.find.question import find
-from ppafo.analyses.sweep.statistic import estimate
 from ppafo.analyses.tune.problem import load_tuning
 from ppafo.analyses.tune.question import tune
 from ppafo.loading import load_scenario
@@ -60,15 +59,6 @@ def test_a_person_of_a_study_is_the_one_of_that_number() -> None:
         for name in ("toe_clearance", "gas"):
             assert found.metrics[name][row] == pytest.approx(alone.metrics[name].value, rel=1.0e-12)
     assert np.ptp(found.metrics["gas"]) > 0.01 * found.metrics["gas"][0]
-
-
-def test_the_probability_over_wearers_is_that_of_the_draws_below_the_limit() -> None:
-    found = estimate(
-        "wearers", metric="toe_clearance", statistic="probability above -18 mm", width="0.5", first_draws=64, draws=64
-    ).found
-    above = found.values > -0.018
-    assert found.interval.value == pytest.approx(above.mean(), abs=0.02)
-    assert 0.3 < above.mean() < 0.9
 
 
 @pytest.mark.thorough

@@ -200,7 +200,7 @@ OF_A_SET = (
     "simulate torque-task-proportional --set device.set=",
     "walk solenoid --set device.set=",
 )
-OF_A_STUDY = ("sweep", "sensitivity", "compare --study", "sweep --statistic mean --metric rms_error")
+OF_A_STUDY = ("sweep", "sensitivity", "compare --study")
 LINES: dict[str, tuple[str, str]] = {
     **{line: (SCENARIO, f"{line} given.toml") for line in OF_A_SCENARIO},
     **{line: (SET, f"{line} given.toml".replace("= ", "=")) for line in OF_A_SET},

@@ -15,7 +15,6 @@ FOLDERS: dict[str, list[str]] = {
     "sweep": ["pressure-and-area"],
     "compare": ["step-response"],
     "sensitivity": ["torque-task-uncertainty"],
-    "sweep of a statistic": ["torque-task-uncertainty", "--statistic", "mean", "--metric", "rms_error"],
     "find": ["step-response", "--vary", "supply.pressure=20..90 psi_g", "--such-that", "arrival_time <= 0.3 s"],
     "tune": ["pid-gains"],
     "linearise": ["torque-task-proportional"],

@@ -69,9 +69,6 @@ MADE: dict[str, Callable[[], Any]] = {
     "find": lambda: ppafo.find(TASK, vary="supply.pressure=20..90 psi_g", such_that="rms_error <= 0.5 N m", grid=3),
     "linearise": lambda: ppafo.linearise(TASK, overrides={"reference.level": 3.0}),
     "sweep": lambda: ppafo.sweep("torque-task-uncertainty", draws=4),
-    "estimate": lambda: ppafo.estimate(
-        "torque-task-uncertainty", metric="rms_error", configuration="solenoid", draws=256
-    ),
     "sensitivity": lambda: ppafo.sensitivity(
         "torque-task-uncertainty", configuration="solenoid", samples=64, metrics="rms_error"
     ),

@@ -19,8 +19,6 @@ from ppafo.wording import nearest_name, read_by, read_by_caller
 P = ParamSpec("P")
 R = TypeVar("R")
 _EMPTY = inspect.Parameter.empty
-_ANSWERED_BY = {("sweep", "statistic"): "estimate", ("sweep", "metric"): "estimate"}
-"""Function that has an argument missing in the Python function of the same name, by command and argument."""
 
 
 class _Parameter(NamedTuple):
@@ -73,9 +71,8 @@ def _values(
     values = dict(zip(positional_names, positional, strict=False))
     for name, value in by_name.items():
         if name not in parameters:
-            other = _ANSWERED_BY.get((function, name))
-            hint = f"; use ppafo.{other}" if other else nearest_name(name, parameters)
-            raise ArgumentError(f"{function}() has no argument '{name}'{hint}; available: {', '.join(parameters)}")
+            available = f"{nearest_name(name, parameters)}; available: {', '.join(parameters)}"
+            raise ArgumentError(f"{function}() has no argument '{name}'{available}")
         if name in values:
             raise ArgumentError(f"{function}(): {name} is given twice, by position and by name")
         values[name] = value

@@ -65,7 +65,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "sweep": Command(
             f"{_ANALYSES}.sweep.question:sweep_into_folder",
             *_STUDIES,
-            first_line="Run a study: many runs, one row each, resumable; or a statistic to a wanted precision.",
+            first_line="Run a study: many runs, one row each, resumable.",
         ),
         "compare": _of_scenario(
             f"{_ANALYSES}.compare.question:compare", "Compare configurations, also over an uncertain device."

@@ -24,7 +24,6 @@ from ppafo.simulation.at_hand import RecordedResult
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
-from ppafo.wording import argument_text
 
 SHORTER = 4
 """Factor by which the finer run shortens the steps; its allowed error is smaller by the square of this factor."""
@@ -181,12 +180,11 @@ class Check:
         inexact = [row.name for row in sensitive if not row.changed_by & _PERTURBATIONS]
         sentences = []
         if perturbed:
-            sweep = argument_text("ppafo.sweep(..., statistic=...)", option="ppafo sweep --statistic")
             kinds = {name.split()[0] for row in sensitive for name in row.changed_by & _PERTURBATIONS}
             sentences.append(
                 f"{', '.join(perturbed)}: changed by moving a {' or '.join(sorted(kinds, reverse=True))} by {MOVE:.0e} "
                 "of its range, far less than can be measured. One run does not determine these values; give "
-                f"the spread over many runs ({sweep})."
+                "the spread over many runs (ppafo sweep)."
             )
         if inexact:
             sentences.append(

@@ -29,24 +29,6 @@ def replicates_interval(values: Floats, replicates: int, confidence: float) -> C
     return ConfidenceInterval(mean, mean - reach, mean + reach)
 
 
-def floored_interval(values: Floats, replicates: int, confidence: float) -> ConfidenceInterval:
-    """Return the mean with the wider confidence interval: between replicates (Student), or of independent draws.
-
-    If rare values dominate the mean, evenly spaced draws may miss them in every replicate, and the spread between
-    replicates is smaller than the error.
-    """
-    from scipy.special import ndtri
-
-    spread = replicates_interval(values, replicates, confidence)
-    known = values[np.isfinite(values)]
-    # A replicate without a value has no mean: nothing is known of the spread.
-    if not math.isfinite(spread.width):
-        return spread
-    plain = float(ndtri(0.5 + 0.5 * confidence)) * float(np.std(known)) / math.sqrt(known.size)
-    reach = max(0.5 * spread.width, plain)
-    return ConfidenceInterval(spread.value, spread.value - reach, spread.value + reach)
-
-
 def jackknife_reach(left_out: Floats, confidence: float) -> Floats:
     """Return the half width of the confidence interval of an estimate from independent replicates (Student).
 
@@ -132,24 +114,6 @@ def share_interval(hits: Floats, replicates: int, confidence: float) -> Confiden
         return fraction_interval(count, known.size, confidence)
     interval = replicates_interval(hits, replicates, confidence)
     return ConfidenceInterval(interval.value, max(0.0, interval.low), min(1.0, interval.high))
-
-
-def quantile_interval(values: Floats, share: float, confidence: float) -> ConfidenceInterval:
-    """Return a quantile with a confidence interval between two order statistics, which is valid for any distribution.
-
-    The number of draws below the quantile is binomial (David and Nagaraja, Order Statistics, section 7.1). An end of
-    the interval is infinite if there are too few draws.
-    """
-    from scipy.stats import binom
-
-    ordered, tail = np.sort(values), 0.5 - 0.5 * confidence
-    lower = int(binom.ppf(tail, values.size, share))
-    upper = int(binom.ppf(1.0 - tail, values.size, share)) + 1
-    return ConfidenceInterval(
-        float(np.quantile(ordered, share)),
-        float(ordered[lower - 1]) if lower >= 1 else -math.inf,
-        float(ordered[upper - 1]) if upper <= values.size else math.inf,
-    )
 
 
 def fraction_text(fraction: ConfidenceInterval) -> str:

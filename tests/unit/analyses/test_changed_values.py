@@ -18,9 +18,6 @@ BOTH = ("torque-task-proportional", "torque-task-solenoid")
 ASKED: dict[str, Callable[[list[str]], Finding[Any]]] = {
     "compare": lambda changes: ppafo.compare(BOTH, overrides=changes),
     "compare, of a study": lambda changes: ppafo.compare(study=STUDY, draws=32, overrides=changes),
-    "estimate": lambda changes: ppafo.estimate(
-        STUDY, metric="rms_error", configuration="proportional", draws=256, overrides=changes
-    ),
     "find": lambda changes: ppafo.find(
         TASK, vary="reference.level=1..3 N m", such_that="follows", grid=3, overrides=changes
     ),

@@ -1,4 +1,4 @@
-"""``ppafo compare``, ``sensitivity``, ``sweep --statistic`` and ``tune``: text, JSON, files, and what is refused."""
+"""``ppafo compare``, ``sensitivity`` and ``tune``: text, JSON, files, and what is refused."""
 
 import json
 import shlex
@@ -34,19 +34,6 @@ def commands(tuning: Path) -> dict[str, list[str]]:
     """A quick run of each command."""
     return {
         "compare": ["compare", "--study", STUDY, "--baseline", "solenoid", "--draws", "64", *SHORT],
-        "statistic": [
-            *(
-                "sweep",
-                STUDY,
-                "--statistic",
-                "quantile 0.5",
-                "--metric",
-                "rms_error",
-                "--configuration",
-                "proportional",
-            ),
-            *("--width", "20 %", "--first-draws", "64", "--draws", "512", *SHORT),
-        ],
         "sensitivity": [
             *("sensitivity", STUDY, "--samples", "64", "--metric", "gas_supplied"),
             *("--configuration", "proportional", "--independent", *SHORT),
@@ -55,7 +42,7 @@ def commands(tuning: Path) -> dict[str, list[str]]:
     }
 
 
-@pytest.mark.parametrize("command", ["compare", "statistic", "sensitivity", "tune"])
+@pytest.mark.parametrize("command", ["compare", "sensitivity", "tune"])
 def test_each_command_prints_and_leaves_a_report_with_its_figures(
     command: str, tuning: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -71,7 +58,7 @@ def test_each_command_prints_and_leaves_a_report_with_its_figures(
     assert text.splitlines()[0] == printed.splitlines()[0]
 
 
-@pytest.mark.parametrize("command", ["compare", "statistic", "sensitivity", "tune"])
+@pytest.mark.parametrize("command", ["compare", "sensitivity", "tune"])
 def test_each_command_prints_one_json_document_the_same_every_time(
     command: str, tuning: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -132,15 +119,6 @@ effort = { starts = 1, generations = 1, candidates_per_gain = 4 }
     )
     assert main(["tune", str(path)]) == 1
     assert "the torque ceiling is the cause" in capsys.readouterr().out.splitlines()[0]
-
-
-def test_an_interval_that_stays_too_wide_is_exit_code_1(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    words = ["sweep", STUDY, "--statistic", "mean", "--metric", "rms_error", "--configuration", "proportional", *SHORT]
-    assert main([*words, "--width", "0.001 %", "--first-draws", "32", "--draws", "64"]) == 1
-    assert "the target width was not reached with the maximum of 64 draws" in capsys.readouterr().out
 
 
 def test_an_interruption_leaves_nothing(

@@ -138,10 +138,6 @@ interrupts.listen = ready
 
 COMMANDS = {
     "simulate": ("simulate torque-task-solenoid", 2.0),
-    "sweep --statistic": (
-        "sweep torque-task-uncertainty --statistic mean --configuration proportional --metric gas_supplied --width 1%",
-        2.0,
-    ),
     "sweep": ("sweep torque-task-uncertainty --draws 32", 2.4),
 }
 """Words of a command, and the CPU seconds that it takes, about, where models are compiled."""

@@ -10,7 +10,7 @@ from ppafo.errors import StudyError
 from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.draws import choose_configuration, drawn_in, study_of, uncertainty_in, uncertainty_of
-from ppafo.studies.intervals import effective_sample_size, fraction_interval, quantile_interval, replicates_interval
+from ppafo.studies.intervals import effective_sample_size, fraction_interval, replicates_interval
 from ppafo.studies.limits import MetricLimit, check_metrics
 from ppafo.studies.loading import load_study
 
@@ -138,23 +138,6 @@ def test_the_interval_of_a_share_is_the_exact_one(hits: int, draws: int) -> None
     interval = fraction_interval(hits, draws, 0.95)
     known = stats.binomtest(hits, draws).proportion_ci(0.95, "exact")
     assert (interval.low, interval.high) == pytest.approx((known.low, known.high), abs=1e-12)
-
-
-@pytest.mark.parametrize("share", [0.05, 0.5, 0.9])
-def test_the_interval_of_a_quantile_holds_it_often_enough_and_not_by_much(share: float) -> None:
-    from scipy import stats
-
-    random = np.random.default_rng(2)
-    truth = stats.expon.ppf(share)
-    intervals = [quantile_interval(random.exponential(size=200), share, 0.9) for _ in range(2000)]
-    held = np.mean([interval.low <= truth <= interval.high for interval in intervals])
-    assert 0.89 <= held <= 0.95
-
-
-def test_a_quantile_that_few_draws_cannot_bound_has_an_open_end() -> None:
-    interval = quantile_interval(np.arange(20.0), 0.99, 0.95)
-    assert interval.high == math.inf
-    assert interval.width == math.inf
 
 
 def test_a_limit_is_kept_at_itself_and_never_without_a_value() -> None:

@@ -10,10 +10,7 @@ import pytest
 
 import ppafo
 from ppafo.analyses.find import solve as find_module
-from ppafo.analyses.sweep import statistic as statistic_module
-from ppafo.analyses.sweep.statistic_kind import Statistic, parse_statistic
 from ppafo.errors import StudyError
-from ppafo.report.finding import Finding
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.draws import uncertainty_of
@@ -173,24 +170,6 @@ def test_a_condition_of_find_counts_from_the_atmosphere_of_the_scenario(monkeypa
     assert limits == [pytest.approx(130.0e3)]
     with pytest.raises(StudyError, match=REFUSED):
         ppafo.find(TASK, vary=f"{ATMOSPHERE}=70..90 kPa_a", such_that=f"{METRIC} <= 50 kPa_g", overrides=HIGH_UP)
-
-
-def test_a_probability_counts_from_the_atmosphere_of_the_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[Statistic] = []
-
-    def noted(*given: Any) -> Finding[None]:
-        asked.append(given[3])
-        return Finding("sweep", "", "", (), (), None)
-
-    monkeypatch.setattr(statistic_module, "draw_until", noted)
-    ppafo.estimate(
-        high_study("supply.pressure", "300 kPa_a", "400 kPa_a"), metric=METRIC, statistic="probability above 50 kPa_g"
-    )
-    assert asked == [parse_statistic("probability above 50 kPa_g", METRIC, 80.0e3)]
-    with pytest.raises(StudyError, match=REFUSED):
-        ppafo.estimate(
-            high_study(ATMOSPHERE, "70 kPa_a", "90 kPa_a"), metric=METRIC, statistic="probability above 50 kPa_g"
-        )
 
 
 def test_a_constraint_of_a_tuning_counts_from_the_atmosphere_of_the_scenario() -> None:

@@ -2,7 +2,6 @@
 
 import copy
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,19 +9,12 @@ import pytest
 
 import ppafo
 from ppafo.analyses.compare.question import compare
-from ppafo.analyses.sweep.statistic import draw_until
-from ppafo.analyses.sweep.statistic_kind import Statistic, parse_statistic
-from ppafo.analyses.sweep.stopping import StoppingRule
 from ppafo.errors import StudyError
-from ppafo.report.kind import ConfidenceInterval
-from ppafo.studies.distributions import Floats, NormalAround
-from ppafo.studies.draws import Uncertainty, uncertainty_of
+from ppafo.studies.draws import uncertainty_of
 from ppafo.studies.intervals import noise_interval
 from ppafo.studies.loading import load_study
-from ppafo.studies.sampling import NOISE, other_noise, with_noise
-from ppafo.studies.study import RandomValue
+from ppafo.studies.sampling import NOISE, other_noise
 from ppafo.study.blocks import drawn_values
-from tests.model_runs import model_runs
 
 NOISY = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
 DOCUMENT: dict[str, Any] = {
@@ -131,27 +123,6 @@ def test_a_share_of_noise_and_both_ends_are_between_nothing_and_all() -> None:
     share = noise_interval(values, -values, 0.95)
     assert share is not None
     assert 0.0 <= share.low <= share.value <= share.high <= 1.0
-
-
-@pytest.mark.parametrize("statistic", [parse_statistic(text, "rms_error", None) for text in ("mean", "quantile 0.5")])
-def test_a_statistic_says_how_much_is_noise(statistic: Statistic) -> None:
-    from scipy import stats
-
-    def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        noise = stats.norm.ppf((columns.get(NOISE, np.zeros(columns["x"].size)) + 0.5) / 2.0**32)
-        return {"rms_error": columns["x"] + 0.5 * noise}
-
-    def share_in(uncertainty: Uncertainty) -> ConfidenceInterval | None:
-        runs = model_runs(model, ["rms_error"])
-        return draw_until(runs, uncertainty, "rms_error", statistic, rule, 1).found.share_of_noise
-
-    drawn = (RandomValue("x", NormalAround(0.0, 1.0)),)
-    heard = Uncertainty(*with_noise(drawn, None, [ppafo.load_scenario("torque-task-proportional", NOISY)], ["x"]))
-    rule = StoppingRule(0.2, False, first=1024, maximum=4096)
-    share = share_in(heard)
-    assert share is not None
-    assert share.value == pytest.approx(0.2, abs=0.04)
-    assert share_in(Uncertainty(drawn)) is None
 
 
 def test_another_stream_is_another_seed_for_every_seed() -> None:

@@ -13,10 +13,9 @@ import pytest
 import ppafo
 from ppafo.analyses.sweep import solve
 from ppafo.analyses.sweep.answer import load_study_results
-from ppafo.analyses.sweep.question import sweep_into_folder
 from ppafo.analyses.sweep.results import StudyResults
 from ppafo.analyses.sweep.solve import LOG, sweep
-from ppafo.errors import ArgumentError, DataError, StudyError
+from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress
 from ppafo.signals.recording import CHANNELS
@@ -440,10 +439,3 @@ def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> N
         StudyError, match="a loaded Study accepts no overrides, draws or seed; give these to load_study"
     ):
         sweep(load_study(small), draws=3)
-
-
-def test_a_statistic_in_python_is_asked_of_estimate() -> None:
-    with pytest.raises(ArgumentError, match=r"sweep\(\) has no argument 'statistic'; use ppafo\.estimate"):
-        sweep("torque-task-uncertainty", statistic="mean")  # type: ignore[call-arg]
-    with pytest.raises(StudyError, match="for example statistic='mean' metric='rms_error'"):
-        sweep_into_folder("torque-task-uncertainty", metric="rms_error")
