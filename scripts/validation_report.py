@@ -207,10 +207,9 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
         "simulator": against_simulator,
         "balances": balances,
         "formulas": tested(
-            "Closed formulas, joined chambers, gas with an energy balance",
+            "Closed formulas, gas with an energy balance",
             "solutions by hand, and CVODE",
             "tests/convergence/test_closed_formulas.py",
-            "tests/convergence/test_joined_chambers.py",
             "tests/convergence/test_thermal_gas.py",
         ),
         "order": tested(

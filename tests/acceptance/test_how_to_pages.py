@@ -415,14 +415,9 @@ def test_a_publication_of_your_own_is_judged(
 
 
 @pytest.mark.thorough
-def test_the_commands_on_published_studies_run_and_recycling_saves_what_the_page_says(
+def test_the_commands_on_published_studies_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     commands = [line for block in code_blocks("the-paper.md", "sh") for line in block.splitlines()]
-    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 5
-    walked = json.loads((tmp_path / "out" / "recycling" / "walk.json").read_text())
-    recycling = walked["metrics"]["gas"]["value"]
-    page = (PAGES.parent / "the-paper.md").read_text(encoding="utf-8")
-    (shown,) = re.findall(r"takes (0\.\d+) g instead of 0\.678", page)
-    assert f"{1e3 * recycling:.3f}" == shown
+    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 4

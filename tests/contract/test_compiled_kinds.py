@@ -117,10 +117,6 @@ def valves(draw: random.Random) -> Iterator[Entry]:
             yield Entry(f"{name}_settle", model.settle, events)
             if model.shift is not None:
                 yield Entry(f"{name}_shift", model.shift, shifts)
-            if model.joint is not None and number == 0:
-                shown = [(model.advance(*arguments)[0],) for arguments in stepped]
-                yield Entry(f"{name}_joint_opening", model.joint.opening, shown)
-                yield Entry(f"{name}_joint_instant", model.joint.instant, instants)
 
 
 def sensors(draw: random.Random) -> Iterator[Entry]:

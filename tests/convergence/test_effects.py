@@ -33,7 +33,6 @@ STEP, PAIR, SPOOL = "step-response", "torque-task-solenoid", "torque-task-propor
 CASES = (
     *((STEP, SEALS), (STEP, STRIBECK), (PAIR, (*SEALS, *STRIBECK, *FREE))),
     *((PAIR, (*SLOW, *WARM, *own)) for own in (("run.duration=1 s",), ("motion.kind=free", "run.duration=0.4 s"))),
-    (PAIR, ("run.duration=0.5 s", "device.valve=solenoid_recycling", *WARM)),
     *((STEP, ICE), (STEP, (*ICE, "effects.silencer.sonic_conductance=1e-8 m^3/(s Pa)"))),
     *((PAIR, (*ICE, "motion.kind=free", "run.duration=0.5 s")), (STEP, (*ICE, *THERMAL, "run.duration=0.3 s"))),
     *((STEP, OPENING), (STEP, (*OPENING, *THERMAL, "run.duration=0.3 s")), (PAIR, (*OPENING, *FREE))),

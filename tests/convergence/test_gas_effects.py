@@ -15,7 +15,6 @@ from ppafo.parameters.loading import load_device
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.simulate import simulate
-from tests.reference.reference_solver import compare_with_reference
 
 CURVE = isentropic_curve(1.4, 0.999)
 OPENING = ("effects.leak_opening.pressure=150 kPa_d",)
@@ -50,16 +49,6 @@ def test_a_leak_that_never_opens_loses_nothing() -> None:
         for texts in ((), OPENING, ("effects.leak_opening.pressure=10 bar_d",))
     ]
     assert leaked[0] > leaked[1] > leaked[2] == 0.0
-
-
-def test_a_valve_that_joins_the_chambers_passes_gas_where_the_leak_is_shut() -> None:
-    tight = "effects.leak_opening.pressure=10 bar_d"
-    run = plan_run(
-        load_scenario("torque-task-solenoid", ("device.valve=solenoid_recycling", tight, "run.duration=0.5 s"))
-    )
-    assert run.program.valve.joint is not None
-    agreement = compare_with_reference(run)
-    assert agreement.worst_pressure < 1e-3
 
 
 def test_a_linear_model_has_the_leak_as_a_difference_of_two_runs_has() -> None:

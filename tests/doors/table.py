@@ -234,11 +234,6 @@ WALK_FEATURES: dict[str, Feature] = {
     "late command": _feature("valve.delay=5 ms", needs="valve"),
     "spool": _feature("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", needs="valve"),
     "play": _feature("effects.spool_play.width=0.04", needs="valve"),
-    "recycling": _feature(
-        *("device.valve=solenoid_recycling", "controller.kind=event_on_off"),
-        *("valve.joining_time=60 ms", "valve.holding_time=40 ms", "valve.opening_delay=3 ms"),
-        needs="valve law actuator",
-    ),
     "thermal gas": _feature(*_THERMAL),
     "supply lines": _feature(*_LINES),
     "ice": _feature("effects.ice.blockage_per_gas=1e4 1/kg", "effects.ice.melting_time=30 ms"),
@@ -408,7 +403,7 @@ SHORT = (
     _chosen(VANE_BASE, "bladder", "slew", "dead band", "damped", "smooth"),
     _chosen(VANE_BASE, "muscle pair", "hysteresis", "leak that opens", "laminar leak", "relieving regulators"),
     _chosen(WALK_BASE, "late command", "noise", "lost samples", "ice"),
-    _chosen(WALK_BASE, "recycling", "heel distorted", "angle distorted", "hose 1 kinked", "thermal gas"),
+    _chosen(WALK_BASE, "spool", "heel distorted", "angle distorted", "hose 1 kinked", "thermal gas"),
 )
 """Twelve cases in which most of what has a state, a history or a clock meets something else."""
 

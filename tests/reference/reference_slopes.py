@@ -179,44 +179,6 @@ def thermal_gas_rates(
     )
 
 
-def joined_gas_rates(
-    gas: GasRates, valve_orifice: ExactOrifice, opening: float, pressure_1: float, pressure_2: float
-) -> GasRates:
-    """Mass flows [kg/s] with a valve beside the leak that joins the chambers. Equations (6), (7), (9)."""
-    across = exact_flow(pressure_1, pressure_2, opening * valve_orifice.conductance, valve_orifice)
-    return GasRates(
-        mass_1=gas.mass_1 - across,
-        mass_2=gas.mass_2 + across,
-        supplied=gas.supplied,
-        vented=gas.vented,
-        leaked=gas.leaked + abs(across),
-    )
-
-
-def joined_thermal_rates(
-    gas: ThermalGasRates,
-    thermal: ThermalParameters,
-    valve_orifice: ExactOrifice,
-    opening: float,
-    pressure_1: float,
-    pressure_2: float,
-    warmth_1: float,
-    warmth_2: float,
-) -> ThermalGasRates:
-    """As ``joined_gas_rates`` [kg/s], of gas with an energy balance; warmths are T/T_0 [-]."""
-    flow = exact_flow(pressure_1, pressure_2, opening * valve_orifice.conductance, valve_orifice)
-    across = transport(thermal, pressure_1, pressure_2, warmth_1, warmth_2, flow)
-    return ThermalGasRates(
-        content_1=gas.content_1 - across.content,
-        content_2=gas.content_2 + across.content,
-        mass_1=gas.mass_1 - across.mass,
-        mass_2=gas.mass_2 + across.mass,
-        supplied=gas.supplied,
-        vented=gas.vented,
-        leaked=gas.leaked + abs(across.mass),
-    )
-
-
 PLANT_UNKNOWNS = 7
 
 
@@ -330,24 +292,17 @@ def _moves(path: str) -> str:
 
 def gas_lines(program: Program, add: Callable[..., str]) -> list[str]:
     """Lines that find the rates ``gas`` and write the slopes of what is in the chambers."""
-    orifices, joint = "valve_orifice, leak_orifice, openings", program.valve.joint
-    joined = [] if joint is None else [f"joined = {add(joint.instant)}(valve, valve_state, command)"]
+    orifices = "valve_orifice, leak_orifice, openings"
     if not program.is_thermal:
-        if joint is not None:
-            joined.append(f"gas = {add(joined_gas_rates)}(gas, valve_orifice, joined, pressure_1, pressure_2)")
-        rates = [f"gas = {add(gas_rates)}(plant, {orifices}, pressure_1, pressure_2)", *joined]
+        rates = f"gas = {add(gas_rates)}(plant, {orifices}, pressure_1, pressure_2)"
         if not program.has_true_masses:
-            return [*rates, "slopes[2] = gas.mass_1", "slopes[3] = gas.mass_2"]
+            return [rates, "slopes[2] = gas.mass_1", "slopes[3] = gas.mass_2"]
         moved = f"{add(real_gas_rates)}(plant, angle, rate, gas.mass_1, gas.mass_2, y[2], y[3])"
-        return [*rates, f"slopes[2], slopes[3] = {moved}"]
+        return [rates, f"slopes[2], slopes[3] = {moved}"]
     given = "(y[2], y[3]), (y[7], y[8]), angle, rate"
-    if joint is not None:
-        across = "valve_orifice, joined, pressure_1, pressure_2, y[2] / y[7], y[3] / y[8]"
-        joined.append(f"gas = {add(joined_thermal_rates)}(gas, thermal, {across})")
     rates_of = add(made_of(thermal_gas_rates, "thermal_gas_rates", program.functions))
     return [
         f"gas = {rates_of}(plant, thermal, {orifices}, {given})",
-        *joined,
         "slopes[2] = gas.content_1",
         "slopes[3] = gas.content_2",
         "slopes[7] = gas.mass_1",

@@ -20,7 +20,6 @@ VALVES: Kinds[ValveKind] = Kinds(
     {
         "proportional": "ppafo.model.valves.proportional:KIND",
         "solenoid": "ppafo.model.valves.solenoid:KIND",
-        "solenoid_recycling": "ppafo.model.valves.solenoid_recycling:KIND",
     },
 )
 

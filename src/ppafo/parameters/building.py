@@ -40,7 +40,7 @@ from ppafo.parameters.parameter_set import (
     links_of_set,
     with_followers,
 )
-from ppafo.parameters.plant import first_settings, shape_and_growth
+from ppafo.parameters.plant import shape_and_growth
 from ppafo.units.shown import counted_from, shown_in, shown_text
 from ppafo.wording import known_names, one_line
 
@@ -121,19 +121,13 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
 
 def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield contradictions between the values of a set that prevent a run: their paths, and a message."""
-    actuator, valve = device.actuator, device.valve
+    actuator = device.actuator
     stops = ("actuator.angle_min", "actuator.angle_max")
     is_ordered = actuator.angle_min < actuator.angle_max
     problem = actuator_problem(actuator) if is_ordered else ""
     if problem:
         settings = (f"actuator.{quantity.name}" for quantity in ACTUATORS[actuator.kind].quantities)
         yield ("actuator", *settings, *stops), f"actuator: {problem}"
-    if actuator.has_one_chamber and VALVES[valve.kind].choose(first_settings(valve)).joint is not None:
-        name = device.valve_name
-        yield (
-            (f"valves.{name}",),
-            f"valve '{name}' (kind '{valve.kind}') connects two chambers, but {declaration.WHY_ONE_CHAMBER}",
-        )
     is_beyond, line = beyond_pressures(device)
     if is_beyond:
         yield SUPPLIES, f"actuator: {line(0)}"

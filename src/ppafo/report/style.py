@@ -61,7 +61,7 @@ EXPERIMENT = DrawingStyle(GREY, marker=".")
 """Style of measurements, from a real or a simulated test bench."""
 ACTUAL = DrawingStyle(BLUE)
 """Style of a device regardless of its valve."""
-_VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})
+_VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID})
 PAGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 """Colours of curves on the interactive page, which is white: colours 1 to 4 of its style sheet."""
 PAGE_LOOKS = MappingProxyType({kind: PAGE_COLOURS.index(look.colour) + 1 for kind, look in _VALVES.items()})

@@ -92,11 +92,6 @@ def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float 
     rate = min(highest_rate, preset.values["sampling.rate"])
     device = real_device(scenario.device, preset)
     run = plan_run(replace(scenario, device=device))
-    if run.program.valve.joint is not None:
-        raise ScenarioError(
-            f"the simulated test bench does not support a valve of kind '{device.valve.kind}', which joins the "
-            "chambers; choose another valve"
-        )
     physics, (plant, line) = rig_physics(device, preset), with_line(device, run.plant, preset)
     run = replace(run, plant=plant)
     # All gas is at wall temperature at the start.

@@ -14,7 +14,6 @@ from ppafo.parameters.publications.publication import FILE, PAPER
 PUBLISHED = {
     "jrrd-2011": {9.0: "N m"},
     "jmd-2016": {12.0: "N m"},
-    "icorr-2013": {24.0: "%", 25.0: "%"},
     "tmech-2011": {49.0: "%", 40.0: "%"},
 }
 """Spelled out once more on purpose: every number that was read, and no other."""

@@ -123,11 +123,11 @@ def test_the_list_names_every_walk_and_every_task_sequence(capsys: pytest.Captur
     assert main(["walk", "--list"]) == 0
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
     proportional = ("proportional", "proportional-learning", "proportional-regulators")
-    assert names[:7] == ["off", *proportional, "solenoid", "solenoid-recycling", "solenoid-regulators"]
-    assert names[7:] == ["corridor", "first-steps", "six-minutes", "stairs"]
+    assert names[:6] == ["off", *proportional, "solenoid", "solenoid-regulators"]
+    assert names[6:] == ["corridor", "first-steps", "six-minutes", "stairs"]
     assert main(["walk", "--list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["walks"]
-    assert [item["kind"] for item in listed] == ["walk"] * 7 + ["task sequence"] * 4
+    assert [item["kind"] for item in listed] == ["walk"] * 6 + ["task sequence"] * 4
 
 
 def test_a_task_sequence_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

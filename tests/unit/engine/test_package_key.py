@@ -17,7 +17,7 @@ FOLDERS = ("control", "model", "signals")
 """Without the engine, of which the tests replace a function to count what is compiled."""
 
 
-@pytest.mark.parametrize("name", ["swing-foot", "proportional", "proportional-regulators", "solenoid-recycling"])
+@pytest.mark.parametrize("name", ["swing-foot", "proportional", "proportional-regulators", "solenoid"])
 def test_every_scenario_of_the_package_has_a_key(name: str) -> None:
     # A law that is bound to walking stands under no name of its own; nor does a shank that a gait leads.
     assert package_key(plain_batch(name).program, FOLDERS) is not None

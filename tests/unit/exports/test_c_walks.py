@@ -72,7 +72,7 @@ other actuators."""
 BY_PYTHON = ("proportional-regulators", EVERYTHING)
 """The walk whose lanes Python runs, so that no translator stands on both sides; it takes minutes."""
 
-WHOLE = [("proportional-learning", ()), ("solenoid-recycling", ()), *VARIED[-3:]]
+WHOLE = [("proportional-learning", ()), ("solenoid", ()), *VARIED[-3:]]
 """Walks whose whole example is compared with Python at every change; those of others are thorough tests."""
 
 

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from ppafo.engine.scheme.motion import until_jump
-from ppafo.model.valves import proportional, solenoid, solenoid_recycling
+from ppafo.model.valves import proportional, solenoid
 
 SPOOL = proportional.ProportionalSettings(
     dead_band=0.0, delay=0.0, spool_frequency=50.0, spool_damping_ratio=0.5, slew_limit=0.0
@@ -157,49 +157,3 @@ def test_step_is_cut_at_every_switching_inside_it() -> None:
 
 def test_step_without_a_switching_is_whole() -> None:
     assert parts_of_a_step(PAIR, 1.0, 1e-3) == [1e-3]
-
-
-def recycled(joining: float, holding: float, command_at: dict[float, float]) -> list[tuple[float, tuple[float, ...]]]:
-    """Times and openings (source 1, vent 1, source 2, vent 2, joint) of a recycling pair, where they change."""
-    valve = solenoid_recycling.prepare(solenoid_recycling.RecyclingSettings(*PAIR, joining, holding))
-    state, command, time, seen = solenoid_recycling.RecyclingState(), 0.0, 0.0, []
-    while time < 1.0:
-        command = command_at.get(round(time, 6), command)
-        state = solenoid_recycling.settle(valve, state, command, time)
-        openings = (*solenoid_recycling.instant(valve, state, command), state.joined)
-        if not seen or seen[-1][1] != openings:
-            seen.append((round(time, 6), openings))
-        waiting = [moment for moment in command_at if moment > time]
-        time = min([solenoid_recycling.next_event(valve, state, command, time), 1.0, *waiting])
-    return seen
-
-
-PUSH_THEN_LIFT = {0.1: 1.0, 0.3: -1.0, 0.6: 0.0}
-FREE, FEEDS_1, FEEDS_2 = (0.0, 1.0, 0.0, 1.0, 0.0), (1.0, 0.0, 0.0, 1.0, 0.0), (0.0, 1.0, 1.0, 0.0, 0.0)
-FEEDS_BOTH = (1.0, 0.0, 1.0, 0.0, 0.0)
-JOINED, KEEPS_2 = (0.0, 0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0, 0.0)
-
-
-def test_chambers_are_joined_from_when_valve_a_has_closed_until_the_joining_time_is_over() -> None:
-    expected = [(0.0, FREE), (0.103, FEEDS_1), (0.303, FEEDS_BOTH), (0.305, JOINED), (0.365, FEEDS_2), (0.605, FREE)]
-    assert recycled(0.06, 0.0, PUSH_THEN_LIFT) == expected
-
-
-def test_chamber_2_keeps_its_gas_for_the_holding_time_or_until_it_is_let_go() -> None:
-    times = [(time, openings) for time, openings in recycled(0.06, 0.1, PUSH_THEN_LIFT) if time > 0.35]
-    assert times == [(0.365, KEEPS_2), (0.465, FEEDS_2), (0.605, FREE)]
-    lifted_twice = {0.1: 1.0, 0.3: -1.0, 0.4: 0.0, 0.5: -1.0, 0.6: 0.0}
-    times = [(time, openings) for time, openings in recycled(0.06, 0.5, lifted_twice) if time > 0.35]
-    assert times == [(0.365, KEEPS_2), (0.405, FREE), (0.503, FEEDS_2), (0.605, FREE)]
-
-
-def test_push_off_ends_the_joint() -> None:
-    pushed_again = {0.1: 1.0, 0.3: 0.0, 0.36: 1.0}
-    assert recycled(0.2, 0.0, pushed_again) == [(0.0, FREE), (0.103, FEEDS_1), (0.305, JOINED), (0.363, FEEDS_1)]
-
-
-def test_without_a_joining_time_it_is_the_pair() -> None:
-    switchings = [(time, openings) for time, openings in recycled(0.0, 0.0, PUSH_THEN_LIFT) if time > 0.0]
-    pair = run_pair(PAIR, PUSH_THEN_LIFT, 1.0)
-    assert sorted({round(time, 6) for time, _, _ in pair}) == [0.103, 0.303, 0.305, 0.605]
-    assert [openings for _, openings in switchings] == [FEEDS_1, FEEDS_BOTH, FEEDS_2, FREE]

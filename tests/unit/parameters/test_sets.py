@@ -43,6 +43,5 @@ def test_a_set_is_shown_in_two_lines() -> None:
     count = len(COMPLETED.numbers) + len(COMPLETED.texts)
     assert repr(COMPLETED).splitlines() == [
         f"ParameterSet 'ppafo2011': {COMPLETED.title}",
-        f"  {count} values; valves: proportional (proportional), solenoid (solenoid), "
-        "solenoid_recycling (solenoid_recycling)",
+        f"  {count} values; valves: proportional (proportional), solenoid (solenoid)",
     ]

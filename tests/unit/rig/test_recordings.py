@@ -212,7 +212,6 @@ def test_the_truth_names_the_preset_with_overrides_and_the_device() -> None:
         ({"overrides": ["rig.line.area=0 m^2"]}, "must be above 0 if line.volume is above 0"),
         ({"overrides": ["friction.statik_torque=1 N m"]}, "did you mean"),
         ({"valve": "solenoyd"}, "did you mean 'solenoid'"),
-        ({"valve": "solenoid_recycling"}, "does not support a valve of kind 'solenoid_recycling'"),
     ],
 )
 def test_bad_input_is_one_line_with_the_nearest_name(words: dict[str, object], message: str) -> None:

@@ -1,6 +1,5 @@
 """An actuator with one chamber: nothing of a second one is asked for, supplied, measured or shown."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 import ppafo
 from ppafo.errors import PpafoError, ScenarioError
 from ppafo.metrics import METRICS
-from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER as NUMBERS_OF_SECOND_CHAMBER
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.ensemble import run_ensemble
@@ -81,15 +79,6 @@ def test_a_second_chamber_takes_no_pressure_at_the_start() -> None:
     for text in ("20 psi_g", "supply"):
         with pytest.raises(ScenarioError, match=r"one chamber.*omit this key"):
             ppafo.load_scenario("torque-task-proportional", [f"device.set={BLADDER}", f"initial.pressure_2={text}"])
-
-
-def test_chambers_that_are_joined_by_a_valve_are_two() -> None:
-    vane, bladder = ppafo.load_parameter_set("ppafo2011"), ppafo.load_parameter_set(BLADDER)
-    name = next(name for name, kind in vane.valve_kinds.items() if kind == "solenoid_recycling")
-    numbers = {path: entry for path, entry in vane.numbers.items() if path.startswith(f"valves.{name}.")}
-    joined = replace(bladder, valve_kinds={name: "solenoid_recycling"}, numbers={**bladder.numbers, **numbers})
-    with pytest.raises(PpafoError, match="connects two chambers"):
-        build_device(joined, name)
 
 
 def test_a_command_towards_the_second_chamber_takes_no_gas() -> None:

@@ -23,7 +23,6 @@ WALKS: dict[str, tuple[str, tuple[str, ...]]] = {
     "off": ("off", ()),
     "proportional": ("proportional", ()),
     "learning": ("proportional-learning", ()),
-    "recycling": ("solenoid-recycling", ()),
     "lines": ("proportional-regulators", ()),
     "lines, slow": ("solenoid-regulators", ("controller.rate=500 Hz",)),
     "timed": ("proportional", ("timing.kind=estimated", "sensors.pressure_bandwidth=40 Hz")),

@@ -124,7 +124,7 @@ def test_a_torque_profile_that_contradicts_itself_is_refused(overrides: str) -> 
 
 def test_shipped_walks_load_and_contradict_nothing() -> None:
     proportional = ("proportional", "proportional-learning", "proportional-regulators")
-    solenoid = ("solenoid", "solenoid-recycling", "solenoid-regulators")
+    solenoid = ("solenoid", "solenoid-regulators")
     assert list_walks() == ("off", *proportional, *solenoid)
     assert [load_walk(name).name for name in list_walks()] == list(list_walks())
 

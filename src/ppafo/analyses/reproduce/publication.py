@@ -20,7 +20,6 @@ from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, r
 from ppafo.progress import Progress, Report
 from ppafo.report.writing import format_reported_quantity, quantity
 from ppafo.units import from_si, parse_quantity
-from ppafo.walking.evaluation import integral_of_a_stride
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
@@ -30,8 +29,8 @@ from ppafo.wording import argument_text, known_names, nearest_name, said_missing
 DEVICE = "ppafo2011"
 MINUTES = 0.5
 """Duration of a walk [min]; without noise the strides repeat, so that longer walks give the same result."""
-PAIR, RECYCLING = "solenoid", "solenoid-recycling"
-"""Names of the walks with direct event control and with recycling."""
+PAIR = "solenoid"
+"""Name of the walk with direct event control."""
 KEEPS_GAIT = "wearer.keeps_gait=1"
 """Override of a walk for a nondisabled wearer, whose muscles keep the measured ankle angle."""
 
@@ -61,12 +60,6 @@ def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
     return result
 
 
-def _nondisabled(name: str, holding_time: float | None = None) -> WalkResult:
-    """Run a shipped walk of a nondisabled wearer; a valve between the chambers is held open for a time [s]."""
-    holding = () if holding_time is None else (f"valve.holding_time={holding_time!r} s",)
-    return _walked(name, (KEEPS_GAIT, *holding))
-
-
 def held_torque(pressure: float) -> float:
     """Static torque [N m] at a supply pressure [Pa absolute]: torque constant times gauge pressure. Equation (2)."""
     return load_device(DEVICE).actuator.torque_constant * (pressure - STANDARD_ATMOSPHERE)
@@ -88,27 +81,8 @@ def walking_torque(pressure: float) -> float:
 
 def dorsiflexor_share() -> float:
     """Dorsiflexor moment of a nondisabled wearer with the device divided by the moment without [-], stride means."""
-    worn = _nondisabled(PAIR)
+    worn = _walked(PAIR, (KEEPS_GAIT,))
     return worn.metrics["dorsiflexor_moment"].value / healthy_metrics(worn.scenario)["dorsiflexor_moment"].value
-
-
-def recycling_saving(holding_time: float) -> float:
-    """Fraction of the gas of a stride that the valve between the chambers, open for a time [s], saves [-].
-
-    The reference is event-based control without this valve.
-    """
-    plain, recycling = _nondisabled(PAIR), _nondisabled(RECYCLING, holding_time)
-    return 1.0 - recycling.metrics["gas"].value / plain.metrics["gas"].value
-
-
-def recycling_work(holding_time: float) -> float:
-    """Ratio of the net work of the actuator in a stride with and without the valve between the chambers [-].
-
-    The work is a mean over the strides with help; without the valve, control is event-based.
-    """
-    walks = _nondisabled(PAIR), _nondisabled(RECYCLING, holding_time)
-    plain, recycling = (integral_of_a_stride(result, result.recording["torque"]) for result in walks)
-    return recycling / plain
 
 
 def event_reduction(wearer: str) -> float:
@@ -123,14 +97,12 @@ def event_reduction(wearer: str) -> float:
     return 1.0 - errors[1] / errors[0]
 
 
-_OF_PRESSURE, _OF_RECYCLING = {"pressure": "Pa_a"}, {"holding_time": "s"}
+_OF_PRESSURE = {"pressure": "Pa_a"}
 COMPUTATIONS: dict[str, _Computation] = {
     "held_torque": _Computation("N m", _OF_PRESSURE, held_torque),
     "share_of_healthy_moment": _Computation("1", _OF_PRESSURE, share_of_healthy_moment),
     "walking_torque": _Computation("N m", _OF_PRESSURE, walking_torque),
     "dorsiflexor_share": _Computation("1", {}, dorsiflexor_share),
-    "recycling_saving": _Computation("1", _OF_RECYCLING, recycling_saving),
-    "recycling_work": _Computation("1", _OF_RECYCLING, recycling_work),
     "healthy_event_reduction": _Computation("1", {}, partial(event_reduction, "healthy")),
     "impaired_event_reduction": _Computation("1", {}, partial(event_reduction, "impaired")),
 }
@@ -216,7 +188,7 @@ def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict
         key, text = f"{where}.arguments.{name}", entry.arguments[name]
         with refused_as(ScenarioError, key, UnitError):
             value = values[name] = parse_quantity(text, unit)
-        # An absolute pressure and a time: neither lies below 0.
+        # An absolute pressure does not lie below 0.
         if not 0.0 <= value < math.inf:
             raise ScenarioError(f"{key} = '{text}': must be finite and at least 0 {unit}")
     return values

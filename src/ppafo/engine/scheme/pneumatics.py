@@ -15,7 +15,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ppafo.model.columns import smaller
-from ppafo.model.orifice import FlowCurve, orifice_flow, orifice_flow_slopes
+from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, PortFlow, PortFlowSlopes, admitted_flow
 from ppafo.model.ports import leakage_path
 
@@ -84,38 +84,6 @@ def plant_with_leak_at(plant: PlantParameters, pressure_1: float, pressure_2: fl
     """
     conductance = leakage_path(plant.leak_conductance, pressure_1, pressure_2, plant.leak_curve)
     return plant._replace(leak_conductance=conductance)
-
-
-def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantParameters:
-    """Plant with an additional valve between the chambers, parallel to the vane leakage; ``opening`` [-], 0 to 1.
-
-    The common flow curve is the mean of both curves weighted by conductance: exact if both have the same pressure
-    ratios.
-    """
-    joining = opening * plant.valve_conductance
-    conductance = plant.leak_conductance + joining
-    share = joining / max(conductance, 1.0e-30)
-    curve = mean_curve(plant.leak_curve, plant.valve_curve, share)
-    return plant._replace(leak_conductance=conductance, leak_curve=curve)
-
-
-def mean_curve(first: FlowCurve, second: FlowCurve, share: float) -> FlowCurve:
-    """Flow curve of two parallel orifices; ``share`` [-] is the conductance fraction of the second orifice."""
-    a, b = first.coefficients, second.coefficients
-    return FlowCurve(
-        critical_ratio=first.critical_ratio + share * (second.critical_ratio - first.critical_ratio),
-        linear_ratio=first.linear_ratio + share * (second.linear_ratio - first.linear_ratio),
-        linear_slope=first.linear_slope + share * (second.linear_slope - first.linear_slope),
-        coefficients=(
-            a[0] + share * (b[0] - a[0]),
-            a[1] + share * (b[1] - a[1]),
-            a[2] + share * (b[2] - a[2]),
-            a[3] + share * (b[3] - a[3]),
-            a[4] + share * (b[4] - a[4]),
-            a[5] + share * (b[5] - a[5]),
-            a[6] + share * (b[6] - a[6]),
-        ),
-    )
 
 
 # gamma = 1 - 1/sqrt(2) makes the method L-stable; SHORTEST keeps a part without length from dividing by 0.

@@ -146,9 +146,6 @@ def with_leak(
     """Return the plant with the leakage at the pressures of a stage, if the leakage varies."""
     if "leakage_path" in parts.ports_with_laws:
         leaky = pneumatics.plant_with_leak_at(leaky, pressure_1, pressure_2)
-    if parts.valve.joint is not None:
-        # A valve that joins the chambers makes the leak between them as wide as it stands open.
-        leaky = pneumatics.plant_with_joined_chambers(leaky, parts.valve.joint.opening(lane.shown))
     return leaky
 
 

@@ -14,18 +14,6 @@ from ppafo.model.plant import BlendedPort, Openings, PlantParameters, PortFlow, 
 
 
 @dataclass(frozen=True, slots=True)
-class JoiningPath:
-    """Path of a valve from one chamber to the other: its opening divided by the full area, 0 to 1, in two forms.
-
-    ``opening(shown)`` is constant during a step, from the valve output; ``instant(parameters, state, command)`` is the
-    opening at an instant, for the reference solver.
-    """
-
-    opening: Callable[[Any], float]
-    instant: Callable[[Any, Any, float], float]
-
-
-@dataclass(frozen=True, slots=True)
 class ValveModel:
     """Functions of a valve for the time stepping and for the reference solver.
 
@@ -37,8 +25,7 @@ class ValveModel:
     ``jumps`` is True for a valve that switches by itself within a step, as given by ``next_event`` and ``settle``: the
     step is then divided at the switching times. ``shift(state, next_state)`` is the relative change of the opening of a
     valve that moves within a step, None for a valve that stands still between two switchings.
-    ``command_delay(settings)`` is the dead time [s] before a command reaches the valve. ``joint`` is the path of a
-    valve that also joins the chambers with each other.
+    ``command_delay(settings)`` is the dead time [s] before a command reaches the valve.
 
     The reference solver uses the same valve in continuous time: ``instant(parameters, state, command)`` returns the
     openings at an instant, ``rates(parameters, state, command)`` the time derivatives of the state,
@@ -63,7 +50,6 @@ class ValveModel:
     rates: Callable[[Any, Any, float], Any]
     next_event: Callable[[Any, Any, float, float], float]
     settle: Callable[[Any, Any, float, float], Any]
-    joint: JoiningPath | None = None
 
 
 def valve_problem(valve: ValveModel) -> str:

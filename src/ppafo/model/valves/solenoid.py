@@ -185,7 +185,7 @@ def prepare_ideal(settings: TimedSolenoid) -> EmptyRow:
     return EmptyRow()
 
 
-def prepare_timed(settings: Any) -> TimedSolenoid:
+def prepare_timed(settings: TimedSolenoid) -> TimedSolenoid:
     """Parameters [s] of the pair with delays."""
     return TimedSolenoid(settings.opening_delay, settings.closing_delay, settings.switching_interval)
 

@@ -299,34 +299,17 @@ def test_a_lever_cylinder_is_sized_by_the_search_that_its_refusal_names(tmp_path
     assert found.value - ATMOSPHERE > 385.0e3
 
 
-RECYCLING = """
-schema_version = 1
-name = "own"
-title = "own"
-[valves.own]
-kind = "solenoid_recycling"
-maker = "Acme"
-model = "R"
-mass = { value = 300, unit = "g", origin = "datasheet", source = "its sheet" }
-area = { value = 3, unit = "mm^2", origin = "datasheet", source = "its sheet" }
-discharge_coefficient = { value = 0.6, unit = "", origin = "datasheet", source = "its sheet" }
-"""
-
-
 @pytest.mark.parametrize(
     ("scenario", "valve", "kind"),
     [
         ("torque-task-proportional", "festo-vovg-5v-pair", "solenoid"),
         ("torque-task-solenoid", "enfield-ls-v05s", "proportional"),
-        ("torque-task-proportional", "own", "solenoid_recycling"),
     ],
 )
 def test_a_valve_of_another_kind_is_sized_by_the_second_file_that_its_refusal_names(
     tmp_path: Path, scenario: str, valve: str, kind: str
 ) -> None:
-    (tmp_path / "own.toml").write_text(RECYCLING)
-    catalogue = 'catalogue = "own.toml"\n' * (valve == "own")
-    text = FILE.replace("simulated = 1", f"simulated = 1\n{catalogue}").replace("enfield-ls-v05s", valve)
+    text = FILE.replace("enfield-ls-v05s", valve)
     (tmp_path / "first.toml").write_text(text.replace("torque-task-proportional", scenario))
     with pytest.raises(PpafoError) as refused:
         load_design(tmp_path / "first.toml")
