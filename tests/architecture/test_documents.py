@@ -130,51 +130,10 @@ def test_every_dotted_name_on_the_page_of_equations_is_a_function() -> None:
     assert [name for name in names if not inspect.isfunction(inspect.unwrap(found(name) or str))] == []
 
 
-def test_every_function_on_the_page_of_equations_leads_to_the_file_that_has_it() -> None:
-    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-    links = dict(re.findall(r"\[`(ppafo\.[\w.]+)`\]\(\.\./(src/[\w/]+)\.py\)", text))
-    assert set(links) == set(dotted_names("equations.md"))
-    assert {
-        name: file for name, file in links.items() if f"src.{name.rpartition('.')[0]}" != file.replace("/", ".")
-    } == {}
-
-
-def test_every_equation_has_its_mathematics_and_the_units_of_its_symbols() -> None:
-    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-    sections = re.findall(r"^## (\(\d+\))[^\n]*\n(.*?)(?=^## )", text, flags=re.MULTILINE | re.DOTALL)
-    assert [
-        number for number, body in sections if not re.search(r"```math\n.+?\n```\n\n[^\n]*\[", body, re.DOTALL)
-    ] == []
-
-
 @pytest.mark.parametrize("number", PAPER_EQUATIONS)
 def test_the_functions_of_an_equation_name_it_in_their_docstrings(number: int) -> None:
     silent = [name for name in sections_of_equations()[number] if number not in equations_of(found(name).__doc__ or "")]
     assert silent == [], f"write 'Equation ({number}).' into the first line of the docstring of each of them"
-
-
-def test_numbers_of_equations_are_read_from_every_way_of_writing_them() -> None:
-    assert equations_of("Eqs (6), (7). At step (2).") == {6, 7}
-    assert equations_of("Equations (3), (6) to (9).") == {3, 6, 7, 8, 9}
-    assert equations_of("of equation (1), and equation (14)'s rule") == {1, 14}
-
-
-def test_no_name_of_the_nomenclature_is_listed_twice() -> None:
-    names = [name for name, _ in nomenclature()]
-    assert len(names) > 100
-    assert sorted({name for name in names if names.count(name) > 1}) == []
-
-
-def test_every_row_of_the_nomenclature_or_the_line_above_its_table_says_where_its_symbol_stands() -> None:
-    sections = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8").split("\n## ")[1:]
-    rows = {
-        row: section.partition("\n|")[0] for section in sections for row in re.findall(r"^\| .*`.*$", section, re.M)
-    }
-    assert len(rows) > 100
-    page = r"\[[^\]]+\]\(\S+\.md\S*\)"
-    assert [
-        row for row, head in rows.items() if not re.search(rf"\| {page} \|$", row) and not re.search(page, head)
-    ] == []
 
 
 def test_every_name_of_the_nomenclature_is_a_parameter_or_field_or_declared_value() -> None:
@@ -274,26 +233,6 @@ def test_the_page_on_architecture_lists_every_room_and_no_other() -> None:
     assert listed == packages | modules
 
 
-def test_the_page_on_architecture_answers_where_ten_things_are() -> None:
-    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    answers = text.partition("## Where do I find ...?")[2].partition("\n## ")[0].strip().splitlines()[2:]
-    assert len(answers) >= 10
-    for answer in answers:
-        files = re.findall(r"`([\w/]+\.py)`(?: \(`(\w+)`\))?", answer.rpartition(" | ")[2])
-        assert files, answer
-        for file, name in files:
-            tree = ast.parse((SOURCE / file).read_text(encoding="utf-8"))
-            defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
-            assert not name or name in defined, f"{file}: {name}"
-
-
-def test_decisions_are_few_and_at_most_half_a_page() -> None:
-    pages = sorted((ROOT / "docs" / "decisions").glob("0*.md"))
-    words = {page.name: len(page.read_text(encoding="utf-8").split()) for page in pages}
-    assert len(pages) <= 20
-    assert {name: count for name, count in words.items() if count > 250} == {}
-
-
 def test_the_documents_stay_short() -> None:
     words = {page: len(page.read_text(encoding="utf-8").split()) for page in ROOT.rglob("*.md") if _is_ours(page)}
     assert words[ROOT / "README.md"] <= 500
@@ -310,17 +249,6 @@ def _is_ours(page: Path) -> bool:
         "docs",
         "src",
     }
-
-
-def test_every_picture_of_the_documents_is_named_by_a_page() -> None:
-    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
-    assert [file.name for file in (ROOT / "docs" / "images").iterdir() if f"images/{file.name}" not in text] == []
-
-
-def test_pictures_of_the_documents_are_small_enough_for_a_repository() -> None:
-    pictures = sorted((ROOT / "docs" / "images").iterdir())
-    assert {picture.name for picture in pictures} >= {"figure-7.png", "figure-8.png"}
-    assert {picture.name: picture.stat().st_size for picture in pictures if picture.stat().st_size > 150_000} == {}
 
 
 def test_no_file_of_the_repository_names_a_registry_or_a_place_on_one_machine() -> None:

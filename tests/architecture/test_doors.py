@@ -5,8 +5,6 @@ from collections.abc import Iterator
 from importlib import resources
 from typing import Any
 
-import pytest
-
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.timings import TIMINGS
@@ -18,7 +16,7 @@ from ppafo.parameters.loading import load_device
 from ppafo.simulation.declaration import ACCURACY, RUN, SAMPLING, SEED, SENSORS, THERMAL_GAS, line_paths
 from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.walking.declaration import FAULTS, WALK_SENSORS
-from tests.doors.table import ALONE, BASES, CASES, GROUPS, PAIRS, SHIPPED, SHORT, VANE_FEATURES, WALK_FEATURES
+from tests.doors.table import CASES, SHORT
 
 TEXTS = frozenset(text for case in CASES for text in case.texts)
 PATHS = frozenset(text.partition("=")[0] for text in TEXTS)
@@ -99,24 +97,3 @@ def test_every_key_that_adds_a_state_a_history_or_a_clock_stands_in_the_table() 
     assert [path for path in paths_of_keys() if path not in PATHS] == []
     given = {path.rpartition(".")[2] for path in PATHS if path.startswith("faults.")}
     assert numbers_of_faults() - given == set()
-
-
-def test_a_new_kind_and_a_new_key_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tests.architecture.test_doors.TEXTS", TEXTS - {"controller.kind=event_sliding_mode"})
-    monkeypatch.setattr("tests.architecture.test_doors.PATHS", PATHS - {"effects.ice.melting_time"})
-    with pytest.raises(AssertionError, match=r"controller\.kind=event_sliding_mode"):
-        test_every_kind_of_the_catalogues_stands_in_the_table()
-    with pytest.raises(AssertionError, match=r"effects\.ice\.melting_time"):
-        test_every_key_that_adds_a_state_a_history_or_a_clock_stands_in_the_table()
-
-
-def test_the_table_has_twelve_short_cases_each_feature_alone_and_in_a_group_and_pairs() -> None:
-    assert len(SHORT) == 12
-    assert len({case.name for case in CASES}) == len(CASES)
-    count = len(VANE_FEATURES) + len(WALK_FEATURES)
-    groups = [case.name.partition(": ")[2].split(", ") for case in GROUPS]
-    assert sum(map(len, groups)) == count
-    assert len(ALONE) + sum(len(group) == 1 for group in groups) == count
-    assert all(len(case.name.partition(": ")[2].split(", ")) == 2 for case in PAIRS)
-    assert {*BASES} <= {case.scenario for case in CASES}
-    assert len(SHIPPED) >= 12

@@ -14,9 +14,6 @@ from hatchling.builders.sdist import SdistBuilder
 from hatchling.builders.wheel import WheelBuilder
 from packaging.requirements import Requirement
 
-from ppafo import __version__
-from ppafo.parameters import load_parameter_set
-
 ROOT = Path(__file__).parents[2]
 
 
@@ -36,15 +33,6 @@ def test_the_licences_of_what_is_vendored_go_with_the_wheel_and_stand_in_the_pag
     assert '"page/vendor/uplot/LICENSE"' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     bundle = (ROOT / "src" / "ppafo" / "page" / "bundle" / "page.js").read_text(encoding="utf-8")
     assert " ".join(licence.split()) in " ".join(bundle[:3000].split())
-
-
-def test_the_citation_file_names_this_version_and_the_authors_and_proceedings_of_the_paper() -> None:
-    stated, paper = (ROOT / "CITATION.cff").read_text(encoding="utf-8"), load_parameter_set("ppafo2011").citation
-    assert f"\nversion: {__version__}\n" in stated
-    assert f'title: "{paper.title}"' in stated
-    assert re.findall(r'family-names: "(.+)"', stated) == list(paper.authors)
-    assert "Proceedings of the ASME Dynamic Systems and Control Conference (DSCC)" in stated
-    assert "Proceedings of the ASME Dynamic Systems and Control Conference (DSCC)" in paper.note
 
 
 def test_the_page_of_licences_lists_the_packages_of_the_lock() -> None:

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 import ppafo
-from scripts.docstrings import restructured
-from scripts.website import DOCS, FRONT, WORKBENCH, contents, decisions, documents, faults, interface, stage
+from scripts.website import FRONT, contents, decisions, documents, faults, interface
 
 INDEX = {"README.md", "docs/README.md"}
 
@@ -21,47 +20,6 @@ def test_every_public_name_is_described_once() -> None:
     described = [line.split("::")[1].strip() for line in text.splitlines() if line.startswith(".. auto")]
     assert sorted(described) == sorted(f"ppafo.{name}" for name in ppafo.__all__)
     assert "``proportional_gain``" in pages["kinds"]
-
-
-def test_the_page_on_exports_leads_to_the_one_that_the_site_has(tmp_path: Path) -> None:
-    stage(tmp_path)
-    text = (tmp_path / "docs" / "how-to" / "export.md").read_text(encoding="utf-8")
-    assert f'<a href="../../{WORKBENCH}">' in text
-
-
-def test_a_docstring_is_text_with_code_in_it() -> None:
-    plain = ["Torque `tau` of ``m g l`` [N m]; P_up * |x|, f_.", "", "    a = b * c", "", "Alias for field number 3"]
-    assert restructured(plain) == [
-        "Torque ``tau`` of ``m g l`` [N m]; P_up \\* \\|x\\|, f\\_.",
-        "",
-        "::",
-        "",
-        "    a = b * c",
-    ]
-
-
-def test_the_arguments_of_a_command_are_a_list_with_its_further_lines() -> None:
-    lines = ["draws: how many; default", "    4096", "seed: of the draws"]
-    assert restructured(lines) == ["- ``draws``: how many; default 4096", "- ``seed``: of the draws"]
-
-
-def test_arguments_returns_and_raises_are_lists_under_their_names() -> None:
-    lines = ["Arguments:", "    draws: how many; default", "        4096", "", "Returns:", "    a Result"]
-    assert restructured(lines) == [
-        "**Arguments**",
-        "",
-        "- ``draws``: how many; default 4096",
-        "",
-        "**Returns**",
-        "",
-        "a Result",
-    ]
-
-
-def test_a_function_leads_to_its_file_on_a_forge_and_to_its_description_on_the_site(tmp_path: Path) -> None:
-    assert "](../src/ppafo/model/plant.py)" in (DOCS / "equations.md").read_text(encoding="utf-8")
-    stage(tmp_path)
-    assert "src/ppafo/model/plant.py" not in (tmp_path / "docs" / "equations.md").read_text(encoding="utf-8")
 
 
 def test_links_that_lead_nowhere_and_other_hosts_are_found(tmp_path: Path) -> None:

@@ -203,7 +203,7 @@ def test_a_fault_is_refused_in_one_line_that_names_its_place(run: Run, fault: st
     assert not (through_map and "UNIT" in words[0]) or ".toml" in lines[0]
 
 
-@pytest.mark.parametrize(("command", "through_map"), [("identify", False), ("identify", True), ("validate", True)])
+@pytest.mark.parametrize(("command", "through_map"), [("identify", False), ("validate", True)])
 def test_the_same_recording_without_a_fault_is_taken_without_a_remark(
     run: Run, command: str, through_map: bool
 ) -> None:

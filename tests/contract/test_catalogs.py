@@ -1,6 +1,5 @@
 """Every entry of every catalogue keeps the contract of its kind."""
 
-import dataclasses
 import itertools
 import math
 import random
@@ -12,14 +11,11 @@ import pytest
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.engine.channels import TRACED
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
-from ppafo.metrics import METRICS, MetricKind
 from ppafo.model.catalog import VALVES
 from ppafo.model.plant import Openings
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import ValveKind, ValveModel
-from ppafo.signals.recording import CHANNELS
 
 CATALOGS = [*CONTROLLERS.items(), *WALKING_CONTROLLERS.items(), *PROFILES.items(), *VALVES.items()]
 
@@ -141,11 +137,6 @@ def test_valve_states_survive_the_way_through_rows(name: str, model: ValveModel,
     assert rebuilt(model.state, map(float, numbers(state))) == state, name
 
 
-def test_kinds_are_frozen() -> None:
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        VALVES["solenoid"].name = "other"  # type: ignore[misc]
-
-
 @pytest.mark.parametrize("kind", VALVES.values(), ids=lambda kind: kind.name)
 def test_a_valve_chooses_its_model_by_which_settings_are_zero_and_by_nothing_else(kind: ValveKind) -> None:
     draw = random.Random(kind.name)
@@ -172,9 +163,3 @@ def test_a_profile_that_says_so_is_monotone(kind: ProfileKind) -> None:
         changes = [later - earlier for earlier, later in itertools.pairwise(values)]
         turned = turned or (min(changes) < -1e-12 and max(changes) > 1e-12)
     assert turned != kind.is_monotone
-
-
-@pytest.mark.parametrize("kind", METRICS.values(), ids=lambda kind: kind.name)
-def test_metrics_need_channels_that_there_are(kind: MetricKind) -> None:
-    assert set(kind.channels) <= set(CHANNELS)
-    assert set(kind.traced) <= set(TRACED)

@@ -1,6 +1,5 @@
 """Files of others run no code: whatever they say, the module that lies beside them is not imported."""
 
-import inspect
 import json
 import os
 import sys
@@ -10,7 +9,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import pytest
 
 import ppafo
@@ -64,7 +62,7 @@ terms = ["evil:KIND"]
 positive = "evil:KIND"
 """,
 }
-MOST = 60
+MOST = 20
 """Texts of a file that are changed, evenly chosen."""
 
 EVIL = """
@@ -236,15 +234,6 @@ def test_the_remedy_of_the_message_works(folder: Path) -> None:
     assert is_run()
 
 
-def test_an_environment_takes_plugins_as_every_door_does(folder: Path) -> None:
-    (folder / "given.toml").write_text(WITHOUT_GAINS, encoding="utf-8")
-    with pytest.raises(PpafoError, match=r"plugins=\['evil.py'\]"):
-        gymnasium.make("ppafo/TorqueTask-v0", scenario="given.toml", randomise=False)
-    env = gymnasium.make("ppafo/TorqueTask-v0", scenario="given.toml", randomise=False, plugins=["evil.py"])
-    assert env.reset(seed=1)[0].shape == env.observation_space.shape
-    assert is_run()
-
-
 WITHOUT_GAINS = "\n".join(line for line in SCENARIO.splitlines() if "_gain" not in line and "anti_windup" not in line)
 
 
@@ -299,28 +288,6 @@ def test_results_never_import_and_need_no_module_of_their_own(folder: Path) -> N
         ppafo.load_study_results("out").plot()
     assert main(["export", "figure", "out"]) == 2
     assert "evil" not in sys.modules
-
-
-OPENS = {"scenario", "scenarios", "study", "parameter_set", "problem", "tuning", "configurations", "content"}
-OF_OBJECTS = {"apply_overrides", "compare_walks"}
-"""Functions that take what was loaded before."""
-
-
-def test_every_function_that_opens_such_a_file_takes_modules() -> None:
-    for name in set(ppafo.__all__) - OF_OBJECTS:
-        function = getattr(ppafo, name)
-        if inspect.isfunction(function) and OPENS & inspect.signature(function).parameters.keys():
-            assert "plugins" in inspect.signature(function).parameters or name == "walk_population", name
-
-
-def test_a_set_is_audited_with_the_module_that_the_person_names(folder: Path) -> None:
-    (folder / "given.toml").write_text(SET, encoding="utf-8")
-    with pytest.raises(PpafoError, match="module 'evil' is not loaded"):
-        ppafo.audit("given.toml")
-    # It holds a controller, which is no valve: it was asked.
-    with pytest.raises(PpafoError, match="is of type ControllerKind, not ValveKind"):
-        ppafo.audit("given.toml", plugins=["evil.py"])
-    assert is_run()
 
 
 def test_no_text_of_a_file_gives_the_terminal_an_order(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

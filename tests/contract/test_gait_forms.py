@@ -1,6 +1,5 @@
 """A form of gait recording of another package is one file and one entry point: its files are imported by that."""
 
-import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,8 +10,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.gait import load_gait, walk_recording
 from ppafo.gait.recorded import ImportSettings, import_gait
-from ppafo.gait.recorded.form import GaitForm
-from ppafo.gait.recorded.source import FORMS, read_table
+from ppafo.gait.recorded.source import FORMS
 from tests.page_code import block_with, write_package
 
 PAGE = "how-to/extend.md"
@@ -63,15 +61,6 @@ def test_its_files_are_recognised_and_imported(tmp_path: Path, capsys: pytest.Ca
     assert "there is no gait format 'goniometre', did you mean 'goniometer'?" in capsys.readouterr().err
 
 
-def test_it_can_be_named_by_its_module_without_an_entry_point(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    shutil.rmtree(site / "my_forms-0.1.0.dist-info")
-    path = write_walk(site.parent / "walk.txt")
-    words = ["gait", "import", str(path), "--body-mass", "62 kg"]
-    assert main(words) == 2
-    assert "walk.txt: the first column must be 'time'" in capsys.readouterr().err
-    assert main([*words, "--form", "my_forms.goniometer:FORM"]) == 0
-
-
 @pytest.mark.usefixtures("site")
 def test_a_wrong_file_of_it_is_one_line_that_names_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for names, said in (
@@ -82,27 +71,3 @@ def test_a_wrong_file_of_it_is_one_line_that_names_it(tmp_path: Path, capsys: py
         printed = capsys.readouterr().err
         assert said in printed
         assert "x.txt" in printed
-
-
-@pytest.mark.parametrize("name", OWN)
-def test_a_form_of_the_package_is_a_value_whose_suffixes_the_help_names(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    form = FORMS[name]
-    assert isinstance(form, GaitForm)
-    assert form.name == name
-    assert all(suffix == suffix.lower() and suffix.startswith(".") for suffix in form.suffixes)
-    with pytest.raises(SystemExit):
-        main(["gait", "--help"])
-    printed = capsys.readouterr().out
-    missing = [suffix for suffix in form.suffixes if suffix not in printed]
-    assert missing == [], "name them in the help of 'import' in src/ppafo/cli/gait.py"
-
-
-def test_whoever_reads_a_table_learns_its_form(tmp_path: Path) -> None:
-    path = tmp_path / "walk.csv"
-    rows = "".join(f"{0.01 * row},{row},{row}\n" for row in range(9))
-    path.write_text("time [s],shank_angle [deg],ankle_angle [deg]\n" + rows)
-    assert read_table(path).form == "csv"
-    path.write_text("time,ankle_angle_r,knee_angle_r\n" + rows)
-    assert read_table(path).form == "opensim"

@@ -66,30 +66,16 @@ def called(bare: Path, folder: Path, *arguments: str) -> subprocess.CompletedPro
     "arguments",
     [
         ["--help"],
-        ["export", "--help"],
         ["simulate", "torque-task-proportional", "--set", "run.duration=0.2s"],
         ["walk", "off", "--set", "run.duration=6s"],
-        ["walk", "--list"],
-        ["doctor", "--schema", "scenario"],
         ["design", "BARE/profile.toml"],
         ["export", "c", "torque-task-proportional", "--out", "c"],
-        ["export", "fmu", "torque-task-proportional", "--out", "fmu"],
-        pytest.param(["reproduce", "--out", "paper"], marks=pytest.mark.thorough),
     ],
     ids=lambda arguments: " ".join(arguments[:2]),
 )
 def test_without_its_guests_the_package_works(bare: Path, tmp_path: Path, arguments: list[str]) -> None:
     done = called(bare, tmp_path, *(word.replace("BARE", str(bare)) for word in arguments))
     assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
-
-
-def test_without_its_guests_a_recording_is_made_and_identified(bare: Path, tmp_path: Path) -> None:
-    made = called(bare, tmp_path, "rig", "simulate", "free-decay", "--out", str(tmp_path))
-    assert made.returncode == 0, made.stderr
-    shutil.copy(bare / "decay.toml", tmp_path)
-    done = called(bare, tmp_path, "identify", "decay.toml")
-    assert done.returncode in (0, 1), done.stderr
-    assert "friction.viscous_damping" in done.stdout
 
 
 def test_a_report_says_in_one_line_that_the_page_is_not_installed(bare: Path, tmp_path: Path) -> None:
@@ -115,17 +101,3 @@ def test_a_command_of_a_guest_says_that_it_is_not_installed(
     done = called(bare, tmp_path, *arguments)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     assert f"is part of {room}, which is not installed" in done.stderr
-
-
-def test_a_name_of_a_guest_says_that_it_is_not_installed(bare: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", "import ppafo; ppafo.workbench"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(bare)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.stderr.rstrip().endswith(
-        "AttributeError: ppafo.workbench is part of ppafo.page, which is not installed"
-    )

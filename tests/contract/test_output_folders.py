@@ -1,6 +1,5 @@
 """``--out`` means the same in every command: absent, empty or its own earlier result; nothing of others is replaced."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -72,14 +71,7 @@ def test_every_command_is_here() -> None:
     assert tried == set(COMMANDS)
 
 
-def test_an_example_takes_only_a_folder_that_is_absent(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["new", "example", "study", "--out", str(tmp_path / "study")]) == 0
-    before = contents(tmp_path)
-    assert main(["new", "example", "study", "--out", str(tmp_path / "study")]) == 2
-    assert contents(tmp_path) == before
-
-
-@pytest.mark.parametrize("theirs", ["notes.txt", "report.html", "run.json", MARK])
+@pytest.mark.parametrize("theirs", ["notes.txt", MARK])
 @pytest.mark.parametrize("name", FOLDERS)
 def test_folder_of_others_is_refused_before_anything_runs(
     name: str, theirs: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -105,16 +97,6 @@ def test_result_of_another_command_is_refused(
     before = contents(tmp_path)
     assert main(words_of(name, tmp_path / "out")) == 2
     assert contents(tmp_path) == before
-
-
-@pytest.mark.parametrize("name", FOLDERS)
-def test_file_in_the_place_of_the_folder_is_refused(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "out").write_text("mine")
-    assert main(words_of(name, tmp_path / "out")) == 2
-    assert contents(tmp_path) == {"out": b"mine"}
 
 
 @pytest.mark.parametrize("name", QUICK)
@@ -150,14 +132,6 @@ def test_smaller_result_leaves_nothing_of_a_larger_one(tmp_path: Path, capsys: p
         "audit-ppafo2011-printed.json",
         "report.html",
     }
-
-
-def test_mark_that_names_no_files_lets_nothing_be_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = tmp_path / "out"
-    assert main(["sets", "parts", "--out", str(out)]) == 0
-    document = json.loads((out / MARK).read_text())
-    (out / MARK).write_text(json.dumps(document | {"sha256": 3}))
-    assert main(["sets", "parts", "--out", str(out)]) == 2
 
 
 def test_rig_adds_an_experiment_and_replaces_nothing_of_others(

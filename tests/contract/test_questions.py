@@ -6,14 +6,12 @@ The command of the how-to page is installed as a package of its own would be, an
 import inspect
 import json
 import re
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
-import ppafo
 from ppafo.analyses.endurance.solve import LONGEST
 from ppafo.analyses.linearise.solve import EQUILIBRIUM
 from ppafo.analyses.reproduce.publication import SEED
@@ -29,24 +27,6 @@ VERBS: dict[str, Command] = {
     for name, one in COMMANDS.items()
     for action, command in (one.actions if isinstance(one, CommandGroup) else {"": one}).items()
 }
-QUESTIONS = (
-    "bottle",
-    "compare",
-    "design",
-    "find",
-    "identify",
-    "linearise",
-    "reproduce",
-    "sensitivity",
-    "tune",
-    "validate",
-)
-"""Commands whose function is the one of Python by the same name."""
-MOST_COMMANDS = 22
-
-
-def test_there_are_at_most_as_many_commands_as_somebody_can_look_over() -> None:
-    assert len(COMMANDS) <= MOST_COMMANDS
 
 
 @pytest.mark.parametrize("name", VERBS)
@@ -62,19 +42,6 @@ def test_every_parameter_of_a_verb_has_its_help_and_every_option_one_meaning(nam
     assert {*named, "--json", "--out"} <= parser.options()
 
 
-@pytest.mark.parametrize("name", [name for name, command in VERBS.items() if command.first_line])
-def test_the_line_of_a_command_in_the_list_is_the_first_of_its_docstring(name: str) -> None:
-    assert (VERBS[name].function().__doc__ or "").strip().partition("\n")[0] == VERBS[name].first_line
-
-
-@pytest.mark.parametrize("name", QUESTIONS)
-def test_the_arguments_of_a_question_are_read_without_what_answers_it(name: str) -> None:
-    code = f"import sys; from ppafo.cli.main import main; main(['{name}', '--help'])"
-    script = f"import atexit, sys; atexit.register(lambda: print('numpy' in sys.modules)); {code}"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "False"
-
-
 def test_defaults_that_are_written_in_a_signature_are_those_of_the_modules() -> None:
     defaults = {
         "bottle longest": LONGEST,
@@ -85,24 +52,6 @@ def test_defaults_that_are_written_in_a_signature_are_those_of_the_modules() -> 
     for words, value in defaults.items():
         name, argument = words.split()
         assert inspect.signature(VERBS[name].function()).parameters[argument].default == value, words
-
-
-@pytest.mark.parametrize("name", QUESTIONS)
-def test_the_function_of_a_command_is_the_verb_of_python_with_its_errors_documented(name: str) -> None:
-    verb = VERBS[name].function()
-    assert getattr(ppafo, name) is verb
-    assert "Error" in (verb.__doc__ or "")
-
-
-def test_a_verb_that_is_mistyped_is_refused_with_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:
-    for words, said in (
-        (["sets", "lst"], "there is no 'ppafo sets lst', did you mean 'list'?; available: list, show, audit, parts"),
-        (["sets"], "ppafo: sets: give one of list, show, audit, parts"),
-        (["doctr"], "there is no command 'doctr', did you mean 'doctor'?"),
-        (["sets", "audit", "x", "--parnt", "y"], "there is no option '--parnt', did you mean '--parent'?"),
-    ):
-        assert main(words) == 2
-        assert said in capsys.readouterr().err
 
 
 def plain(

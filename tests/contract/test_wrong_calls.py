@@ -53,13 +53,3 @@ def test_a_mistyped_call_is_answered_with_what_to_write(call, said) -> None:  # 
     with pytest.raises(ppafo.ArgumentError) as caught:
         call()
     assert said in str(caught.value)
-
-
-def test_common_arguments_stand_in_one_order() -> None:
-    from inspect import isclass, signature
-
-    order = ["overrides", "draws", "seed", "confidence", "maximum_failed", "threads", "progress"]
-    for name in ppafo.__all__:
-        if not isclass(getattr(ppafo, name)):
-            found = [argument for argument in signature(getattr(ppafo, name)).parameters if argument in order]
-            assert found == [argument for argument in order if argument in found], name

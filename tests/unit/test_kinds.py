@@ -16,7 +16,6 @@ from ppafo.errors import KindError, ScenarioError, StudyError
 from ppafo.kinds import Kinds
 from ppafo.metrics import METRICS
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.simulation.schema import json_schema
 from ppafo.walking import load_walk
 
 LAW = """
@@ -60,11 +59,6 @@ def test_a_law_of_another_package_is_found_by_its_name_and_only_then(install: In
     assert CONTROLLERS["mine"].summary == "Of another package."
 
 
-def test_the_published_layout_has_the_laws_of_all_packages(install: Install) -> None:
-    install("other_laws", LAW.format(name="on_off", call="mine"), controllers="mine")
-    assert '"mine"' in repr(json_schema()).replace("'", '"')
-
-
 def test_a_broken_package_is_one_line_and_stops_no_other(install: Install, caplog: pytest.LogCaptureFixture) -> None:
     install("broken_laws", "import nowhere_to_be_found\n", controllers="broken")
     install("angry_laws", "raise RuntimeError('no\\nno')\n", controllers="angry")
@@ -94,13 +88,6 @@ def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
         "package"
     )
     assert CONTROLLERS["pid"] is ours
-
-
-def test_two_packages_with_one_name_are_both_named(install: Install) -> None:
-    for package in ("first_laws", "second_laws"):
-        install(package, LAW.format(name="on_off", call="mine"), controllers="mine")
-    with pytest.raises(KindError, match="defined by several packages: package 'first_laws', package 'second_laws'"):
-        CONTROLLERS["mine"]
 
 
 @pytest.mark.parametrize(
@@ -219,23 +206,6 @@ def test_kinds_are_a_mapping_that_can_be_changed_for_a_while() -> None:
     del kinds["a"]
     assert kinds.get("a") is None
     assert len(kinds) == 0
-
-
-def test_help_looks_for_commands_of_other_packages_and_a_scenario_of_the_package_for_nothing() -> None:
-    code = (
-        "import ppafo.kinds as kinds\n"
-        "looked, original = [], kinds._entry_points\n"
-        "def scan(group, path):\n    looked.append(group)\n    return original(group, path)\n"
-        "kinds._entry_points = scan\n"
-        "import ppafo.cli.main as main\n"
-        "try:\n    main.main(['--help'])\nexcept SystemExit:\n    pass\n"
-        "assert [one for one in looked if one.startswith('ppafo')] == ['ppafo.commands'], looked\n"
-        "looked.clear()\n"
-        "import ppafo\nppafo.load_scenario('torque-task-proportional')\nppafo.load_walk('proportional')\n"
-        "assert not [one for one in looked if one.startswith('ppafo')], looked\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
 
 
 def test_a_kind_of_a_room_that_is_not_installed_is_not_listed_and_says_so() -> None:

@@ -1,34 +1,13 @@
 """``print(result)`` is what the command prints, and the short form is one line; neither prints an array."""
 
-from pathlib import Path
-
 import pytest
 
 import ppafo
 from ppafo.cli.command_line import CommandGroup
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
-from ppafo.wording import read_by
 
 FEWEST_ANALYSES = 14
-
-
-@pytest.mark.parametrize(
-    ("name", "times"),
-    [("step-response", "valve.spool_frequency, valve.slew_limit"), ("torque-task-solenoid", "valve.opening_delay")],
-)
-def test_a_printed_run_is_what_its_command_prints(
-    name: str, times: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
-) -> None:
-    assert main(["simulate", name, "--out", str(tmp_path / "run")]) == 0
-    with read_by("command line"):
-        result = ppafo.simulate(name)
-        text = str(result)
-    printed = capsys.readouterr()
-    # The command tells of coarse valves before the run, beside its output.
-    lines = "\n".join(line for line in text.splitlines() if not line or line not in caplog.text)
-    ideal = f"the valve opens without delay, as an ideal one: {times} = 0"
-    assert printed.out.startswith(f"{lines}\n\n{result.error().sentence}\n{ideal}\n\nwritten: ")
 
 
 def test_a_printed_answer_is_what_its_command_prints(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,11 +1,9 @@
 """The progress line: share, rate, time left, failures, and how often it is said."""
 
 import io
-import logging
 
 import pytest
 
-from ppafo.cli.output import progress_line
 from ppafo.progress import Progress, ProgressLine, time_text
 
 
@@ -52,27 +50,3 @@ def test_a_file_gets_a_line_now_and_then_and_the_last_one() -> None:
     line.close()
     said = stream.getvalue().splitlines()
     assert [text.split(" of ")[0] for text in said] == [f"ppafo: {done}" for done in (1, 6, 11, 16, 21, 26, 30)]
-
-
-def test_the_end_of_a_count_is_written_once_and_the_next_count_begins_at_0() -> None:
-    stream = io.StringIO()
-    line = ProgressLine(stream, lambda: 0.0)
-    for done in (0, 1, 2, 2, 2, 0, 1, 2, 2):
-        line(Progress("walking", done, 2))
-    said = stream.getvalue().splitlines()
-    assert [text.split(" of ")[0].removeprefix("ppafo: walking, ") for text in said] == ["0", "2", "0", "2"]
-
-
-def test_what_is_logged_while_a_line_is_open_begins_on_a_line_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = Terminal()
-    monkeypatch.setattr("sys.stderr", terminal)
-    logger = logging.getLogger("ppafo")
-    with progress_line() as report:
-        report(Progress("", 1, 2))
-        logger.warning("compiling")
-        assert terminal.getvalue().endswith("1 of 2 runs (50 %)\n")
-        report(Progress("", 2, 2))
-    assert terminal.getvalue().endswith("2 of 2 runs (100 %)\n")
-    before = terminal.getvalue()
-    logger.warning("later")
-    assert terminal.getvalue() == before

@@ -1,12 +1,11 @@
 """The report of what was judged: its table, what was not run, and going on after an interruption."""
 
-import json
 from pathlib import Path
 
 import pytest
 
 from scripts import validation_report
-from scripts.validation_report import AGREES, DIFFERS, NOT_RUN, Line, alarms, intervals, main, report
+from scripts.validation_report import AGREES, DIFFERS, NOT_RUN, Line, main, report
 
 
 def line(verdict: str, command: str = "bits.py") -> Line:
@@ -21,25 +20,6 @@ def test_the_report_counts_the_verdicts_and_numbers_the_commands() -> None:
     assert "| not run | 2 |" in text
     assert "1. `bits.py`\n2. `make bits`\n" in text
     assert "## What was not judged" in text
-
-
-def test_what_takes_hours_is_read_from_its_folder_or_said_not_to_have_run(tmp_path: Path) -> None:
-    assert [found.verdict for found in intervals(tmp_path)] == [NOT_RUN]
-    row = {"cell": "white", "fits": 40, "held": [38, 35, 40]}
-    other = {"cell": "stribeck", "fits": 40, "held": [0, 0, 0]}
-    (tmp_path / "coverage.json").write_text(json.dumps([row, other]))
-    (line,) = intervals(tmp_path)
-    assert line.verdict == DIFFERS
-    assert line.result == "hold 88% (white) to 100%; 1 of 3 cells outside"
-
-
-def test_one_false_stop_differs(tmp_path: Path) -> None:
-    assert alarms(tmp_path)[0].verdict == NOT_RUN
-    (tmp_path / "false-alarms").mkdir()
-    for stops, expected in ((0, AGREES), (1, DIFFERS)):
-        found = {"wearers": 1000, "stops": stops}
-        (tmp_path / "false-alarms" / "solenoid-ideal-stairs-impaired-1000.json").write_text(json.dumps(found))
-        assert alarms(tmp_path)[0].verdict == expected
 
 
 def test_a_second_call_goes_on_where_the_first_one_was_interrupted(

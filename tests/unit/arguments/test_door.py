@@ -10,7 +10,7 @@ import pytest
 import ppafo
 from ppafo.arguments import Count, Fraction, Mass, Overrides, Threads, Word, checked
 from ppafo.cli.main import main
-from ppafo.errors import ArgumentError, StudyError, at_fault
+from ppafo.errors import ArgumentError, StudyError
 from ppafo.wording import argument_text
 
 TASK = "torque-task-proportional"
@@ -86,15 +86,6 @@ def test_a_number_among_overrides_is_in_si_units_and_a_text_has_its_own() -> Non
     assert ppafo.load_scenario(TASK, {"sensors.seed": 3}).sensors.seed == 3
 
 
-def test_overrides_that_can_be_gone_through_once_are_not_lost() -> None:
-    def level(overrides: Any) -> float | None:
-        arguments = {"vary": "supply.pressure=20..90 psi_g", "such_that": "rms_error <= 0.8 N m", "grid": 3}
-        return ppafo.find(TASK, overrides=overrides, **arguments).found.value
-
-    assert level(text for text in ["reference.level=3 N m"]) == level(["reference.level=3 N m"])
-    assert level(()) != level(["reference.level=3 N m"])
-
-
 def test_a_name_is_taken_wherever_an_object_is() -> None:
     assert ppafo.audit("ppafo2011") == ppafo.audit(ppafo.load_parameter_set("ppafo2011"))
     assert [run.scenario.name for run in ppafo.simulate_many([TASK, ppafo.load_scenario("step-response")])] == [
@@ -115,42 +106,6 @@ def test_an_error_about_the_content_of_an_argument_begins_with_its_name_and_keep
         ppafo.simulate(Path("nowhere.toml"))
     with pytest.raises(ppafo.ParameterError, match=r"^there is no parameter set 'nowhere'"):
         ppafo.audit("nowhere")
-
-
-def test_the_argument_at_fault_is_one_of_the_function_that_was_called() -> None:
-    @checked
-    def inner(walk: str) -> None:
-        with at_fault("walk"):
-            raise StudyError(f"there is no walk '{walk}'")
-
-    @checked
-    def outer(walks: str, size: str) -> None:
-        with at_fault(size):
-            inner(walks)
-
-    for size, said in {"size": "^size: there is no walk 'a'$", "other": "^there is no walk 'a'$"}.items():
-        with pytest.raises(StudyError, match=said):
-            outer("a", size)
-
-
-def test_overrides_in_another_place_are_answered_with_a_call_that_works() -> None:
-    with pytest.raises(ArgumentError, match=r"write walk\('solenoid', overrides=\{'supply\.pressure': '4 bar_g'\}\)"):
-        ppafo.walk("solenoid", {"supply.pressure": "4 bar_g"})  # type: ignore[call-arg]
-
-
-def test_what_is_taken_is_said_once_and_what_is_at_hand_with_it(tmp_path: Path) -> None:
-    run = ppafo.simulate("step-response")
-    with pytest.raises(ArgumentError) as refused:
-        ppafo.bottle(run)  # type: ignore[arg-type]
-    assert str(refused.value) == (
-        "recordings=<Result>: must be a name, a path, a Recording or a WalkResult, or several; "
-        "pass its attribute 'recording'"
-    )
-    with pytest.raises(ArgumentError, match=r"; pass its attribute 'recording'$"):
-        ppafo.evaluate(run)  # type: ignore[arg-type]
-    stored = ppafo.read_result(run.save(tmp_path / "run"))
-    with pytest.raises(ArgumentError, match=r"a path; a stored result is not run or compared again: give what was run"):
-        ppafo.compare({"stored": stored})  # type: ignore[dict-item]
 
 
 def test_a_message_names_arguments_in_python_and_options_on_the_command_line(

@@ -4,7 +4,6 @@ import enum
 import itertools
 import math
 import tomllib
-from collections.abc import Mapping
 from dataclasses import replace
 from importlib.resources import files
 from types import MappingProxyType
@@ -17,8 +16,6 @@ from pandas import DataFrame, Series
 import ppafo
 from ppafo import ArgumentError, Channel, DataError, ScenarioError
 from ppafo.arguments.conversion import taken_document, taken_overrides, taken_text
-from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.scenario import Sensors
 
 TASK = "torque-task-proportional"
@@ -79,19 +76,6 @@ def test_a_proxy_and_a_generator_are_overrides_as_a_dictionary_and_a_list_are(ov
     assert ppafo.load_scenario(TASK, overrides) == ppafo.load_scenario(TASK, ["run.duration=1 s"])
 
 
-def test_a_document_may_hold_proxies_iterators_and_numbers_of_numpy() -> None:
-    plain = document()
-    plain["device"]["overrides"] = ["supply.pressure=60 psi_g"]
-    strange: dict[str, Any] = {
-        name: MappingProxyType(part) if isinstance(part, Mapping) else part for name, part in plain.items()
-    }
-    strange["device"] = MappingProxyType({**plain["device"], "overrides": iter(plain["device"]["overrides"])})
-    strange["schema_version"] = np.int64(1)
-    found = ppafo.scenario_from_dict(MappingProxyType(strange))
-    assert found == ppafo.scenario_from_dict(plain)
-    assert found.origin.content == plain
-
-
 def test_a_document_that_holds_itself_comes_to_an_end() -> None:
     endless: dict[str, Any] = document()
     endless["run"] = endless
@@ -144,16 +128,3 @@ def test_a_masked_value_of_a_channel_is_none() -> None:
     for values in (np.array([1, 2], dtype="m8[s]"), np.array([1j, 2.0]), np.array(["1", "2"]), (x for x in [1.0])):
         with pytest.raises(DataError, match="the values of a channel must be "):
             Channel(values, "rad")  # type: ignore[arg-type]
-
-
-def test_an_adiabatic_gas_needs_no_area_of_walls() -> None:
-    content = document()
-    content["gas_model"] = {"kind": "thermal", "heat_transfer_coefficient": "0 W/(m^2 K)"}
-    adiabatic = scenario_from_dict(content)
-    content["gas_model"]["wall_area_per_volume"] = "100 1/m"
-    assert scenario_from_dict(content).gas_model != adiabatic.gas_model
-    content["gas_model"] = {"kind": "thermal", "heat_transfer_coefficient": "5 W/(m^2 K)"}
-    with pytest.raises(ScenarioError, match=r"'gas_model\.wall_area_per_volume' is missing"):
-        scenario_from_dict(content)
-    with pytest.raises(ScenarioError, match=r"the heat transfer varies, but 'gas_model\.wall_area_per_volume' is 0"):
-        run_ensemble(adiabatic, {"gas_model.heat_transfer_coefficient": np.array([0.0, 5.0])}, [])

@@ -1,7 +1,6 @@
 """``ppafo compare``, ``sensitivity`` and ``tune``: text, JSON, files, and what is refused."""
 
 import json
-import shlex
 from pathlib import Path
 
 import pytest
@@ -88,16 +87,6 @@ def test_a_comparison_says_the_change_and_how_probable_it_is(
     gas = next(item for item in task["pairs"]["proportional"] if item["metric"] == "gas_supplied")
     assert gas["change_high"] < 0.0
     assert gas["better"]["low"] > 0.9
-
-
-def test_the_lines_of_a_tuning_can_be_pasted(tuning: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["tune", str(tuning), "--out", str(tmp_path / "out")]) == 0
-    pasted = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("ppafo simulate"))
-    assert main([*shlex.split(pasted)[1:], "--json", "--out", str(tmp_path / "run")]) == 0
-    result = json.loads(capsys.readouterr().out)
-    stored = json.loads((tmp_path / "out" / "tune.json").read_text())
-    assert result["metrics"]["rms_error"]["value"] == pytest.approx(stored["after"]["values"]["rms_error"], rel=1e-9)
-    assert set(stored["effort"]) == {"starts", "generations", "candidates_per_gain", "seed"}
 
 
 def test_a_goal_that_no_gains_can_keep_is_exit_code_1_and_says_why(

@@ -10,26 +10,10 @@ from pathlib import Path
 import pytest
 
 from ppafo.arguments import whole_number
-from ppafo.cli.command_line import CommandGroup, parameters_of
-from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
 from ppafo.parameters.bottles.bottle import list_bottles
 
 FULL = Path("/dev/full")
-SHIPPED = {"SCENARIO", "STUDY", "SET", "GAIT", "WALK", "TUNING", "DESIGN", "BOTTLE", "KIND"}
-"""Words of the help for names of something that comes with the package."""
-
-
-def test_every_command_that_begins_with_a_shipped_name_has_list() -> None:
-    every = {name: one.actions if isinstance(one, CommandGroup) else {"": one} for name, one in COMMANDS.items()}
-    lacking = [
-        f"{name} {action}".strip()
-        for name, actions in every.items()
-        for action, command in actions.items()
-        for _, reading in list(parameters_of(command.function()))[:1]
-        if reading.word.metavar in SHIPPED and not command.lists
-    ]
-    assert lacking == []
 
 
 @pytest.mark.parametrize(
@@ -57,22 +41,6 @@ def test_what_comes_with_the_package_is_listed_by_name_with_what_it_is(
     assert {row["name"] for row in rows} >= set(names)
 
 
-@pytest.mark.parametrize("words", [["find"], ["validate"], ["export", "c"], ["gait", "record"], ["new"]], ids=" ".join)
-def test_list_needs_nothing_of_what_the_command_needs(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*words, "--list", "--json"]) == 0
-    (listed,) = json.loads(capsys.readouterr().out).values()
-    assert all(row["name"] for row in listed)
-    assert main(words) == 2
-
-
-def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([]) == 2
-    said = capsys.readouterr().err
-    first = re.findall(r"^  ppafo (\w+) ", said, re.MULTILINE)
-    assert {"simulate", "reproduce", "walk", "workbench", "new", "design", "identify"} == set(first) <= set(COMMANDS)
-    assert "All commands: ppafo --help" in said
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -90,26 +58,6 @@ def test_a_line_break_in_a_word_does_not_break_the_line_of_the_message(
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    "words", [["--js"], ["--json", "--", "--bogus"], ["--set", "gas.species=- 1"], ["--out", "-1"]], ids=" ".join
-)
-def test_a_shortened_option_and_a_value_with_a_dash_are_no_unknown_options(
-    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    name = [] if "--" in words else ["ppafo2011"]
-    assert main(["sets", "audit", *name, *words]) in {0, 2}
-    assert "no option" not in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("words", [["--help"], ["simulate", "--help"], ["--version"]], ids=" ".join)
-def test_help_and_version_still_end_well(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    assert ended.value.code == 0
-    assert "ppafo" in capsys.readouterr().out
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="there is no full device here")

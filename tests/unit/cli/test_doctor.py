@@ -16,7 +16,6 @@ from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
 from ppafo.loading import load_scenario
 from ppafo.simulation import simulate
-from ppafo.simulation.scenario import Scenario
 from tests.compilers_here import first_compiler
 
 SOURCE = '@entry("void(float64[::1])")\ndef thrice(x):\n    x[0] = 3.0 * x[0]\n'
@@ -45,18 +44,6 @@ def test_cache_says_why_a_folder_is_not_used(fresh_cache: Path, capsys: pytest.C
     assert "not used: other users can write into" in capsys.readouterr().out
     assert main(["doctor", "--warm"]) == 2
     assert "cannot be stored: other users can write into" in capsys.readouterr().err
-
-
-def test_warming_compiles_every_scenario_of_the_package(
-    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from ppafo.simulation.loading import list_scenarios
-
-    asked: list[Scenario] = []
-    monkeypatch.setattr(simulate, "compile_models", asked.extend)
-    assert main(["doctor", "--warm"]) == 0
-    assert [scenario.name for scenario in asked] == list(list_scenarios())
-    assert "programs: 0" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("fully_compiled")
@@ -90,11 +77,6 @@ def test_the_schema_of_each_format_is_printed_and_valid(name: str, capsys: pytes
     assert schema["title"].startswith("ppafo ")
 
 
-def test_two_orders_to_the_doctor_at_once_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", "--bits", "--clear"]) == 2
-    assert capsys.readouterr().err == "ppafo: --bits: not allowed with --clear\n"
-
-
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 @pytest.mark.parametrize(
     ("line", "found"),
@@ -113,15 +95,3 @@ def test_a_line_is_completed_in_bash(line: str, found: list[str]) -> None:
     script = f"{completion_script('bash')}\n{typed}"
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == found
-
-
-def test_the_script_for_zsh_is_that_for_bash_behind_its_own_reader(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--completion", "zsh"]) == 0
-    head, _, rest = capsys.readouterr().out.partition("\n")
-    assert head == "autoload -U +X bashcompinit && bashcompinit"
-    assert rest.strip() == completion_script("bash").strip()
-
-
-def test_a_shell_that_has_no_completion_is_refused_with_those_that_have(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--completion", "fish"]) == 2
-    assert capsys.readouterr().err == "ppafo: --completion fish: must be bash or zsh\n"

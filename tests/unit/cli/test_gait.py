@@ -48,23 +48,6 @@ def test_an_imported_gait_is_written_whole_and_can_be_used_by_its_file(
     assert (gait.origin, gait.strides) == ("synthetic", 3)
 
 
-def test_the_text_of_an_import_names_the_file_to_walk_with_and_other_files_are_answered_with_the_import(
-    walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "gait"
-    assert main(["gait", "import", str(walk), "--body-mass", "62 kg", "--name", "mine", "--out", str(out)]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == f"file to use: {out / 'mine.toml'}"
-    assert main(["walk", "solenoid", "--gait", str(walk)]) == 2
-    assert "give a .toml file, which 'ppafo gait import' makes from a recording\n" in capsys.readouterr().err
-    assert main(["walk", "solenoid", "--gait", str(out)]) == 2
-    assert f"a directory, not a file; give {out / 'mine.toml'}\n" in capsys.readouterr().err
-
-
-def test_the_option_of_other_commands_is_answered_with_the_list_of_a_group(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["gait", "--list"]) == 2
-    assert "use 'ppafo gait list'" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [

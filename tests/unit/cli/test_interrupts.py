@@ -116,16 +116,6 @@ def test_a_signal_whose_exception_got_lost_ends_the_run_all_the_same(middle: str
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_signal_that_whoever_started_it_ignores_stays_ignored(tmp_path: Path) -> None:
-    code = START.replace("signal.default_int_handler", "signal.SIG_IGN").replace(
-        "MIDDLE", LOST.replace("NAME", "SIGINT")
-    )
-    words = [sys.executable, "-c", code, str(tmp_path / "run")]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120)
-    assert done.returncode == 0
-    assert (tmp_path / "run" / "run.json").is_file()
-
-
 READY = """
 from ppafo import interrupts
 listen = interrupts.listen

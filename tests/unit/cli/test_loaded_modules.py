@@ -9,8 +9,6 @@ from typing import Any
 
 import pytest
 
-import ppafo
-
 HEAVY = frozenset(
     {
         *("dask", "h5netcdf", "h5py", "jax", "jinja2", "matplotlib", "numpy", "pandas"),
@@ -77,36 +75,6 @@ def test_a_run_loads_no_library_that_it_does_not_use(simulated: tuple[list[str],
     assert heavy(after) == READING | DRAWING | WRITING
 
 
-def test_a_run_of_a_scenario_loads_no_walks_studies_rigs_and_questions(
-    simulated: tuple[list[str], list[str]],
-) -> None:
-    foreign = ("walking", "gait", "studies", "rig", "identification", "validation", "gym", "processor")
-    _, after = simulated
-    assert {name for name in own(after) if name.startswith(tuple(f"ppafo.{part}" for part in foreign))} == set()
-    assert {name for name in own(after) if name.startswith("ppafo.analyses")} == set()
-
-
-def test_a_run_loads_the_valves_of_its_set_and_the_controller_and_actuator_that_it_has_and_no_others(
-    simulated: tuple[list[str], list[str]],
-) -> None:
-    before, _ = simulated
-    others = (
-        "actuators.cylinder",
-        "effects.silencer",
-        "effects.coil_heating",
-    )
-    assert "ppafo.model.valves.proportional" in before
-    assert not {f"ppafo.model.{name}" for name in others} & own(before)
-    assert "ppafo.control.controllers.model_based" not in before
-    assert not {f"ppafo.engine.scheme.{name}" for name in ("thermal_gas", "supply_lines")} & own(before)
-
-
-def test_the_number_of_modules_of_a_run_does_not_grow_unnoticed(simulated: tuple[list[str], list[str]]) -> None:
-    before, after = simulated
-    assert len(own(before)) <= MOST_BEFORE_THE_RUN
-    assert len(own(after)) <= MOST
-
-
 @pytest.fixture(scope="module")
 def run_from_python() -> list[str]:
     """What ``ppafo.simulate`` loads, with everything made that is kept."""
@@ -117,43 +85,6 @@ def run_from_python() -> list[str]:
 
 def test_a_run_from_python_draws_and_writes_nothing(run_from_python: list[str]) -> None:
     assert heavy(run_from_python) == READING
-
-
-def test_what_a_run_from_python_loads_does_not_grow_unnoticed(run_from_python: list[str]) -> None:
-    loaded = own(run_from_python)
-    lines = sum(file_of(name).read_text(encoding="utf-8").count("\n") for name in loaded)
-    assert len(loaded) <= MOST_FROM_PYTHON
-    assert lines <= MOST_LINES_FROM_PYTHON
-    late = (
-        "metrics.gas",
-        "report.writing",
-        "storage.netcdf",
-        "translation.c99",
-        "translation.compiling",
-        "model.plant_faults",
-        "model.gait",
-        "model.leg",
-        "model.regulator",
-        "model.actuators.table",
-        "engine.generator",
-        "engine.led_leg",
-        "simulation.check",
-        "simulation.python_controller",
-        "simulation.sampled",
-    )
-    assert not {f"ppafo.{name}" for name in late} & loaded
-
-
-def file_of(name: str) -> Path:
-    """The file of a module of the package."""
-    place = Path(ppafo.__file__).parent.joinpath(*name.split(".")[1:])
-    return place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
-
-
-def test_a_walk_reads_units_without_their_library(tmp_path: Path) -> None:
-    command = COMMAND.format(words=["walk", "off", "--minutes", "0.2", "--out", str(tmp_path / "walk")])
-    _, after = loaded_by(command)
-    assert heavy(after) <= READING | DRAWING | WRITING | {"scipy"}
 
 
 def said_by(*words: str) -> tuple[int, str]:

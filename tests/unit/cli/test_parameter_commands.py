@@ -16,14 +16,6 @@ def test_a_set_is_shown_with_the_source_of_every_value(capsys: pytest.CaptureFix
     assert row.split() == ["valves.proportional.area", "12.6", "mm^2", "assumed", "override"]
 
 
-def test_json_holds_every_value_and_is_the_only_thing_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sets", "show", "ppafo2011", "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    paths = [value["path"] for value in document["values"]]
-    assert paths[0] == "gas.species"
-    assert {"actuator.torque_constant", "reported.choked_flow_constant"} <= set(paths)
-
-
 def test_the_audit_fails_on_the_printed_set_and_passes_on_the_completed_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sets", "audit", "ppafo2011-printed"]) == 1
     assert "ppafo2011-printed: 9 errors" in capsys.readouterr().out
@@ -77,14 +69,6 @@ def test_several_sets_are_audited_side_by_side(capsys: pytest.CaptureFixture[str
     assert document["sets"][1]["counts"]["error"] == 9
 
 
-def test_an_audit_shows_first_what_the_set_changes_of_its_parent(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sets", "audit", "ppafo2011"]) == 0
-    shown = "\n".join(capsys.readouterr().out.splitlines()[:6])
-    page = (Path(__file__).parents[3] / "docs/how-to/add-a-parameter-set.md").read_text(encoding="utf-8")
-    assert shown.startswith("ppafo2011 changes 19 values of its parent ppafo2011-printed\n")
-    assert f"```text\n{shown}\n```" in page
-
-
 def test_a_set_without_a_parent_begins_with_its_findings_and_may_be_compared_with_any(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -97,41 +81,3 @@ def test_a_set_without_a_parent_begins_with_its_findings_and_may_be_compared_wit
     assert document["parent"] == "cylinder-lever"
     (change,) = document["changes"]
     assert change == {"path": "gas.temperature", "before": "293.15 K", "after": "30 degC", "origin": "assumed"}
-
-
-def test_the_copy_of_a_set_names_it_as_parent_from_wherever_it_lies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "below").mkdir()
-    main(["new", "set", "first", "--from", "ppafo2011"])
-    file = tmp_path / "first.toml"
-    file.write_text(file.read_text().replace("value = 36.0", "value = 31.5", 1))
-    main(["new", "set", "second", "--from", "first.toml", "--out", "below/second.toml"])
-    capsys.readouterr()
-    main(["sets", "audit", "first.toml"])
-    assert capsys.readouterr().out.startswith("first changes 1 value of its parent ppafo2011\n")
-    main(["sets", "audit", "below/second.toml"])
-    assert capsys.readouterr().out.startswith("second changes nothing of its parent first\n")
-    file.unlink()
-    assert main(["sets", "audit", "below/second.toml"]) == 2
-    assert "below/second.toml: parent: below/../first.toml: cannot be read" in capsys.readouterr().err
-
-
-def test_placeholders_of_the_template_are_a_warning_and_a_source_mended_is_a_change(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    main(["new", "set", "mine"])
-    main(["new", "set", "mended", "--from", "mine.toml"])
-    text = Path("mended.toml").read_text(encoding="utf-8")
-    placeholder = 'origin = "assumed"\nsource = "template"'
-    text = text.replace(placeholder, 'origin = "datasheet"\nsource = "page 3"', 3)
-    Path("mended.toml").write_text(text.replace("value = 60.0", "value = 61.0"), encoding="utf-8")
-    capsys.readouterr()
-    main(["sets", "audit", "mine.toml"])
-    assert "the source of 20 values is the template's" in capsys.readouterr().out
-    main(["sets", "audit", "mended.toml"])
-    assert capsys.readouterr().out.startswith(
-        "mended changes 1 value and the origin or source of 2 values of its parent mine\n"
-    )

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-import ppafo
 from ppafo.cli.main import main
 from ppafo.storage import read_csv
 
@@ -55,26 +54,6 @@ def test_the_command_that_compares_a_recording_names_its_motion_and_the_motion_i
     assert main(words[:-2]) == 1
     verdict = capsys.readouterr().out.splitlines()[0]
     assert "; the vane seems to be coupled to a leg (--motion leg); " in verdict
-
-
-def test_values_of_an_experiment_that_replace_those_of_the_requested_set_are_said_in_the_answer(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    own = tmp_path / "mine.toml"
-    own.write_text((Path(ppafo.__file__).parent / "parameters" / "sets" / "ppafo2011.toml").read_text())
-    words = ["rig", "simulate", "step-response", "--device", str(own), "--out"]
-    replaced = (
-        f"values of the scenario replace values of {own}: supply.pressure=55 psi_g, supply.dorsiflexion_pressure="
-    )
-    assert main([*words, str(tmp_path / "replaced")]) == 0
-    assert replaced in capsys.readouterr().out
-    (truth,) = json.loads((tmp_path / "replaced" / "rig.json").read_text())["recordings"].values()
-    assert truth["replaced"].startswith(replaced)
-    keeping = ["--set", "supply.pressure=50 psi_g", "--set", "supply.dorsiflexion_pressure=50 psi_g"]
-    assert main([*words, str(tmp_path / "kept"), *keeping]) == 0
-    assert "replace" not in capsys.readouterr().out
-    assert main(["simulate", "step-response", "--set", f"device.set={own}", "--out", str(tmp_path / "run")]) == 0
-    assert replaced in capsys.readouterr().out
 
 
 def test_device_and_overrides_reach_the_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -51,13 +51,6 @@ def saved(ran: tuple[Path, str]) -> Path:
     return ran[0]
 
 
-def test_a_run_prints_its_metrics_and_where_the_files_are(ran: tuple[Path, str]) -> None:
-    folder, printed = ran
-    assert printed.startswith("step-response: completed\n")
-    assert "angle_range" in printed
-    assert str(folder) in printed.splitlines()[-1]
-
-
 def test_a_run_writes_a_whole_result_folder_and_nothing_else(saved: Path) -> None:
     assert names(saved) == FILES
     assert names(saved.parent) == ["step"]
@@ -98,17 +91,6 @@ def test_a_saved_result_is_drawn_again_without_running_it(
     assert (tmp_path / "new" / "again.png").read_bytes() == (saved / "figure.png").read_bytes()
 
 
-def test_without_a_file_the_figures_in_the_folder_are_drawn_again(
-    saved: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    before = (saved / "figure.svg").read_bytes()
-    (saved / "figure.svg").unlink()
-    assert main(["export", "figure", str(saved), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["files"] == [str(saved / "figure.png"), str(saved / "figure.svg")]
-    assert (saved / "figure.svg").read_bytes() == before
-    assert names(saved) == FILES
-
-
 def test_the_end_of_a_walk_is_drawn_and_the_folder_stays_that_of_the_walk(tmp_path: Path) -> None:
     time = 0.1 * np.arange(101)
     recording = Recording("left leg", time, {"angle": Channel(1.5 + 0.1 * np.sin(time), "rad")}, kind="simulated")
@@ -123,19 +105,6 @@ def test_the_end_of_a_walk_is_drawn_and_the_folder_stays_that_of_the_walk(tmp_pa
     (folder / "recording.nc").rename(tmp_path / "foreign" / "recording.nc")
     assert main(["export", "figure", str(tmp_path / "foreign")]) == 2
     assert names(tmp_path / "foreign") == ["recording.nc"]
-
-
-def test_recordings_of_the_rig_are_drawn_each_on_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    recording = Recording("bench", np.array([0.0, 1.0]), {"angle": Channel(np.array([1.0, 1.1]), "rad")}, "synthetic")
-    for name in ("free-decay", "step-response"):
-        (tmp_path / f"{name}.csv").write_bytes(marked_csv_bytes(recording))
-    (tmp_path / "rig.json").write_text('{"format": "ppafo rig", "recordings": {}}')
-    before = names(tmp_path)
-    assert main(["export", "figure", str(tmp_path), "--out", str(tmp_path / "one.png")]) == 2
-    assert f"{tmp_path} has 2 figures (free-decay, step-response); omit --out" in capsys.readouterr().err
-    assert names(tmp_path) == before
-    assert main(["export", "figure", str(tmp_path)]) == 0
-    assert {"free-decay.png", "free-decay.svg", "step-response.png", "step-response.svg"} <= set(names(tmp_path))
 
 
 def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_the_device(tmp_path: Path) -> None:
@@ -155,30 +124,6 @@ def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_t
         assert figure.read_bytes() == drawn
     (tmp_path / "walk" / "walk.json").write_text('{"configuration": {"device": [3]}}')
     assert main(["export", "figure", str(tmp_path / "walk")]) == 2
-
-
-def test_the_end_of_a_walk_is_drawn_in_the_look_of_its_valve_and_says_what_ended_it(tmp_path: Path) -> None:
-    time = 0.1 * np.arange(91)
-    recording = Recording("walk", time, {"torque": Channel(np.sin(time), "N m")}, "simulated")
-    document = {
-        "status": {"kind": "unsteady", "message": "no gas"},
-        "configuration": {"device": {"valve": {"kind": "solenoid"}}},
-    }
-    files = {"recording.nc": netcdf_bytes(recording, None), "walk.json": json.dumps(document).encode()}
-    write_marked_folder(tmp_path, files, "walk")
-    assert main(["export", "figure", str(tmp_path)]) == 0
-    remark = "no gas; the last 5 s of 9 s"
-    expected = recording_figure(recording.between(4.0, 9.0), "walk", remark, valve="solenoid")
-    assert (tmp_path / "figure.png").read_bytes() == figure_files(expected)["figure.png"]
-
-
-def test_a_message_without_end_makes_no_picture_without_end(tmp_path: Path) -> None:
-    recording = Recording("walk", 0.1 * np.arange(11), {"torque": Channel(np.zeros(11), "N m")}, "simulated")
-    document = {"status": {"kind": "unsteady", "message": "no gas " * 10_000}}
-    files = {"recording.nc": netcdf_bytes(recording, None), "walk.json": json.dumps(document).encode()}
-    write_marked_folder(tmp_path, files, "walk")
-    assert main(["export", "figure", str(tmp_path)]) == 0
-    assert int.from_bytes((tmp_path / "figure.png").read_bytes()[20:24], "big") < 1000, "height in pixels"
 
 
 @pytest.mark.parametrize("damage", [{"files": 3}, {"files": [3]}, {"sha256": [3]}])
@@ -214,32 +159,6 @@ def test_overrides_reach_the_saved_device_and_a_pressure_is_shown_above_its_atmo
     assert {tuple(row[1:]) for row in shown[:2]} == {("55", "psi_g")}
     page = (tmp_path / "high" / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert "55 psi_g" in page
-
-
-def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_marked_folder(
-        tmp_path / "a", {"change.png": b"", "change.svg": b"", "report.html": b"", "compare.txt": b""}, "compare"
-    )
-    write_marked_folder(tmp_path / "b", {"sets.txt": b"", "sets.json": b"{}"}, "sets")
-    before = names(tmp_path / "a")
-    assert main(["export", "figure", str(tmp_path / "a")]) == 0
-    assert main(["export", "figure", str(tmp_path / "b"), "--json"]) == 0
-    first, _, second = capsys.readouterr().out.partition("\n")
-    again = "ppafo.compare(...).plot('change', width='84 mm').savefig('change.pdf')"
-    opened = f"result of 'ppafo compare' has its figures (change.png); open {tmp_path / 'a' / 'report.html'}; "
-    assert opened in first
-    assert first.endswith(again)
-    assert json.loads(second)["open"] == str(tmp_path / "b" / "sets.txt")
-    assert main(["export", "figure", str(tmp_path / "a"), "--out", str(tmp_path / "new.pdf")]) == 2
-    message = capsys.readouterr().err
-    assert "figures of 'ppafo compare' cannot be drawn again, only figures of runs, walks, studies and rec" in message
-    assert message.strip().endswith(again)
-    assert main(["export", "figure", str(tmp_path / "a"), "--width", "84 mm"]) == 2
-    assert again in capsys.readouterr().err
-    assert names(tmp_path / "a") == before
-    assert names(tmp_path) == ["a", "b"]
 
 
 def test_a_damaged_result_is_one_line_and_exit_code_2(

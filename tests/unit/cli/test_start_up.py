@@ -28,36 +28,6 @@ def test_a_run_loads_nothing_that_only_others_need(tmp_path: Path, monkeypatch: 
     assert printed_by(code).splitlines()[-1] == "[]"
 
 
-def test_the_drawing_library_is_left_as_it_was() -> None:
-    code = (
-        "from ppafo.report.drawing import load_drawing\nload_drawing()\n"
-        "import matplotlib.artist\nfrom matplotlib.lines import Line2D\n"
-        "class Thicker(Line2D):\n    'A line.'\n    def set_excess(self, excess):\n        'Set it.'\n"
-        "print('linewidth' in matplotlib.artist.kwdoc(Line2D), 'excess' in Thicker.set.__doc__)"
-    )
-    assert printed_by(code) == "True True"
-
-
-def test_what_the_drawing_library_loads_late_is_there_when_it_is_used() -> None:
-    code = (
-        "import sys\nfrom ppafo.report.drawing import load_drawing\nload_drawing()\n"
-        "from matplotlib import dviread\nimport fontTools.agl\n"
-        "print(hasattr(fontTools.agl, '__file__'), 'mpl_toolkits.mplot3d' in sys.modules)\n"
-        "print(dviread.fontTools.agl.toUnicode('alpha') == '\\u03b1', hasattr(fontTools.agl, 'toUnicode'))\n"
-        "from mpl_toolkits.mplot3d import Axes3D\nprint(Axes3D.name)"
-    )
-    assert printed_by(code).split() == ["False", "False", "True", "True", "3d"]
-
-
-def test_a_library_that_is_there_already_is_not_touched() -> None:
-    code = (
-        "import sys, matplotlib.figure\nfrom ppafo.report import drawing\n"
-        "def of_others(): return {name: item for name, item in sys.modules.items() if not name.startswith('ppafo')}\n"
-        "before = of_others()\ndrawing.load_drawing()\nprint(of_others() == before)"
-    )
-    assert printed_by(code) == "True"
-
-
 def test_main_leaves_the_garbage_collection_of_a_calling_program_alone() -> None:
     code = (
         "import gc\nbefore = gc.get_threshold()\nfrom ppafo.cli.main import main\n"

@@ -3,7 +3,6 @@
 import contextlib
 import io
 import json
-import shlex
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -14,13 +13,10 @@ import pytest
 
 from ppafo.analyses.walk import command
 from ppafo.cli.main import main
-from ppafo.page.html import bundled, digest
-from ppafo.page.workbench import live_part
 from ppafo.storage import read_csv
 from ppafo.storage.netcdf_reading import read_netcdf
 from ppafo.storage.reading import read_recording
 from ppafo.walking import loading
-from ppafo.walking.loading import load_walk
 
 SHORT = ["--minutes", "0.1"]
 FILES = [
@@ -76,15 +72,6 @@ def test_a_walk_prints_its_table_and_where_the_files_are(ran: tuple[Path, list[s
     assert str(folder) in lines[-1]
 
 
-def test_toes_below_the_ground_would_drag_by_no_number_and_no_foot_has_a_rate(walked: Path) -> None:
-    text = (walked / "walk.txt").read_text(encoding="utf-8")
-    toes = next(line for line in text.splitlines() if line.startswith("Lowest toe height above ground"))
-    assert "would drag" in toes
-    assert "-" not in toes.partition("(cm)")[2]
-    assert "deg/s" not in text
-    assert "slap" not in text
-
-
 def test_a_walk_writes_its_folder_whole(walked: Path) -> None:
     assert names(walked) == FILES
     assert names(walked.parent) == ["solenoid"]
@@ -109,14 +96,6 @@ def test_tables_and_recordings_say_the_same_and_that_they_are_simulated(walked: 
     mean = (walked / "mean-stride.csv").read_text().splitlines()
     assert len(mean) == 2 + 101
     assert "angle [rad],angle_deviation [rad]" in mean[1]
-
-
-def test_the_report_holds_figures_and_numbers(walked: Path) -> None:
-    page = (walked / "report.html").read_text()
-    assert page.count("data:image/svg+xml;base64,") == 2
-    assert "Gas per stride (g)" in page
-    assert page.count("<script>") == 1
-    assert digest(bundled("loader.js")) in page.split("</head>")[0]
 
 
 def test_the_list_names_every_walk_and_every_task_sequence(capsys: pytest.CaptureFixture[str]) -> None:
@@ -153,23 +132,6 @@ def test_a_bottle_repeats_a_task_sequence_as_a_whole(tmp_path: Path, capsys: pyt
     capsys.readouterr()
     assert main(["bottle", str(folder), "--longest", "5 s"]) == 0
     assert "walk 'solenoid' in task sequence 'stairs'" in capsys.readouterr().out
-
-
-def test_a_walk_that_ends_before_its_bottle_prints_a_command_that_says_how_long_the_bottle_lasts(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    walked = ["walk", "proportional", "--bottle", "co2-16g", "--out", str(tmp_path / "a walk")]
-    assert main([*walked, *SHORT]) == 0
-    last = capsys.readouterr().out.splitlines()[-1]
-    name, *words = shlex.split(last.removeprefix("time until the bottle ends: "))
-    assert name == "ppafo"
-    assert main(words) == 0
-    assert "of walking" in capsys.readouterr().out
-    # A walk until the end of the bottle has its time already.
-    assert main([*walked, "--minutes", "2"]) == 0
-    printed = capsys.readouterr().out
-    assert "lasts" in printed
-    assert "time until the bottle ends" not in printed
 
 
 def test_a_stop_is_told_with_its_sign_readings_settings_and_time(
@@ -219,16 +181,6 @@ def test_strides_with_help_and_vented_ones_stand_apart(tmp_path: Path, capsys: p
     assert [line.split(",")[-1] for line in strides[1:]] == ["helped [-]", *["1.0"] * 3, *["0.0"] * 7]
     supplied = read_recording(tmp_path / "walk")["supplied_mass"]
     assert helped["total_gas"]["value"] == supplied[-1] - supplied[0]
-
-
-def test_a_minute_may_be_given_as_a_time_and_json_alone_is_printed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["walk", "--minutes", "6 s", "--json", "--out", str(tmp_path / "walk")]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["minutes"] == pytest.approx(0.1, abs=1e-3)
-    assert document["metrics"]["net_push_off_work"]["value"] > 0.5
-    assert document["folder"] == str(tmp_path / "walk")
 
 
 @pytest.fixture
@@ -284,12 +236,3 @@ def test_many_wearers_are_written_with_quantiles_and_histograms(
     assert len(gas) == document["wearers"] == 20
     assert quantiles["0.5"] == pytest.approx(np.median(gas))
     assert quantiles["0.05"] < quantiles["0.5"] < quantiles["0.95"]
-
-
-def test_the_page_says_that_its_live_part_begins_with_a_shorter_walk() -> None:
-    scenario = load_walk("solenoid")
-    found, same = live_part([scenario]), live_part([replace(scenario, run=replace(scenario.run, duration=6.0))])
-    assert found is not None
-    assert found.remark.startswith("The workbench begins with 6 s of the 60 s above")
-    assert same is not None
-    assert same.remark == ""

@@ -1,27 +1,22 @@
 """Actuators in parameter sets: kinds, what does not fit together, and the file of one that was measured."""
 
 import math
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ppafo.cli.main import main
 from ppafo.engine.rows import leaves
 from ppafo.errors import ParameterError, PpafoError
 from ppafo.model.actuators.table import bases_at, level_of
 from ppafo.parameters.actuator_table import read_actuator_table, table_of, within_resolution
-from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
 from ppafo.parameters.measured_volumes import MeasuredVolumes, read_measured_volumes
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.plan import plan_run
 from ppafo.simulation.tracking.shortfall import shortfall
-from tests.actuators.soft import soft
 
 EXAMPLE = Path(__file__).parents[2] / "actuators"
 HEADER = "angle [deg],pressure [kPa_g],volume_1 [mL]"
@@ -168,35 +163,6 @@ def test_the_step_of_a_table_is_that_of_its_numbers_and_not_of_its_zeros(
     assert read_measured_volumes(few).resolution_1 == pytest.approx(1e-6), "six numbers may be multiples by chance"
 
 
-def test_equal_volumes_at_two_pressures_are_not_moved() -> None:
-    volumes = np.repeat(np.linspace(80.0e-6, 200.0e-6, 8) ** 1.1, 2).reshape(8, 2)
-    kept, moved = within_resolution(volumes, np.linspace(0.0, 1.0, 8), 1.0e-6)
-    assert moved == 0.0
-    assert kept is volumes
-    assert table_of(MeasuredVolumes(np.linspace(0.3, 1.9, 8), np.array([0.0, 1e5]), volumes, None, 1e-6), "a.csv")
-
-
-@pytest.mark.parametrize("law", [("controller.kind=pid",), ("motion.kind=free", "controller.kind=sliding_mode")])
-def test_all_tables_with_as_many_chambers_share_a_program(tmp_path: Path, law: tuple[str, ...]) -> None:
-    sets = (f"device.set={EXAMPLE / 'measured-bladder.toml'}", soft(tmp_path, 1), soft(tmp_path, 2))
-    given = ("reference.level=0.5 N m", *law)
-    scenarios = [load_scenario("torque-task-proportional", [chosen, *given]) for chosen in sets]
-    one, *two = (plan_run(scenario).program for scenario in scenarios)
-    assert (len(set(two)), one.has_one_chamber) == (1, True)
-    assert one == replace(two[0], has_one_chamber=True)
-
-
-def test_the_audit_says_by_how_much_a_rounded_table_is_moved(tmp_path: Path) -> None:
-    text = (EXAMPLE / "measured-bladder.toml").read_text(encoding="utf-8")
-    path, table = tmp_path / "measured-bladder.toml", tmp_path / "measured-bladder.csv"
-    path.write_text(text.replace("angle_max]\nvalue = 110", "angle_max]\nvalue = 75"), encoding="utf-8")
-    table.write_bytes((EXAMPLE / "measured-bladder.csv").read_bytes())
-    assert "rounded-table" not in {finding.id for finding in findings_of(load_parameter_set(path))}
-    table.write_text("\n".join([HEADER, *ROUNDED]), encoding="utf-8")
-    (found,) = (finding for finding in findings_of(load_parameter_set(path)) if finding.id == "rounded-table")
-    assert "within the rounding step of 0.1 mL" in found.paragraph
-
-
 def test_columns_and_lines_may_stand_in_any_order(tmp_path: Path) -> None:
     rows = [
         (angle, pressure, 100 + angle + pressure, 300 - angle + pressure) for angle in (20, 60) for pressure in (0, 9)
@@ -286,27 +252,9 @@ def test_numbers_that_do_not_fit_together_are_refused(name: str, override: str, 
     assert said in str(caught.value)
 
 
-def test_a_scenario_asks_no_more_of_another_actuator_than_it_can() -> None:
-    with pytest.raises(
-        ParameterError,
-        match=r"needs a torque proportional to the pressure difference, .*'cylinder' of 'cylinder-lever' also",
-    ):
-        load_scenario(EXAMPLE / "torque-task-cylinder.toml", ("controller.kind=pid_fixed_point",))
-
-
 def test_a_run_of_an_ensemble_whose_lever_comes_to_its_dead_centre_is_refused_and_the_others_go_on() -> None:
     base = load_scenario(EXAMPLE / "torque-task-cylinder.toml")
     offsets = np.radians([15.0, 60.0, 20.0])
     screen = screen_columns(check_columns(base, {"actuator.lever_offset": offsets}))
     assert screen.members.tolist() == [0, 2]
     assert "actuator: the angle between lever and base is 80 to 190 deg" in screen.reasons[1]
-
-
-def test_the_bench_refuses_another_actuator_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["rig", "simulate", "step-response", "--device", "cylinder-lever", "--out", "out"]) == 2
-    said = capsys.readouterr().err
-    assert "supports vane actuators only, but the actuator of 'cylinder-lever' is of kind 'cylinder'" in said
-    assert said.count("\n") == 1

@@ -29,14 +29,6 @@ def test_a_column_of_a_study_moves_the_displacement_too() -> None:
     assert varied.device.actuator.displacement_per_radian == 2.35e-5
 
 
-def test_what_a_walk_s_observer_believes_follows_to_the_end() -> None:
-    from ppafo.walking.loading import load_walk
-
-    configuration = load_walk("solenoid")
-    varied = with_numbers(configuration, {CONSTANT: np.array([1.0e-5, 2.0e-5])})
-    assert np.array_equal(varied.controller.settings["nominal_displacement_per_radian"], [1.0e-5, 2.0e-5])
-
-
 @pytest.mark.parametrize("unit", ["cm^3", "m^3", "N m/psi", "in^3"])
 def test_the_displacement_is_the_torque_constant_to_the_last_bit_in_any_unit(unit: str) -> None:
     actuator = load_device("ppafo2011", overrides=(f"{CONSTANT}=0.1234 {unit}",)).actuator

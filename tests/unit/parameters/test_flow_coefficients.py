@@ -8,7 +8,6 @@ from ppafo.errors import ParameterError
 from ppafo.parameters.flow_coefficients import conductance_of, conductance_of_nominal_flow, nominal_flow_of_cv
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.overrides import apply_overrides
-from ppafo.wording import nearest_name
 
 LITRE_PER_SECOND_BAR = 1e-8
 
@@ -53,7 +52,3 @@ def test_the_answer_to_a_flow_coefficient_is_taken(given: str) -> None:
     after = apply_overrides(before, answers)
     assert after.numbers["valves.proportional.critical_ratio"].value == 0.3
     assert 0.15 < after.numbers["valves.proportional.sonic_conductance"].value < 0.25
-
-
-def test_a_key_of_a_file_is_answered_too() -> None:
-    assert "3.87 L/(s bar) for each Cv" in nearest_name("Cv", ["area", "sonic_conductance", "critical_ratio"])

@@ -1,6 +1,5 @@
 """Links between settings: which act, what they come to, and when they end."""
 
-from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -80,24 +79,3 @@ def test_terms_are_summed_and_one_with_settings_takes_them_by_name() -> None:
     link = LinkedDefault((LinkFunction(("a", "b"), lambda row: row.x * row.y, (Pair,)), LinkFunction(("b",))), 0.5)
     assert link.sources == ("a", "b", "b")
     assert link.number({"a": 2.0, "b": 3.0}.__getitem__) == pytest.approx(9.5)
-
-
-def test_links_with_a_common_first_stage_compute_it_once_for_each_run() -> None:
-    asked = []
-
-    def both(row: Pair) -> tuple[float, float]:
-        asked.append(row)
-        return row.x + row.y, row.x * row.y
-
-    def term(second: Callable[[float, float], float]) -> LinkFunction:
-        return LinkFunction(("a", "b"), lambda row: second(*both(row)), (Pair,), stages=(both, second))
-
-    graph = {"larger": (LinkedDefault((term(max),)),), "smaller": (LinkedDefault((term(min),)),)}
-    now = {"a": 2.0, "b": 3.0, "larger": 6.0, "smaller": 5.0}
-    column = np.array([0.1, 0.2, 0.7, 0.2])
-    moved = resolved(graph, {"a": column}, now)
-    assert moved["larger"].tolist() == [max(a + 3.0, a * 3.0) for a in column]
-    assert moved["smaller"].tolist() == [min(a + 3.0, a * 3.0) for a in column]
-    # Once for the numbers now, and once for each distinct value.
-    assert [row.x for row in asked] == [2.0, 0.1, 0.2, 0.7]
-    assert term(max).number({"a": 2.0, "b": 3.0}.__getitem__) == 6.0

@@ -9,7 +9,7 @@ import pytest
 from ppafo.analyses.sets.values import shown_values
 from ppafo.errors import ParameterError
 from ppafo.parameters import load_device, load_parameter_set
-from ppafo.parameters.joint import ANKLE, JointNames
+from ppafo.parameters.joint import JointNames
 from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
 from ppafo.report.stored_figure import draw_stored_result
 from ppafo.running import simulate
@@ -25,10 +25,6 @@ def elbow(tmp_path: Path) -> Path:
     file = tmp_path / "elbow.toml"
     file.write_text(CYLINDER.replace('name = "cylinder-lever"', 'name = "elbow"', 1) + ELBOW, encoding="utf-8")
     return file
-
-
-def test_the_sets_that_ship_turn_an_ankle() -> None:
-    assert load_device("ppafo2011").joint == ANKLE == JointNames("ankle", "plantarflexion", "dorsiflexion")
 
 
 def test_a_set_names_its_joint_and_the_opposite_is_known(elbow: Path) -> None:

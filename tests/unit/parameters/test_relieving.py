@@ -36,21 +36,6 @@ def test_anything_but_true_or_false_is_refused(text: str) -> None:
         ppafo.load_scenario("step-response", [f"supply.relieving={text}"])
 
 
-def test_a_number_in_a_file_is_refused(tmp_path: Path) -> None:
-    text = parameter_set_toml(apply_overrides(load_parameter_set("ppafo2011"), [RELIEVING]))
-    file = tmp_path / "mine.toml"
-    file.write_text(text.replace("value = true", "value = 1.0"), encoding="utf-8")
-    with pytest.raises(PpafoError, match=r"supply\.relieving\.value"):
-        load_parameter_set(file)
-
-
-def test_the_key_does_not_vary_in_an_ensemble() -> None:
-    from ppafo.simulation.ensemble import run_ensemble
-
-    with pytest.raises(PpafoError, match=r"'supply\.relieving' is a text and cannot vary"):
-        run_ensemble(ppafo.load_scenario("step-response"), {"supply.relieving": [0.0, 1.0]}, ("gas_supplied",))
-
-
 EMPTY = ("supply.pressure=0 psi_g", "supply.dorsiflexion_pressure=0 psi_g")
 
 
@@ -71,12 +56,6 @@ def test_a_leaking_step_with_an_empty_bottle_agrees_with_the_reference_solver() 
     agreement = compare_with_reference(plan_run(ppafo.load_scenario("step-response", [*EMPTY, *filled])))
     assert agreement.worst_pressure < 1.0e-3
     assert agreement.angle < 2.0e-4
-
-
-def test_one_supply_below_the_atmosphere_beside_one_above_it_is_refused_in_one_line() -> None:
-    said = r"supply\.dorsiflexion_pressure = -1 psi_g must be at least supply\.atmospheric_pressure = 0 psi_g;"
-    with pytest.raises(PpafoError, match=said):
-        ppafo.load_scenario("step-response", ["supply.dorsiflexion_pressure=-1 psi_g"])
 
 
 def test_an_empty_bottle_has_no_full_range_to_validate_against(tmp_path: Path) -> None:

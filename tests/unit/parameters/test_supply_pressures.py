@@ -37,12 +37,6 @@ def test_pressure_is_that_of_both_unless_the_second_is_given_apart(
     assert supply.dorsiflexion_pressure == pytest.approx(psi(second), rel=1e-12)
 
 
-def test_override_on_top_of_those_of_a_file_leaves_a_second_pressure_that_is_apart() -> None:
-    apart = apply_overrides(load_parameter_set("ppafo2011"), ["supply.dorsiflexion_pressure=45 psi_g"])
-    supply = build_device(apply_overrides(apart, ["supply.pressure=70 psi_g"])).supply
-    assert (supply.pressure, supply.dorsiflexion_pressure) == pytest.approx((psi(70.0), psi(45.0)), rel=1e-12)
-
-
 def test_override_on_top_of_a_file_with_both_alike_moves_both() -> None:
     alike = apply_overrides(
         load_parameter_set("ppafo2011"), ["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g"]

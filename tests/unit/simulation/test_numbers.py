@@ -12,17 +12,16 @@ from ppafo.parameters.overrides import over
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form, with_numbers
-from ppafo.simulation.scenario import scenario_document
 
 
 @cache
 def looked_at() -> dict[str, set[str]]:
-    """Numbers by scenario: each in the first two that have it, and a fifth of the others, in turn."""
+    """Numbers by scenario: each in the first that has it, and a tenth of the others, in turn."""
     seen: Counter[str] = Counter()
     chosen: dict[str, set[str]] = {}
     for number, name in enumerate(list_scenarios()):
         declared = list(declared_numbers(load_scenario(name)))
-        chosen[name] = {path for place, path in enumerate(declared) if seen[path] < 2 or place % 5 == number % 5}
+        chosen[name] = {path for place, path in enumerate(declared) if seen[path] < 1 or place % 10 == number % 10}
         seen.update(declared)
     return chosen
 
@@ -38,7 +37,7 @@ def test_a_replaced_number_is_the_single_run_with_it(name: str) -> None:
     declared = declared_numbers(scenario)
     paths = [path for path in declared if path not in {*TIMES, *absent}]
     chosen = looked_at()[name] & set(paths)
-    assert len(chosen) > 8
+    assert chosen
     for path in chosen:
         before, quantity = number_at(scenario, path), declared[path]
         # A pressure that is wanted stays above the atmosphere.
@@ -79,22 +78,10 @@ def test_an_orifice_in_the_other_form_takes_that_form() -> None:
     assert changed.device.actuator == scenario.device.actuator
 
 
-def test_a_constant_command_has_no_reference_to_vary() -> None:
-    paths = declared_numbers(load_scenario("step-response"))
-    assert not [path for path in paths if path.startswith("reference.")]
-    assert "controller.command" in paths
-
-
 def test_a_scenario_made_from_a_device_alone_has_the_links_of_the_device() -> None:
     scenario = replace(load_scenario("step-response"), device=load_device("ppafo2011"), links={})
     supply = with_numbers(scenario, {"supply.pressure": 5.0e5}).device.supply
     assert (supply.pressure, supply.dorsiflexion_pressure) == (5.0e5, 5.0e5)
-
-
-def test_links_are_no_part_of_the_document_of_a_scenario() -> None:
-    document = scenario_document(load_scenario("step-response"))
-    assert "links" not in document
-    assert "links" not in document["device"]
 
 
 LINEARISED = ("controller.kind=feedback_linearisation", "reference.kind=constant", "reference.level=2 N m")

@@ -7,14 +7,10 @@ import pytest
 
 import ppafo
 from ppafo.errors import PpafoError, ScenarioError
-from ppafo.metrics import METRICS
-from ppafo.parameters.declaration import OF_SECOND_CHAMBER as NUMBERS_OF_SECOND_CHAMBER
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
-from ppafo.simulation.ensemble.running import lacking, offered
-from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
 from tests.actuators.soft import OF_SECOND_CHAMBER as SECOND_CHAMBER
 from tests.actuators.soft import soft
@@ -94,20 +90,3 @@ def test_the_second_port_stays_at_the_atmosphere_where_this_varies(bladder: Scen
     assert len(plan_ensemble(columns).batches) == 1
     with pytest.raises(ScenarioError, match="cannot vary: the actuator has one chamber"):
         check_columns(bladder, {"actuator.dead_volume_2": np.array([1.0e-6])})
-
-
-def test_no_number_of_a_second_chamber_varies(bladder: Scenario) -> None:
-    assert not [path for path in declared_numbers(bladder) if path in NUMBERS_OF_SECOND_CHAMBER]
-    assert "one chamber" in lacking(bladder, METRICS["gas_leaked"])
-    assert "gas_imbalance" not in offered(bladder)
-
-
-def test_the_audit_asks_for_no_second_chamber() -> None:
-    findings = {finding.id: finding for finding in ppafo.audit(str(BLADDER)).found.findings}
-    assert "missing-values" not in findings
-    assert "With the chamber at supply or at atmosphere" in findings["torque-ceiling"].paragraph
-
-
-def test_the_torque_of_a_spring_is_not_said_to_be_the_supplys() -> None:
-    (finding,) = (item for item in ppafo.audit(str(BLADDER)).found.findings if item.id == "torque-ceiling")
-    assert finding.title == "the actuator gives at most 25.7 N m up and 2.36 N m down"

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import ppafo
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
 from ppafo.running import gains, simulate
@@ -28,18 +27,6 @@ def test_given_gains_and_computed_ones_are_told_apart() -> None:
     assert found.dead_time == 1.5e-3
     assert found.sentence.startswith("gains: torque_gain 2 1/(N m) (given); torque_integral_gain 167 ")
     assert gains(load_scenario("step-response")) is None
-
-
-def test_a_gain_on_the_rate_of_the_error_is_said_unless_it_is_0() -> None:
-    paper = gains(load_scenario(TASK))
-    assert paper is not None
-    given = (
-        "proportional_gain 0.095 1/(N m), integral_gain 0.25 1/(N m s), derivative_gain 0.006 s/(N m), anti_windup 0"
-    )
-    assert paper.sentence == f"gains: {given} 1/s (given)"
-    without = gains(load_scenario(TASK, ["controller.derivative_gain=0"]))
-    assert without is not None
-    assert "derivative" not in without.sentence
 
 
 def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:
@@ -107,19 +94,6 @@ def test_a_walk_says_it_and_meters_count_what_its_recording_shows() -> None:
     assert verdict is not None
     assert verdict.per == "stride"
     assert "; to try, the more promising one first: overrides=['controller.torque_gain=" in verdict.sentence
-
-
-def test_find_counts_what_oscillates_as_not_met() -> None:
-    found = ppafo.find(
-        TASK,
-        vary="controller.proportional_gain=1..200 1/(N m)",
-        such_that="rms_error <= 2 N m",
-        highest=True,
-        grid=8,
-        overrides=["valve.delay=5 ms", "controller.derivative_gain=0 s/(N m)"],
-    ).found
-    assert found.value is not None
-    assert found.value < 60.0
 
 
 def test_a_joint_that_moves_far_oscillates_where_its_chamber_is_smallest(tmp_path: Path) -> None:

@@ -3,8 +3,6 @@
 import dataclasses
 import json
 import math
-import pickle
-import re
 from pathlib import Path
 
 import numpy as np
@@ -56,18 +54,6 @@ def test_a_stored_result_is_shown_as_its_run_was(tmp_path: Path, capsys: pytest.
     assert repr(ppafo.read_result(tmp_path / "told")).splitlines()[1] == printed[1]
 
 
-def test_a_result_of_an_earlier_version_has_no_verdict_and_a_damaged_verdict_is_refused(tmp_path: Path) -> None:
-    folder = ppafo.simulate("step-response", ["run.duration=0.05 s"]).save(tmp_path / "run")
-    document = json.loads((folder / "run.json").read_text())
-    said = document.pop("verdict")
-    assert said == ["values changed: run.duration=0.05 s"]
-    (folder / "run.json").write_text(json.dumps(document))
-    assert repr(ppafo.read_result(folder)).splitlines()[:2] == [f"StoredResult in {folder}: completed", ""]
-    (folder / "run.json").write_text(json.dumps({**document, "verdict": 3}))
-    with pytest.raises(DataError, match=r"run\.json: verdict = 3 must be a list of texts"):
-        ppafo.read_result(folder)
-
-
 def test_a_stored_result_is_the_dataset_of_its_run(tmp_path: Path) -> None:
     run = ppafo.simulate("step-response", ["run.duration=0.05 s"])
     stored = ppafo.read_result(run.save(tmp_path / "run"))
@@ -85,15 +71,6 @@ def test_a_stored_result_is_the_dataset_of_its_run(tmp_path: Path) -> None:
     for result in (run, stored):
         with pytest.raises(ppafo.PpafoError, match="units='psi_g': must be units by channel"):
             result.dataset(units="psi_g")  # type: ignore[arg-type]
-
-
-def test_a_figure_that_the_user_saves_has_no_type_3_font(tmp_path: Path) -> None:
-    figure = ppafo.simulate("step-response", ["run.duration=0.05 s"]).plot()
-    for number, drawn in enumerate((figure, pickle.loads(pickle.dumps(figure)))):
-        drawn.savefig(tmp_path / f"{number}.pdf", metadata={"CreationDate": None})
-        content = (tmp_path / f"{number}.pdf").read_bytes()
-        assert b"/Subtype /Type0" in content
-        assert b"/Subtype /Type3" not in content
 
 
 def test_the_document_holds_every_number_of_the_device_in_si(result: Result) -> None:
@@ -123,18 +100,6 @@ def test_plain_data_has_python_numbers_and_the_type_of_what_is_not_data() -> Non
     assert plain({"a": (np.int64(3), np.float64(0.5), True, None)}) == {"a": [3, 0.5, True, None]}
     assert type(plain(np.int64(3))) is int
     assert plain(Path) == "builtins.type"
-
-
-def test_a_controller_written_in_python_is_named_in_the_document(step_response: Scenario) -> None:
-    class Law:
-        def reset(self) -> None: ...
-
-        def update(self, *seen: object) -> float:
-            return float(len(seen))
-
-    control = dataclasses.replace(step_response.controller, custom=Law())
-    document = scenario_document(dataclasses.replace(step_response, controller=control))
-    assert document["controller"]["custom"].endswith("Law")
 
 
 def test_a_saved_result_is_read_back(result: Result, tmp_path: Path) -> None:
@@ -192,19 +157,6 @@ def test_a_run_that_is_useless_says_so_where_it_is_printed() -> None:
     assert str(wild).splitlines()[:4] == ["torque-task-proportional: completed", warning, changed, ""]
 
 
-def test_a_run_that_follows_its_reference_says_so_in_its_second_line() -> None:
-    result = ppafo.simulate("torque-task-proportional", {"reference.level": 4.0})
-    verdict, changed, blank = str(result).splitlines()[1:4]
-    assert (verdict, changed, blank) == (result.following, "values changed: reference.level=4 N m", "")
-    words = r"the torque follows its reference; from [\d.]+ s on: RMS error [\d.]+ N m \(0.2 N m allowed\), swing "
-    assert re.fullmatch(rf"{words}[\d.]+ N m", verdict)
-    # The metric of the same name covers another interval, and says so in its line.
-    (metric,) = (line for line in str(result).splitlines() if line.startswith("rms_error "))
-    assert metric.endswith("over the whole run")
-    assert result.tracking is None
-    assert ppafo.simulate("step-response").following == ""
-
-
 def test_times_and_units_are_at_hand(result: Result) -> None:
     assert result["time"].tolist() == [0.0, 0.1]
     assert result._ipython_key_completions_()[0] == "time"
@@ -220,15 +172,3 @@ def test_times_and_units_are_at_hand(result: Result) -> None:
         result.plot(ax=None)  # type: ignore[call-arg]
     with pytest.raises(DataError, match=r"log: 'torque' must be a Channel, such as Channel\(values, 'N m'\)"):
         Recording("log", np.array([0.0, 1.0]), {"torque": [1.0, 2.0]})  # type: ignore[dict-item]
-
-
-def test_run_json_has_one_verdict_whether_python_or_the_command_line_wrote_it(tmp_path: Path) -> None:
-    """A pair of valves too coarse for a reference beyond reach on purpose, so that no remedy is tried."""
-    task, change = "torque-task-solenoid", "valve.area=15.8 mm^2"
-    ppafo.simulate(task, [change]).save(tmp_path / "python")
-    assert main(["simulate", task, "--set", change, "--out", str(tmp_path / "command")]) == 0
-    texts = [json.loads((tmp_path / name / "run.json").read_text())["verdict"] for name in ("python", "command")]
-    # Each caller is told overrides in the form that the caller gives.
-    assert texts[0] == [re.sub(r"--set ('.*?')", r"overrides=[\1]", said) for said in texts[1]]
-    assert sum("the pair of valves changes the torque by 2.75 N m" in said for said in texts[0]) == 1
-    assert sum(said.startswith("the torque stays ") for said in texts[0]) == 1

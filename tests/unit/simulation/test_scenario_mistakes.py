@@ -1,7 +1,6 @@
 """Every mistake in a scenario is one line: the file, the key, the value, what is allowed, the nearest name."""
 
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -60,10 +59,6 @@ def problem_after(old: str, new: str, kind: type[PpafoError] = ScenarioError) ->
     return problem_with(TEXT.replace(old, new).encode(), kind)
 
 
-def test_the_text_that_these_tests_damage_is_itself_a_scenario() -> None:
-    assert parse_scenario(TEXT.encode(), "task.toml").name == "task"
-
-
 @pytest.mark.parametrize(
     ("old", "new", "key", "nearest"),
     [
@@ -91,10 +86,6 @@ def test_a_misspelt_key_is_answered_with_the_nearest(old: str, new: str, key: st
 )
 def test_an_unknown_kind_is_answered_with_what_there_is(old: str, new: str, nearest: str) -> None:
     assert nearest in problem_after(old, new)
-
-
-def test_a_setting_of_another_kind_of_controller_is_unknown() -> None:
-    assert "unknown key 'controller.proportional_gain'" in problem_after('"pid"', '"on_off"')
 
 
 @pytest.mark.parametrize(
@@ -249,11 +240,6 @@ def test_times_that_do_not_go_together_are_refused(old: str, new: str, reason: s
     assert reason in problem_after(old, new)
 
 
-def test_a_delay_of_too_many_steps_is_refused() -> None:
-    text = TEXT.replace('"3 s"', '"300 s"').replace('delay = "0 s"', 'delay = "101 s"')
-    assert "sensors.delay = '101 s': must be at most 100 s" in problem_with(text.encode())
-
-
 def test_a_mistake_in_the_device_names_scenario_and_set() -> None:
     message = problem_after('valve = "proportional"', 'valve = "solnoid"', ParameterError)
     assert "[device]: ppafo2011: there is no valve 'solnoid', did you mean 'solenoid'?" in message
@@ -271,55 +257,6 @@ def test_a_set_without_the_valve_of_the_scenario_names_the_option_that_takes_its
     assert message.endswith(
         "there is no valve 'solenoid'; available: proportional; give overrides=['device.valve=proportional']"
     )
-
-
-@pytest.mark.parametrize("name", ["a" * 300, "a/" * 3000 + "b"])
-def test_a_name_of_a_set_that_is_too_long_is_a_clean_error(name: str) -> None:
-    message = problem_after('"ppafo2011"', f'"{name}"', ParameterError)
-    assert "[device]: there is no parameter set 'aa" in message or "[device]: there is no parameter set 'a/a" in message
-    assert len(message) < 400
-
-
-def test_a_name_that_is_too_long_says_how_long_it_may_be() -> None:
-    with pytest.raises(ScenarioError, match=r": must have at most 100 characters$"):
-        scenario_from_dict({**tomllib.loads(TEXT), "name": "x" * 101})
-
-
-def test_empty_binary_and_foreign_encodings_are_named() -> None:
-    for content, reason in ((b" \n", "is empty"), (b"\x00\xff\x80", "UTF-8"), ("é".encode("latin-1"), "UTF-8")):
-        assert reason in problem_with(content)
-
-
-def test_a_duplicate_key_and_a_duplicate_table_are_errors_with_their_line() -> None:
-    assert "line 4" in problem_after('name = "task"', 'name = "task"\nname = "task"')
-    assert "line" in problem_with((TEXT + "\n[run]\n").encode())
-
-
-def test_deep_nesting_is_a_clean_error() -> None:
-    assert "nested too deeply" in problem_with(b"a = " + b"[" * 20000)
-
-
-def test_a_name_that_is_not_there_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="no scenario 'step-respnse', did you mean 'step-response'"):
-        load_scenario("step-respnse")
-    with pytest.raises(ScenarioError, match=r"gone.toml: cannot be read: no such file"):
-        load_scenario(tmp_path / "gone.toml")
-    with pytest.raises(ScenarioError, match="directory"):
-        load_scenario(tmp_path)
-
-
-@pytest.mark.parametrize("name", ["a\0b.toml", "a\0b", "a" * 300, "a" * 300 + ".toml", "a\nb.toml", "a\nb", "\ud800"])
-def test_a_name_that_no_file_can_have_is_a_clean_error(name: str) -> None:
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario(name)
-    assert str(caught.value).isprintable()
-    assert len(str(caught.value)) < 400
-
-
-@pytest.mark.parametrize("content", [None, [], "torque-task", 3])
-def test_only_a_dictionary_is_taken_for_a_scenario(content: Any) -> None:
-    with pytest.raises(ScenarioError, match="a scenario must be a dictionary"):
-        scenario_from_dict(content)
 
 
 @pytest.mark.parametrize(

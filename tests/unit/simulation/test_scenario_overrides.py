@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 import ppafo
 from ppafo.errors import ParameterError, PpafoError, ScenarioError
 from ppafo.loading import reloaded
-from ppafo.parameters.overrides import split_override
 from ppafo.simulation.declaration import OF_A_VANE
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.overrides import device_paths
@@ -35,12 +34,6 @@ def test_values_of_scenario_and_device_are_changed_together() -> None:
     assert scenario.motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(80.0)}), "locked")
 
 
-def test_the_overrides_stay_visible_and_the_file_is_kept_as_it_was() -> None:
-    origin = load_scenario(TASK, ["run.duration=1 s"]).origin
-    assert origin.overrides == ("run.duration=1 s",)
-    assert origin.content["run"]["duration"] == "3 s"
-
-
 def test_the_overrides_of_the_caller_come_after_those_of_the_file() -> None:
     assert load_scenario("step-response", ["supply.pressure=300 kPa_a"]).device.supply.pressure == 3.0e5
 
@@ -48,11 +41,6 @@ def test_the_overrides_of_the_caller_come_after_those_of_the_file() -> None:
 def test_another_valve_is_chosen_and_then_changed() -> None:
     device = load_scenario(TASK, ["valve.opening_delay=3 ms", "device.valve=solenoid"]).device
     assert (device.valve.kind, device.valve.opening_delay) == ("solenoid", 0.003)
-
-
-def test_a_section_that_the_file_leaves_out_can_be_set() -> None:
-    sensors = load_scenario(TASK, ["sensors.delay=2 ms", "sensors.seed=5"]).sensors
-    assert (sensors.delay, sensors.seed) == (0.002, 5)
 
 
 def test_another_kind_of_controller_drops_the_settings_of_the_old_one() -> None:
@@ -116,36 +104,9 @@ def test_an_unknown_path_is_answered_with_the_nearest_of_scenario_and_device(ove
     assert f"did you mean '{nearest}'?" in problem_of(override)
 
 
-def test_an_unknown_value_of_the_device_is_answered_by_the_set() -> None:
-    assert "did you mean 'supply.pressure'" in problem_of("supply.presure=3 psi_g", kind=ParameterError)
-
-
-def test_a_path_that_resembles_nothing_is_answered_with_examples() -> None:
-    assert "for example run.duration, run.step, run.output_interval" in problem_of("run.zzzzzzzzzzzz=1")
-
-
 @pytest.mark.parametrize("override", ["run.duration", "=3", "run.duration=", "", "run.duration 3"])
 def test_what_is_not_path_and_value_is_refused(override: str) -> None:
     assert "is not of the form PATH=VALUE" in problem_of(override)
-
-
-def test_a_value_that_does_not_fit_names_the_override() -> None:
-    message = problem_of("motion.angle=200 deg")
-    assert message.startswith("torque-task-proportional: override motion.angle=200 deg: must be between the stops")
-
-
-def test_a_seed_that_is_no_whole_number_is_refused() -> None:
-    assert problem_of("sensors.seed=1.5") == "override 'sensors.seed=1.5': must be a whole number"
-
-
-def test_overrides_of_the_file_and_lists_are_not_paths() -> None:
-    assert "has no value 'device.overrides'" in problem_of("device.overrides=[]")
-    assert "has no value 'assumed'" in problem_of("assumed=x")
-
-
-def test_an_override_is_split_at_its_first_equals_sign() -> None:
-    assert split_override("  run.duration =  1\n s ")[1:] == ("run.duration", "1 s")
-    assert split_override("description=a = b")[1:] == ("description", "a = b")
 
 
 PATHS = [*OF_A_VANE.paths(load_scenario(TASK).origin.content), *device_paths()]
@@ -193,12 +154,6 @@ def test_a_setting_may_come_before_its_kind(words: list[str]) -> None:
     assert replace(last, origin=first.origin) == first
 
 
-def test_a_value_comes_before_or_behind_the_kind_that_has_it() -> None:
-    words = ["controller.integral_gain=2", "controller.kind=pid", "reference.kind=constant", "reference.level=2 N m"]
-    for order in itertools.permutations(words):
-        assert load_scenario("step-response", order).controller.integral_gain == 2.0
-
-
 def test_a_value_of_a_valve_beside_the_choice_of_another_is_refused_with_both_in_any_order() -> None:
     words = ("device.valve=solenoid", "valves.proportional.area=5 mm^2")
     told = {problem_of(*order) for order in itertools.permutations(words)}
@@ -221,19 +176,6 @@ def test_the_choice_of_a_valve_drops_what_a_layer_below_gives_of_another() -> No
     chosen = reloaded(below, ["device.valve=solenoid"])
     assert chosen.origin.overrides == ("run.duration=1 s", "device.valve=solenoid")
     assert chosen.device == load_scenario(TASK, ["device.valve=solenoid"]).device
-
-
-def test_values_of_the_scenario_s_own_device_that_replace_those_of_another_set_are_logged(
-    caplog: pytest.LogCaptureFixture, tmp_path: Path
-) -> None:
-    own = tmp_path / "mine.toml"
-    own.write_text((Path(ppafo.__file__).parent / "parameters" / "sets" / "ppafo2011.toml").read_text())
-    load_scenario("step-response", [f"device.set={own}"])
-    assert caplog.messages == [
-        f"ppafo: step-response: values of the scenario replace values of {own}: supply.pressure=55 psi_g, "
-        "supply.dorsiflexion_pressure=55 psi_g; overrides=['supply.pressure=50 psi_g', "
-        "'supply.dorsiflexion_pressure=50 psi_g'] restores the replaced values"
-    ]
 
 
 def test_numbers_that_a_newly_chosen_kind_keeps_are_said(tmp_path: Path) -> None:

@@ -1,9 +1,7 @@
 """From a scenario to a result: recordings, status, Python controllers, many at once."""
 
-import copy
 import dataclasses
 import math
-import pickle
 import signal
 import subprocess
 import sys
@@ -19,13 +17,11 @@ from ppafo.engine.step import loop
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
-from ppafo.simulation.ensemble import COMPLETED, DIVERGED, _ensemble_result, run_ensemble
-from ppafo.simulation.ensemble.running import MeteredRuns, OutputRequest
+from ppafo.simulation.ensemble import COMPLETED, DIVERGED, run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.simulate import REMEDY, result_of, simulate_many
-from ppafo.walking.evaluation import status_of_walk
 from tests.reference.reference_solver import compare_with_reference
 
 CHANNELS = {
@@ -67,17 +63,6 @@ def test_recording_has_every_channel_at_every_output_time(torque_task: Callable[
     assert result.recording.time[-1] == pytest.approx(3.0)
     assert np.diff(result.recording.time) == pytest.approx(1e-3)
     assert result.status.kind == "completed"
-
-
-def test_open_loop_run_has_no_reference_and_so_no_tracking_error(step_response: Scenario) -> None:
-    result = simulate(step_response)
-    assert "reference" not in result.recording.names
-    assert "rms_error" not in result.metrics
-
-
-def test_same_scenario_gives_the_same_bits_every_time(step_response: Scenario) -> None:
-    first, second = simulate(step_response), simulate(step_response)
-    assert all(np.array_equal(first.recording[name], second.recording[name]) for name in first.recording.names)
 
 
 def test_many_scenarios_give_what_each_gives_alone(torque_task: Callable[[str], Scenario]) -> None:
@@ -146,30 +131,6 @@ def test_python_controller_that_returns_no_finite_number_is_refused_with_the_tim
         simulate(torque_task("proportional").controlled_by(Broken()))
 
 
-def test_a_python_controller_whose_methods_take_other_arguments_is_told_which_they_take(
-    torque_task: Callable[[str], Scenario],
-) -> None:
-    class TwoArguments:
-        def reset(self) -> None: ...
-
-        def update(self, time: float, reference: float) -> float:
-            return 0.0
-
-    class ResetTakesMore(Proportional):
-        def reset(self, gain: float) -> None: ...  # type: ignore[override]
-
-    for controller in (TwoArguments(), ResetTakesMore()):
-        with pytest.raises(SimulationError) as refused:
-            simulate(torque_task("proportional").controlled_by(controller))  # type: ignore[arg-type]
-        assert str(refused.value).startswith(f"{type(controller).__name__}: ")
-        assert str(refused.value).endswith("; define reset(self) and update(self, time, reference, measurement)")
-
-
-def test_commands_of_a_python_controller_are_clipped(torque_task: Callable[[str], Scenario]) -> None:
-    result = simulate(torque_task("proportional").controlled_by(Proportional(1e6)))
-    assert float(np.abs(result.recording["command"]).max()) == 1.0
-
-
 def test_diverging_run_is_a_status_with_time_state_and_remedy(step_response: Scenario) -> None:
     run = plan_run(step_response)
     batch = batch_of(run)
@@ -231,13 +192,6 @@ def test_separate_dorsiflexion_pressure_is_what_chamber_2_gets() -> None:
     result = simulate(load_scenario("step-response", [*overrides, "run.duration=1 s", "initial.pressure_2=0 psi_g"]))
     assert result.recording["pressure_2"][-1] == pytest.approx(101325.0 + 30.0 * 6894.757, rel=1e-3)
     assert result.recording["angle"][-1] == pytest.approx(result.scenario.device.actuator.angle_min)
-
-
-def test_external_torque_holds_the_vane_back() -> None:
-    held = simulate(load_scenario("step-response", ["motion.ankle_torque=-6 N m"]))
-    assert held.recording["angle"][-1] == pytest.approx(held.recording["angle"][0])
-    free = simulate(load_scenario("step-response"))
-    assert free.recording["angle"][-1] > free.recording["angle"][0] + 1.5
 
 
 def test_restitution_makes_the_vane_rebound() -> None:
@@ -328,27 +282,6 @@ def test_a_chamber_that_is_driven_far_above_its_supply_completes() -> None:
     result = simulate("step-response", ["motion.kind=free", "actuator.dead_volume_1=1 cm^3", *driven])
     assert result.status.is_completed
     assert result.recording["pressure_1"].max() > 3.0 * result.scenario.device.supply.pressure
-
-
-def test_runs_of_an_ensemble_and_walks_with_too_many_parts_say_so_too() -> None:
-    states = np.zeros((3, 1))
-    assert status_of_walk(1.5, True, states).message.endswith(f"t = 1.5 s; {TOO_MANY_PARTS}")
-    assert "parts" not in status_of_walk(1.5, False, states).message
-    outcome = MeteredRuns(2, OutputRequest({}, (), 1.0, np.empty(0)))
-    outcome.failure_time[:] = 1.5
-    outcome.too_many_parts[1] = True
-    told = _ensemble_result(outcome, {}, {}).reasons
-    assert told == {0: f"diverged at t = 1.5 s; {REMEDY}", 1: f"diverged at t = 1.5 s; {TOO_MANY_PARTS}"}
-
-
-def test_a_result_that_nobody_has_looked_at_is_copied_pickled_and_compared_as_any_other(
-    step_response: Scenario,
-) -> None:
-    first, other = simulate_many([step_response, step_response])
-    stored = pickle.loads(pickle.dumps(first))
-    assert stored.recording == other.recording
-    assert stored.metrics["angle_range"].value == other.metrics["angle_range"].value
-    assert copy.deepcopy(simulate(step_response)) == dataclasses.replace(first, status=other.status)
 
 
 class WithASlip:

@@ -1,18 +1,13 @@
 """A loop that does not move at all says so, and with what it would."""
 
-import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import ppafo
-from ppafo.cli.main import main
 from ppafo.loading import load_scenario
 from ppafo.remedy_trials import tried
 from ppafo.running import simulate
-from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import level_text
 
@@ -65,19 +60,6 @@ def test_a_pressure_that_stays_where_it_is_is_named_with_what_keeps_it(overrides
     assert said in verdict.sentence
 
 
-def test_simulate_says_it_before_the_gains_and_a_check_ends_with_1(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    given = [
-        word for text in (*STUCK, *LEARNS_NOTHING, "controller.angle_stiffness=4 N m/rad") for word in ("--set", text)
-    ]
-    folder = ["--set", "run.duration=0.5 s", "--out", str(tmp_path / "out")]
-    assert main(["simulate", "cylinder-servo", *given, *folder, "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)["tracking"]["sentence"]
-    assert main(["simulate", "cylinder-servo", *given, *folder, "--check"]) == 1
-    assert capsys.readouterr().out.splitlines()[1] == said
-
-
 HELD = ["motion.kind=free", "motion.angle=75 deg", "reference.level=4 N m"]
 """Free joint that the torque task presses with 4 N m."""
 
@@ -110,20 +92,3 @@ def test_friction_is_not_to_be_reduced_where_nothing_turns_the_joint_or_the_refe
     (still,) = [said for said in beyond.warnings if "does not move" in said]
     assert still.endswith("static friction of 20 N m exceeds the largest torque of actuator and load, 5 N m")
     assert any("actuator gives at most 5 N m" in said for said in beyond.warnings)
-
-
-def test_a_search_says_of_the_value_that_it_found_that_the_joint_stands_still_and_that_gains_follow_it() -> None:
-    base = load_scenario("torque-task-proportional", HELD)
-    found = ppafo.find(base, vary="friction.static_torque=10..20 N m", such_that="follows", highest=True, grid=3)
-    assert found.found.value == pytest.approx(20.0)
-    (at,) = [said for said in found.found.remarks if said.startswith("at 20 N m ")]
-    assert "; the joint does not move: static friction of 20 N m exceeds " in at
-    # The law of the torque knows nothing of the friction; the cascade of an angle does.
-    assert "recomputed" not in str(found)
-    learns = ppafo.find(
-        servo(), vary="friction.static_torque=0.5..1 N m", such_that="peak_torque <= 100 N m", highest=True, grid=3
-    )
-    remark = remark_on_following_gains(servo(), ["friction.static_torque"])
-    assert "static_torque" in remark
-    assert remark in learns.found.remarks
-    assert remark in str(learns)

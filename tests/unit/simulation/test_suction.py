@@ -4,7 +4,6 @@ The runs are compared with the equations in continuous time, written here once m
 """
 
 import math
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ppafo import linearise, validate
-from ppafo.cli.main import main
 from ppafo.errors import PpafoError
-from ppafo.exports.c_library import c_library
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import load_device, load_parameter_set
 from ppafo.parameters.overrides import apply_overrides
@@ -238,42 +234,11 @@ def test_what_makes_no_sense_with_a_vacuum_is_refused_in_one_line(overrides: tup
     assert "\n" not in str(caught.value)
 
 
-def test_a_recording_under_suction_is_neither_validated_nor_made_by_the_bench(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = simulate(TASK, (*SUCTION, "run.duration=0.1 s")).save(tmp_path / "run")
-    with pytest.raises(PpafoError, match=r"a validation, .* needs a supply above atmospheric pressure"):
-        validate("ppafo2011", [folder], motion="locked", overrides=SUCTION)
-    assert main(["rig", "simulate", "step-response", "--set", SUCTION[0], "--out", str(tmp_path / "rig")]) == 2
-    assert "the simulated test bench needs a supply above atmospheric pressure" in capsys.readouterr().err
-
-
-def test_a_suction_scenario_in_c_has_the_bits_of_python(tmp_path: Path) -> None:
-    scenario = load_scenario(TASK, (*SUCTION, "run.duration=0.2 s"))
-    for file, content in c_library(scenario).items():
-        (tmp_path / file).write_bytes(content)
-    done = subprocess.run(["make", "-s", "-C", str(tmp_path), "check"], capture_output=True, text=True, check=False)
-    assert "equal to Python: 201 samples to the bit" in done.stderr
-
-
 def test_a_walk_on_a_vacuum_is_refused_in_one_line() -> None:
     with pytest.raises(
         PpafoError, match=r"^solenoid: \[device\]: a walk, .* needs a supply above atmospheric pressure"
     ):
         load_walk("solenoid", SUCTION)
-
-
-def test_a_verdict_asks_for_a_deeper_vacuum_where_one_gives_the_torque() -> None:
-    said = str(simulate(TASK, (*SUCTION, "reference.level=1 N m")))
-    assert "the actuator gives at most 0.871 N m" in said
-    assert "overrides=['supply.dorsiflexion_pressure=-72.4 kPa_g']" in said
-
-
-def test_a_linear_model_names_the_chamber_that_is_evacuated() -> None:
-    model = linearise(TASK, overrides=(*SUCTION, "reference.level=0.5 N m"))
-    assert "evacuates chamber 2" in str(model)
-    with pytest.raises(PpafoError, match=r"the actuator reaches 0\.8702 N m"):
-        linearise(TASK, overrides=(*SUCTION, "reference.level=2 N m"))
 
 
 @pytest.mark.parametrize(("text", "severity"), [("-60 kPa_g", "note"), ("0.5 bar_a", "warning")])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ppafo.errors import ScenarioError, SimulationError
+from ppafo.errors import ScenarioError
 from ppafo.metrics import evaluate
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import chamber_volumes
@@ -14,7 +14,6 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
-from tests.reference.reference_solver import compare_with_reference
 
 LINES = ("supply_line.plantarflexion.droop=3e6 Pa s/kg",)
 WARM = (
@@ -56,12 +55,6 @@ def test_a_mistake_is_named_in_one_line(override: str, line: str) -> None:
     with pytest.raises(ScenarioError, match=line) as caught:
         load_scenario("torque-task-proportional", over(LINES, [override]))
     assert "\n" not in str(caught.value)
-
-
-def test_the_reference_solver_refuses_lines_in_one_line() -> None:
-    scenario = load_scenario("torque-task-proportional", LINES)
-    with pytest.raises(SimulationError, match=r"does not support \[supply_line\]"):
-        compare_with_reference(plan_run(scenario))
 
 
 @pytest.mark.parametrize("name", ["torque-task-proportional", "torque-task-solenoid"])

@@ -12,7 +12,6 @@ from ppafo.loading import load_scenario
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import torque_reach
 from ppafo.running import simulate
-from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import moving_together, with_numbers
 from ppafo.simulation.scenario import Scenario
@@ -121,27 +120,12 @@ def test_a_gain_that_is_given_stays_and_its_integral_goes_with_it() -> None:
     assert slow.controller.integral_gain == pytest.approx(0.5 / (8.0 * 6.5e-3))
 
 
-def test_a_rate_that_varies_moves_the_gains_as_a_period_does() -> None:
-    walk = load_walk("proportional", ["controller.kind=pid"])
-    by_rate = moving_together(walk, {"controller.rate": np.array([250.0])})
-    by_period = moving_together(walk, {"controller.period": np.array([4.0e-3])})
-    assert by_rate["controller.proportional_gain"] == by_period["controller.proportional_gain"]
-    assert by_rate["controller.proportional_gain"][0] == pytest.approx(0.25 * walk.controller.proportional_gain)
-    assert "controller.period" not in by_rate
-
-
 def test_late_sensors_are_dead_time_too() -> None:
     late = load_walk("proportional", ["controller.kind=pid", "sensors.pressure_bandwidth=100 Hz"])
     at_once = load_walk("proportional", ["controller.kind=pid"])
     lag = 1.0 / (2.0 * math.pi * 100.0)
     ratio = at_once.controller.proportional_gain / late.controller.proportional_gain
     assert ratio == pytest.approx((1.5e-3 + lag) / 1.5e-3)
-
-
-def test_the_gains_of_the_paper_are_stated_in_its_torque_task() -> None:
-    control = load_scenario("torque-task-proportional").controller
-    assert (control.proportional_gain, control.integral_gain, control.derivative_gain) == (0.095, 0.25, 0.006)
-    assert control.anti_windup == 0.0
 
 
 def test_no_flow_leaves_a_gain_that_is_finite() -> None:
@@ -159,15 +143,6 @@ def test_another_actuator_has_gains_of_its_own_and_follows_its_torque(file: str,
     result = simulate(task)
     assert result.metrics["final_error"].value < 0.02
     assert np.abs(np.diff(result.recording["command"][-500:])).max() < 0.5
-
-
-def test_an_ensemble_has_the_gains_of_each_run() -> None:
-    base = load_scenario("torque-task-proportional", ["controller.kind=sliding_mode", "run.duration=0.3 s"])
-    areas = np.array([4.0e-6, 12.6e-6])
-    together = run_ensemble(base, {"valve.area": areas}, ("rms_error",))
-    for run, area in enumerate(areas.tolist()):
-        alone = simulate(with_numbers(base, {"valve.area": area}))
-        assert together.metrics["rms_error"][run] == pytest.approx(alone.metrics["rms_error"].value, rel=1e-12)
 
 
 TABLE_OF_ANGLES = ("level=70 deg", "period=1 s", "value_01=-45 deg", "time_02=0.5 s", "value_02=10 deg")

@@ -35,14 +35,13 @@ def single_batch(name: str, texts: list[str]) -> Batch:
     return batch_of(plan_run(load_scenario(name, texts)))
 
 
-@pytest.mark.parametrize("draw", range(2))
 @pytest.mark.parametrize("name", list_scenarios())
-def test_rows_of_an_ensemble_are_those_of_single_runs_bit_for_bit(name: str, draw: int) -> None:
+def test_rows_of_an_ensemble_are_those_of_single_runs_bit_for_bit(name: str) -> None:
     base = load_scenario(name)
-    columns = draws.drawn_columns(base, np.random.default_rng([draw, *name.encode()]), 12)
+    columns = draws.drawn_columns(base, np.random.default_rng([0, *name.encode()]), 6)
     plan = plan_ensemble(check_columns(base, columns))
     found = places(plan)
-    for run in range(12):
+    for run in range(6):
         texts = overrides(base, columns, run)
         if run in plan.reasons:
             with pytest.raises(PpafoError):

@@ -17,19 +17,6 @@ THERMAL = (
 METRICS = ("rms_error", "gas_supplied", "gas_imbalance", "lowest_temperature")
 
 
-def test_each_run_gives_what_it_gives_alone() -> None:
-    base = load_scenario("torque-task-proportional", THERMAL)
-    coefficients = np.array([0.0, 40.0, 4.0e3])
-    found = run_ensemble(base, {"gas_model.heat_transfer_coefficient": coefficients}, METRICS)
-    for index, coefficient in enumerate(coefficients):
-        override = f"gas_model.heat_transfer_coefficient={coefficient} W/(m^2 K)"
-        alone = simulate("torque-task-proportional", over(THERMAL, [override])).metrics
-        assert found.metrics["rms_error"][index] == pytest.approx(alone["rms_error"].value, rel=1e-11)
-        assert found.metrics["gas_supplied"][index] == pytest.approx(alone["gas_supplied"].value, rel=1e-11)
-        assert found.metrics["lowest_temperature"][index] == pytest.approx(alone["lowest_temperature"].value, rel=1e-11)
-        assert abs(found.metrics["gas_imbalance"][index]) < 1e-15
-
-
 def test_temperatures_are_traced_where_there_is_an_energy_balance_and_refused_elsewhere() -> None:
     columns = {"gas_model.heat_transfer_coefficient": np.array([0.0, 40.0])}
     traced = run_ensemble(load_scenario("torque-task-proportional", THERMAL), columns, METRICS, ("temperature_1",), 0.1)
