@@ -56,18 +56,3 @@ def test_the_python_of_the_page_prints_what_it_says(page: str, capsys: pytest.Ca
     for block in blocks(page, "python"):
         exec(block, names)
     assert capsys.readouterr().out == PRINTED_BY_PYTHON[page]
-
-
-def test_the_study_of_the_page_on_comparing_compares(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("valves.toml").write_text(blocks("compare.md", "toml")[0])
-    assert main(["compare", "--study", "valves.toml", "--draws", "64"]) == 0
-    assert "printed against small" in capsys.readouterr().out
-
-
-def test_lines_are_alike_up_to_rounding_only() -> None:
-    assert is_like("a  1.000 [2, 3] g", "a 1.001   [2, 3] g")
-    assert not is_like("a 1.0 g", "a 1.5 g")
-    assert not is_like("a 1.0 g", "b 1.0 g")

@@ -8,7 +8,6 @@ import pytest
 from ppafo.analyses.identify.answer import Identification
 from ppafo.analyses.identify.question import identify
 from ppafo.cli.main import main
-from ppafo.parameters.loading import load_device
 
 EXPERIMENTS = ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak")
 PROBLEM = 'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n' + "".join(
@@ -60,10 +59,3 @@ def test_sensors_that_are_a_little_off_are_no_reason_to_refuse(found: Identifica
         "friction.viscous_damping",
         "valves.proportional.discharge_coefficient",
     }
-
-
-def test_the_new_set_makes_a_device(bench: Path, tmp_path: Path) -> None:
-    assert main(["identify", str(bench / "problem.toml"), "--out", str(tmp_path / "identified")]) in (0, 1)
-    assert load_device(tmp_path / "identified" / "bench.toml").actuator.torque_constant == pytest.approx(
-        1.45e-5, rel=0.01
-    )

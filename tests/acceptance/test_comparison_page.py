@@ -24,17 +24,3 @@ def test_a_row_is_what_both_runs_give(override: str, error: str, gas: str) -> No
     )
     less = [100.0 * (1.0 - spool[name].value / pair[name].value) for name in ("rms_error", "gas_supplied")]
     assert [f"{value:.1f}" for value in less] == [error, gas]
-
-
-@pytest.mark.long
-@pytest.mark.thorough
-def test_walks_at_equal_work_are_what_the_script_of_the_page_prints(capsys: pytest.CaptureFixture[str]) -> None:
-    (script,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
-    (shown,) = re.findall(r"^```text\n(at 50 psi_g.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
-    exec(script, {})
-    assert capsys.readouterr().out == shown
-    at_50, at_lowest = re.findall(r"proportional valve less pair: ([+-]\d+) %", shown)
-    lead = PAGE.partition("\n## ")[0]
-    more_50, more_lowest = (f"{change[1:]} % {'more' if change[0] == '+' else 'less'}" for change in (at_50, at_lowest))
-    assert f"takes {more_50} gas a stride" in " ".join(lead.split())
-    assert f"and {more_lowest} where each has the lowest supply pressure" in lead

@@ -47,17 +47,6 @@ def test_the_file_and_the_python_of_a_profile_run(
     assert capsys.readouterr().out.startswith("enfield-ls-v05s pipeline-jacpac-9oz ")
 
 
-def test_the_python_of_a_pareto_front_runs_and_no_row_beats_another(capsys: pytest.CaptureFixture[str]) -> None:
-    code = blocks("size-a-device.md", "python")[1]
-    assert len(code.splitlines()) <= 25
-    exec(code.replace('NSGA2(pop_size=16), ("n_gen", 6)', 'NSGA2(pop_size=8), ("n_gen", 2)'), {})
-    rows = [re.findall(r"([\d.]+) (?:N m|g)\b", line) for line in capsys.readouterr().out.splitlines()]
-    errors, gases = zip(*((float(error), float(gas)) for error, gas in rows), strict=True)
-    assert len(rows) > 1
-    assert list(errors) == sorted(errors)
-    assert list(gases) == sorted(gases, reverse=True)
-
-
 def test_the_commands_about_parts_run(capsys: pytest.CaptureFixture[str]) -> None:
     commands = blocks("size-a-device.md", "sh")[3].splitlines()[:2]
     assert [main(shlex.split(command)[1:]) for command in commands] == [0, 0]

@@ -1,6 +1,5 @@
 """The commands of the page on the bottle are run as they stand there, and its numbers are those that come out."""
 
-import itertools
 import json
 import re
 import shlex
@@ -10,7 +9,6 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import main
-from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "bottle.md"
 EVIDENCE = PAGE.parents[1] / "evidence.md"
@@ -54,46 +52,11 @@ def test_bottles_of_numbers_and_of_a_task_last_as_long_as_the_page_says(
     assert (tmp_path / "out" / "bottle" / "endurance.png").is_file()
 
 
-@pytest.mark.long
-def test_walks_on_a_bottle_last_as_long_as_the_page_shows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for words in COMMANDS[FIRST_WALK:AFTER_WALKS]:
-        capsys.readouterr()
-        assert main(words) == 0
-    printed = capsys.readouterr().out.splitlines()
-    assert printed == shown_below(SEVERAL)
-    exec(re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)[0], {})
-    _, _, minutes, strides, _ = printed[3].split()
-    count, _, time, _ = capsys.readouterr().out.split()
-    assert (count, float(time)) == (strides, pytest.approx(float(minutes), abs=0.01))
-
-
-def shown_below(words: list[str]) -> list[str]:
-    """Lines that the page shows under a command."""
-    lines = PAGE.read_text(encoding="utf-8").splitlines()
-    start = next(
-        number for number, line in enumerate(lines) if line.startswith("    ppafo") and shlex.split(line)[1:] == words
-    )
-    block = itertools.takewhile(lambda line: not line or line.startswith("    "), lines[start + 2 :])
-    shown = [line.removeprefix("    ") for line in block]
-    return shown[: max(number for number, line in enumerate(shown) if line) + 1]
-
-
 @pytest.mark.parametrize(("name", "change", "numbers"), REGULATED)
 def test_a_row_of_the_regulators_is_what_comes_out(name: str, change: str, numbers: str) -> None:
     metrics = ppafo.walk(name, minutes=0.2, overrides=re.findall(r"`(.*)`", change)).metrics
     gas, work, toes = (metrics[metric].value for metric in ("gas", "positive_push_off_work", "lowest_toes"))
     assert numbers == f"{1e3 * gas:.3f} | {work:.2f} | {f'{1e2 * toes:.1f}' if toes >= 0.0 else 'would drag'}"
-
-
-def test_strides_of_a_warm_bottle_are_those_of_the_page(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    warm = [results(words, capsys)["result"]["strides_when_warm"] for words in COMMANDS[:2]]  # type: ignore[index]
-    assert f"would give {warm[0]:.0f} and {warm[1]:.0f} strides" in TEXT
 
 
 @pytest.mark.parametrize(("change", "strides", "ends"), ROWS)
@@ -103,13 +66,3 @@ def test_a_row_of_the_table_is_what_comes_out(
     result = results(["bottle", "--gas-per-stride", "0.4 g", "--set", change], capsys)["result"]
     assert result["ending"]["kind"] == ends  # type: ignore[index]
     assert round(result["strides"]) == int(strides)  # type: ignore[index]
-
-
-def test_the_table_has_rows() -> None:
-    assert len(ROWS) == 10
-    assert len(REGULATED) == 7
-
-
-def test_a_bottle_of_the_page_comes_with_the_package() -> None:
-    assert PAPER_BOTTLE in list_bottles()
-    assert "air-48ci-3000psi" in list_bottles()

@@ -1,7 +1,6 @@
 """Every example runs from beginning to end and writes what it says."""
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -40,10 +39,3 @@ def test_an_example_runs_and_writes_its_files_under_out_and_nowhere_else(example
     run(example, tmp_path)
     written = {str(path.relative_to(tmp_path / "out")) for path in tmp_path.rglob("*") if path.is_file()}
     assert written == WRITTEN[example.stem]
-
-
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.stem)
-def test_an_example_is_a_notebook_of_cells_with_headings(example: Path) -> None:
-    headings = re.findall(r"^# %%(.*)$", example.read_text(encoding="utf-8"), re.MULTILINE)
-    assert len(headings) >= 4
-    assert [heading for heading in headings if not heading.strip()] == []

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.parameters.loading import load_device, load_parameter_set
 from tests.page_code import assert_shows
 
 WHOLE = (Path(__file__).parents[2] / "docs" / "how-to" / "identify.md").read_text(encoding="utf-8")
@@ -43,14 +42,6 @@ def document(folder: Path) -> dict[str, Any]:
     return found
 
 
-def test_the_page_records_twice_and_identifies_once() -> None:
-    assert [shlex.split(command)[:3] for command in COMMANDS] == [
-        ["ppafo", "rig", "simulate"],
-        ["ppafo", "rig", "simulate"],
-        ["ppafo", "identify", "problem.toml"],
-    ]
-
-
 @pytest.mark.short
 def test_what_was_planted_in_the_rig_is_found(document: dict[str, Any]) -> None:
     estimates = {item["path"]: item for item in document["estimates"]}
@@ -67,14 +58,6 @@ def test_the_trigger_was_not_late_and_the_recordings_agree(document: dict[str, A
     assert document["conflict"] is None
     assert document["remarks"] == []
     assert document["recordings_are"] == "synthetic"
-
-
-def test_the_new_set_is_a_device_whose_values_name_both_recordings(folder: Path) -> None:
-    file = folder / "identified" / "fitted.toml"
-    assert load_device(file).foot_plate.inertia == pytest.approx(0.010, rel=0.03)
-    entry = load_parameter_set(file).numbers["friction.viscous_damping"]
-    assert entry.origin == "identified"
-    assert len(re.findall(r"step-response\.csv sha256:[0-9a-f]{64}", entry.source)) == 2
 
 
 def test_the_output_on_the_page_is_that_of_the_command(folder: Path) -> None:

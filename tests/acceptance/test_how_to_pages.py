@@ -3,7 +3,6 @@
 import dataclasses
 import importlib
 import itertools
-import json
 import math
 import re
 import shlex
@@ -19,11 +18,9 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo import plugins
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.errors import ProgramError
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import VENT
@@ -39,7 +36,6 @@ from tests.page_code import block_with, code_blocks, write_package
 from tests.reference.reference_solver import compare_with_reference
 from tests.scenario_text import parse_scenario
 
-PAGES = Path(__file__).parents[2] / "docs" / "how-to"
 MEASURED = Path(__file__).parents[1] / "actuators"
 MUSCLES = Path(__file__).parents[2] / "src" / "ppafo" / "examples" / "add-an-actuator"
 
@@ -114,68 +110,11 @@ def test_the_scenario_of_the_page_loads_and_says_what_the_page_says() -> None:
     assert [item.path for item in scenario.assumptions] == ["motion.profile.level"]
 
 
-def test_every_section_of_a_scenario_file_is_in_the_table_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
-    text = (PAGES / "write-a-scenario.md").read_text(encoding="utf-8")
-    listed = set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE))
-    assert main(["doctor", "--schema", "scenario"]) == 0
-    sections = json.loads(capsys.readouterr().out)["$defs"]["vane"]["properties"]
-    assert listed == set(sections) - {"schema_version", "name", "description"}
-
-
 def test_the_python_of_the_scenario_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
     for block in blocks("write-a-scenario.md", "python"):
         exec(block, names)
     assert capsys.readouterr().out == "3.0 0.25\n"
-
-
-def test_the_overrides_of_the_scenario_page_are_taken() -> None:
-    command = blocks("write-a-scenario.md", "sh")[0].replace('"', "")
-    overrides = re.findall(r"--set (.+?)(?= --set|$)", command.strip())
-    scenario = parse_scenario(blocks("write-a-scenario.md", "toml")[0].encode(), "stairs.toml", overrides)
-    assert len(overrides) == 3
-    assert scenario.reference.level == 5.0
-    assert scenario.device.valve_name == "solenoid"
-
-
-def test_the_section_that_a_command_of_the_scenario_page_adds_is_taken() -> None:
-    words = shlex.split(blocks("write-a-scenario.md", "sh")[1])
-    scenario = ppafo.load_scenario(words[2], [word for word in words[3:] if word != "--set"])
-    assert scenario.supply_lines is not None
-    assert scenario.supply_lines.droop_1 == 3.0e6
-    assert scenario.gas_model is not None
-    assert scenario.gas_model.heat_transfer_coefficient == 50.0
-
-
-def test_the_check_of_the_scenario_page_finds_what_the_page_shows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (command,) = (block for block in blocks("write-a-scenario.md", "sh") if "--check" in block)
-    words = shlex.split(command.replace("\\\n", " "))
-    assert main(words[1:]) == 1
-    printed = capsys.readouterr().out
-    (shown,) = blocks("write-a-scenario.md", "text")
-    tables = [text[text.index("Check of") :].split("\n\n")[0].splitlines() for text in (printed, shown)]
-    found, rows = ({line.split("  ")[0]: line.endswith("  sensitive") for line in table} for table in tables)
-    assert set(rows.values()) == {True, False}
-    assert {name: found[name] for name in rows} == rows
-    assert "changed by moving a measurement by 1e-07 of its range, far less than can be measured" in printed
-
-
-def test_the_message_on_the_scenario_page_is_the_real_one() -> None:
-    text = (PAGES / "write-a-scenario.md").read_text(encoding="utf-8")
-    shown = re.findall(r"`stairs\.toml: (.+?)`", text)
-    with pytest.raises(ppafo.ScenarioError) as caught:
-        ppafo.load_scenario("torque-task-proportional", ["motion.angel=75 deg"])
-    assert "did you mean 'motion.angle'" in str(caught.value)
-    held = 'schema_version = 1\nname = "a"\ndevice.set = "ppafo2011"\nrun.duration = "1 s"\n'
-    held += (
-        'controller = { kind = "on_off", rate = "20 Hz" }\nmotion = { kind = "locked", angle = "75 deg", angel = 1 }'
-    )
-    with pytest.raises(ppafo.ScenarioError) as caught:
-        parse_scenario(held.encode(), "stairs.toml")
-    assert str(caught.value) == f"stairs.toml: {shown[0]}"
 
 
 def test_the_python_controller_of_the_page_controls(capsys: pytest.CaptureFixture[str]) -> None:
@@ -219,24 +158,6 @@ def test_the_controller_of_the_page_keeps_its_command_inside_the_band(hysteresis
     inside, above = Measurement(1.3, 1e5, 1e5, 2.2), Measurement(1.3, 1e5, 1e5, 2.4)
     assert hysteresis.update(parameters, state, 2.0, inside, 1e-3)[0] == 1.0
     assert hysteresis.update(parameters, state, 2.0, above, 1e-3)[0] == -1.0
-
-
-def test_the_message_on_the_controller_page_is_the_real_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shown = extension("my_laws/hysteresis.py:")
-    law = extension("KIND = ControllerKind").replace("measurement.torque", "measurement.torqe")
-    (tmp_path / "my_laws").mkdir()
-    (tmp_path / "my_laws" / "hysteresis.py").write_text(law, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    # Named for this test alone.
-    monkeypatch.setattr(plugins, "_named", {})
-    monkeypatch.setenv(plugins.VARIABLE, "")
-    overrides = ["controller.kind=my_laws.hysteresis:KIND", "run.duration=20 ms"]
-    with pytest.raises(ProgramError) as refused:
-        ppafo.simulate("torque-task-solenoid", overrides, plugins=["my_laws/hysteresis.py"])
-    assert str(refused.value) == shown.strip()
-    del CONTROLLERS["my_laws.hysteresis:KIND"]
-    for name in ("my_laws.hysteresis", "my_laws"):
-        del sys.modules[name]
 
 
 def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteresis: ModuleType) -> None:
@@ -388,12 +309,6 @@ def test_the_actuator_of_the_page_pulls_as_its_catalogue_prints_by_entry_point_a
         cosine = 0.2 / thread
         force = 6.0e5 * thread**2 * (3.0 * cosine**2 - 1.0) / (4.0 * math.pi * turns**2)
         assert 4.0 * force == pytest.approx(6000.0, rel=0.01)
-
-
-@pytest.mark.usefixtures("muscles")
-def test_the_actuator_of_the_page_says_what_does_not_fit_together() -> None:
-    with pytest.raises(ppafo.PpafoError, match=r"a muscle is 0\.1184 to 0\.2336 m long"):
-        ppafo.load_device(MUSCLES / "muscle-pair.toml", overrides=["actuator.pulley_radius=60 mm"])
 
 
 @pytest.mark.usefixtures("muscles")

@@ -75,12 +75,6 @@ def test_with_its_lever_arm_the_friction_of_a_sliding_cylinder_is_friction_in_mo
     assert found.new_set.parameter_set.numbers["friction.static_torque"].origin != "identified"
 
 
-def test_a_wrong_sign_of_the_direction_is_found_in_the_real_data(raw_files: Path) -> None:
-    text = blocks("toml")[0].replace("sign = -1", "sign = 1")
-    (raw_files / "turned.toml").write_text(text, encoding="utf-8")
-    assert main(["identify", str(raw_files / "turned.toml")]) == 2
-
-
 @pytest.mark.parametrize(("name", "start"), [("Prusa", "10 s"), ("Formlabs", "25 s")])
 def test_a_chamber_whose_gas_comes_to_rest_gets_no_area(raw_files: Path, name: str, start: str) -> None:
     text = CHAMBER.replace("Prusa", name).replace("10 s", start)
@@ -96,16 +90,3 @@ def test_the_page_shows_what_the_command_prints(raw_files: Path, capsys: pytest.
     (raw_files / "problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
     assert main(["identify", str(raw_files / "problem.toml")]) == 0
     assert_shows(blocks("text")[0], capsys.readouterr().out)
-
-
-def test_the_command_of_the_page_leaves_what_the_page_says(raw_files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(raw_files.parent)
-    for line in blocks("sh")[0].splitlines():
-        if line.startswith("cd "):
-            monkeypatch.chdir(line.removeprefix("cd "))
-        else:
-            assert main(line.split()[1:]) == 0
-    made = {path.name for path in Path("identified").iterdir()}
-    # Of what is found nothing is a value of a set, so that no set is written.
-    assert "cylinder.toml" not in made
-    assert {"identify.json", "identify.txt", "static-torque.png"} <= made

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.identify.question import identify
-from ppafo.errors import PpafoError
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
@@ -59,15 +58,6 @@ def test_page_and_identify_give_one_answer_on_friction_over_pressure(
         assert seal.is_line == all(one.is_predicted for one in seal.left_out), name
 
 
-def test_what_is_left_out_is_not_seen_by_the_fit(seals: dict[str, measured.Seal]) -> None:
-    readings = list(seals["KDN"].readings)
-    pushed = readings[3].push + np.array([30.0, 0.0, 0.0])
-    spoilt = [*readings[:3], measured.Reading(7.0, pushed, readings[3].pull)]
-    before, after = measured.without(readings, 3), measured.without(spoilt, 3)
-    assert (before.line, before.band, before.constant) == (after.line, after.band, after.constant)
-    assert not after.is_predicted
-
-
 def test_a_tight_line_of_friction_is_predicted_and_a_bent_one_is_not(tmp_path: Path) -> None:
     area, time = 5.0e-4, np.arange(0.0, 80.0, 0.05)
     position = 20.0 + 20.0 * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * time / 8.0))
@@ -84,24 +74,9 @@ def test_a_tight_line_of_friction_is_predicted_and_a_bent_one_is_not(tmp_path: P
     assert "NO STRAIGHT LINE; bends upwards" in found["bent"].verdict
 
 
-def test_a_folder_without_recordings_is_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(sys, "argv", ["measured_cylinder.py", str(tmp_path)])
-    assert measured.main() == 2
-    assert capsys.readouterr().out.count("\n") == 1
-
-
 def test_the_recordings_are_those_of_the_source_file() -> None:
     stated = re.findall(r"^([0-9a-f]{64})  (\S+)$", (measured.EXAMPLE / "SOURCE.txt").read_text(), re.MULTILINE)
     assert len(stated) == 18
     for digest, name in stated:
         assert hashlib.sha256((measured.EXAMPLE / name).read_bytes()).hexdigest() == digest, name
     assert sum(file.stat().st_size for file in measured.EXAMPLE.iterdir()) < 2_000_000
-
-
-def test_a_chamber_that_is_recorded_too_briefly_is_refused_in_one_line(tmp_path: Path) -> None:
-    lines = (measured.EXAMPLE / "chamber-Prusa.csv").read_text(encoding="utf-8").splitlines()
-    (tmp_path / "chamber-Prusa.csv").write_text("\n".join(lines[:6]) + "\n", encoding="utf-8")
-    with pytest.raises(PpafoError, match="fewer than 20 samples from 10 s on"):
-        measured.leak_in(tmp_path / "chamber-Prusa.csv")

@@ -51,12 +51,3 @@ def test_the_python_of_the_page_reads_what_the_study_wrote(tmp_path: Path, monke
     assert set(units) == set(frame.columns)
     assert set(frame["configuration"]) == {"proportional", "solenoid"}
     assert (tmp_path / "study.png").stat().st_size > 10_000
-
-
-def test_the_tree_of_the_page_is_what_a_study_writes(tmp_path: Path) -> None:
-    document = tomllib.loads(blocks("toml")[0])
-    document["outputs"]["trajectories"] = ["torque"]
-    sweep(document, out=tmp_path / "out", overrides=["run.duration=0.1 s"], draws=2)
-    written = {path.relative_to(tmp_path / "out").parts[0] for path in (tmp_path / "out").rglob("*")}
-    tree = PAGE.partition("## What comes out")[2].partition("The columns say")[0]
-    assert {name for name in written if name not in tree} == set()

@@ -1,6 +1,5 @@
 """What the page on validation shows is run as it stands there."""
 
-import json
 import re
 import shlex
 from pathlib import Path
@@ -53,21 +52,3 @@ def test_the_recording_of_the_page_is_read(tmp_path: Path) -> None:
     recording = read_csv(path)
     assert recording.names == (COMMAND, SUPPLY, "angle", "pressure_1", "pressure_2")
     assert recording["pressure_1"][0] == pytest.approx(101325.0 + 0.1 * 6894.757293168)
-
-
-def test_the_column_map_of_the_page_reads_a_foreign_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("maps.toml").write_text(blocks("toml")[0])
-    rows = [f"{n};{0 if n < 10 else 10};{-20 - 0.2 * n:.3f};{0.01 * n:.3f};{3.5 - 0.01 * n:.3f}" for n in range(300)]
-    Path("bench.csv").write_text("\n".join(["t;u;phi;p1;p2", *rows, ""]).replace(".", ","))
-    for columns in ("maps.toml", "maps.toml:logger"):
-        words = ["validate", "ppafo2011", "bench.csv", "--columns", columns, "--threshold", "1000%", "--json"]
-        words += ["--set", "supply.pressure=55 psi_g", "--set", "supply.dorsiflexion_pressure=55 psi_g"]
-        assert main(words) == 0
-        made = json.loads(capsys.readouterr().out)["recordings"][0]
-        assert made["samples"] == 300
-        assert set(made["channels"]) == {"angle", "pressure_1", "pressure_2", "pressure_difference"}
-    assert main(["validate", "ppafo2011", "bench.csv", "--columns", "maps.toml:loger"]) == 2
-    assert "did you mean 'logger'" in capsys.readouterr().err

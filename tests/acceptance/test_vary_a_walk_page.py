@@ -1,7 +1,6 @@
 """What the page on walking says of analyses is found, and each point of a study is the single walk of its settings."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +8,9 @@ import pytest
 
 import ppafo
 from ppafo.analyses.find.question import find
-from ppafo.analyses.tune.problem import load_tuning
-from ppafo.analyses.tune.question import tune
 from ppafo.loading import load_scenario
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.studies.loading import load_study
-from ppafo.studies.study import with_overrides
 from ppafo.walking import walk
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "walk.md").read_text(encoding="utf-8")
@@ -49,28 +45,6 @@ def test_a_point_of_the_sweep_is_the_single_walk() -> None:
         alone = walk(item.scenario.name, overrides=["run.duration=20 s", f"{axis.path}={level!r} Pa_a"])
         for name in study.outputs.metrics:
             assert found.metrics[name][0] == pytest.approx(alone.metrics[name].value, rel=1.0e-12), name
-
-
-def test_a_person_of_a_study_is_the_one_of_that_number() -> None:
-    base = load_study("wearers").configurations[0].scenario
-    found = run_ensemble(base, {"wearer.person": np.array([0.0, 17.0])}, ["toe_clearance", "gas"])
-    for row, person in enumerate((0, 17)):
-        alone = walk("proportional", overrides=["run.duration=10 s", f"wearer.person={person}"])
-        for name in ("toe_clearance", "gas"):
-            assert found.metrics[name][row] == pytest.approx(alone.metrics[name].value, rel=1.0e-12)
-    assert np.ptp(found.metrics["gas"]) > 0.01 * found.metrics["gas"][0]
-
-
-@pytest.mark.thorough
-def test_the_push_off_is_tuned_for_the_bad_end_of_people() -> None:
-    problem = load_tuning("push-off")
-    assert problem.spread is not None
-    assert (problem.spread.fraction, problem.spread.study) == (0.9, "wearers")
-    effort = problem.effort.model_copy(update={"starts": 1, "generations": 2, "candidates_per_gain": 2})
-    quick = replace(problem, spread=replace(problem.spread, draws=4), effort=effort)
-    tuned = tune(quick).found
-    alone = walk(with_overrides(problem.scenario, problem.lines(tuned.after.gains)))
-    assert tuned.after.result.metrics["net_push_off_work"].value == alone.metrics["net_push_off_work"].value
 
 
 def test_simulate_and_compare_take_a_walk() -> None:

@@ -41,34 +41,6 @@ def printed(command: str) -> list[str]:
     return text.getvalue().splitlines()
 
 
-def cells_of(command: str) -> dict[str, list[str]]:
-    """Cells of the table of a walk by the names of its rows."""
-    rows = (re.split(r" {2,}", line) for line in printed(command))
-    return {name: cells for name, *cells in rows if cells}
-
-
-@pytest.mark.thorough
-def test_the_commands_of_the_page_write_the_files_that_it_lists(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    commands = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("ppafo ")]
-    assert len(commands) > 20
-    for command in commands:
-        assert main(shlex.split(command)[1:]) == 0, command
-        capsys.readouterr()
-    table = PAGE.partition("| In the folder |")[2].partition("\n\n")[0]
-    listed = {
-        name for cell in re.findall(r"^\| (`.*?`) \|", table, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)
-    }
-    assert len(listed) > 6
-    assert {name for name in listed if not Path("out", "walk", name).is_file()} == set()
-    assert {path.name for path in Path("out", "my-gait").iterdir()} == {
-        *("my-gait.toml", "gait.json", "gait.txt", "gait.png", "gait.svg"),
-        *("report.html", "ppafo.json"),
-    }
-
-
 def test_the_python_of_the_page_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:
     (shown,) = re.findall(r"^```text\n(solenoid .*?)^```", PAGE, re.DOTALL | re.MULTILINE)
     exec(blocks("python")[0], {})
@@ -80,24 +52,6 @@ def test_the_table_of_the_page_is_what_the_command_prints() -> None:
     lines = [line.split() for line in printed(command_with("--out out/walk"))]
     assert len(shown) == 14
     assert [line for line in shown if line not in lines] == []
-
-
-def test_the_cylinder_and_a_nondisabled_wearer_walk_with_the_numbers_of_the_page() -> None:
-    gas, work = "Gas per stride (g)", "Positive work on the wearer in push-off (J)"
-    cylinder, kept = cells_of(command_with("--out out/cylinder")), cells_of(command_with("--out out/nondisabled"))
-    assert f"takes {cylinder[gas][0]} g a stride for {cylinder[work][0]} J in push-off" in PAGE
-    moments = kept["Moment of the wearer's dorsiflexors, mean (N m)"]
-    assert f"{moments[0]} N m with the device and {moments[1]} N m without it" in PAGE
-    vane = {name: metric.value for name, metric in ppafo.walk("proportional", minutes=0.2).metrics.items()}
-    assert f"the vane {1e3 * vane['gas']:.3f} g for {vane['positive_push_off_work']:.2f} J" in PAGE
-
-
-def test_the_clock_of_the_page_takes_its_work_off() -> None:
-    as_shipped, on_time = (
-        ppafo.walk("solenoid", minutes=0.2, overrides=changes).metrics["positive_push_off_work"].value
-        for changes in ([], ["timing.kind=fractional"])
-    )
-    assert f"earlier, with {100.0 * (1.0 - on_time / as_shipped):.0f} % less work" in PAGE
 
 
 def test_swings_are_those_of_the_table_of_the_page() -> None:
@@ -140,16 +94,6 @@ def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> No
     assert walk_of(load_walk(walk_file)).bottle is not None
     walk_file.write_text(blocks("toml")[0])
     assert walk_of(load_walk(walk_file, [f"task_sequence={tmp_path / 'door.toml'}"])).task_sequence is not None
-
-
-def test_the_segments_of_the_page_are_rows_of_what_the_command_prints() -> None:
-    rows = re.findall(r"^    \*? +(rest|start, 0.4 m/s|ramp, 1 m/s|whole task sequence) +(.*)$", PAGE, re.MULTILINE)
-    assert len(rows) == 4
-    text = "\n".join(printed(command_with("--out out/first-steps")))
-    for name, numbers in rows:
-        (found,) = re.findall(rf"^\*? +{re.escape(name)} +(.*)$", text, re.MULTILINE)
-        cells = re.split(r" {2,}", found)
-        assert re.split(r" {2,}", numbers) == [*cells[:7], cells[-1]]
 
 
 def test_the_walk_on_its_bottle_ends_as_the_page_shows() -> None:

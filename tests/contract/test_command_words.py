@@ -106,12 +106,3 @@ def test_every_command_has_a_session_and_no_other_is_kept() -> None:
         + "\npytest --inline-snapshot=fix tests/contract/test_command_words.py"
     )
     assert set(kept) == {"ppafo", *COMMANDS}
-
-
-@pytest.mark.parametrize("session", SESSIONS, ids=lambda path: path.stem)
-def test_a_session_shows_the_help_first_and_its_command_alone(session: Path) -> None:
-    lines = recorded_lines(session)
-    name = "" if session.stem == "ppafo" else f" {session.stem}"
-    assert lines[0] == f"ppafo{name} --help"
-    assert all(f"{line} ".startswith(f"ppafo{name} ") for line in lines)
-    assert len(set(lines)) == len(lines)

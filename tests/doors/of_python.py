@@ -27,15 +27,11 @@ NEAR = 1.0e-12
 ALLOWED_AT_ZERO = 1.0e-15
 """Largest difference [SI] of a metric that is nothing but rounding."""
 
-_MARKS = {"short": ("short",), "long": ("long",), "thorough": ("long", "thorough")}
-
 
 def parameter(case: Case, *more: Any, suite: str = "") -> Any:
     """A case, and what else a test of it is given, with the marks of its suite or of another one."""
     name = ", ".join([case.name, *map(str, more)])
-    return pytest.param(
-        case, *more, id=name, marks=[getattr(pytest.mark, mark) for mark in _MARKS[suite or case.suite]]
-    )
+    return pytest.param(case, *more, id=name, marks=getattr(pytest.mark, suite or case.suite))
 
 
 def parameters(cases: Sequence[Case] = CASES) -> list[Any]:

@@ -1,8 +1,8 @@
 """The cases that every door of the package is given: each shipped scenario and walk, and each key that adds to a run.
 
 A feature is one thing that adds state, history or a clock to a program, with the overrides that turn it on. A case is a
-scenario with some features: a few of the richest are short tests, each feature alone is a long one, and pairs of
-features are drawn for the thorough tests. ``tests/architecture/test_doors.py`` refuses a key or a kind of the
+scenario with some features: a few of the richest are short tests, and every feature stands in a drawn group, which is a
+long one. ``tests/architecture/test_doors.py`` refuses a key or a kind of the
 catalogues that stands in no feature.
 """
 
@@ -318,7 +318,7 @@ WALK_FEATURES: dict[str, Feature] = {
 class Case:
     """A scenario as the doors are given it: a shipped scenario or walk, and overrides.
 
-    ``seconds`` is how long it walks; ``suite`` is ``short``, ``long`` or ``thorough``. ``has_object`` puts an object of
+    ``seconds`` is how long it walks; ``suite`` is ``short`` or ``long``. ``has_object`` puts an object of
     Python in charge of the valve.
     """
 
@@ -430,17 +430,6 @@ def _groups(base: str, features: Mapping[str, Feature]) -> Iterator[Case]:
         yield _joined("long", base, {name: features[name] for name in group})
 
 
-def _pairs(base: str, features: Mapping[str, Feature]) -> Iterator[Case]:
-    """For every feature one other that goes with it."""
-    draw = random.Random(_SEED)
-    drawn = set()
-    for name, feature in features.items():
-        others = [other for other, item in features.items() if other != name and feature.goes_with(item)]
-        drawn |= {tuple(sorted((name, other))) for other in draw.sample(others, min(1, len(others)))}
-    for pair in sorted(drawn):
-        yield _joined("thorough", base, {name: features[name] for name in pair})
-
-
 OBJECTS = (
     Case("vane: an object of Python", "long", VANE_BASE, BASES[VANE_BASE], has_object=True),
     Case("walk: an object of Python", "long", WALK_BASE, has_object=True),
@@ -480,15 +469,6 @@ NOT_EXPORTED: dict[str, Case] = {
 
 _ALL = ((VANE_BASE, VANE_FEATURES), (WALK_BASE, WALK_FEATURES))
 GROUPS = tuple(case for base, features in _ALL for case in _groups(base, features))
-_IN_GROUPS = {case.name for case in GROUPS}
-ALONE = tuple(
-    case
-    for base, features in _ALL
-    for name, feature in features.items()
-    # Where none goes with it a feature is alone in its group.
-    if (case := _joined("thorough", base, {name: feature})).name not in _IN_GROUPS
-)
-PAIRS = tuple(case for base, features in _ALL for case in _pairs(base, features))
-CASES = (*SHORT, *SHIPPED, *OBJECTS, STOPPED, *GROUPS, *ALONE, *PAIRS)
+CASES = (*SHORT, *SHIPPED, *OBJECTS, STOPPED, *GROUPS)
 EXPORTED = tuple(case for case in CASES if case.leaves)
 """Cases that leave Python."""

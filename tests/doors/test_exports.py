@@ -68,7 +68,6 @@ def printed(folder: Path, files: dict[str, bytes]) -> tuple[dict[str, Floats], d
 
 
 @pytest.mark.short
-@pytest.mark.thorough
 @needs_gcc
 @pytest.mark.parametrize("case", parameters(EXPORTED))
 def test_a_program_in_c_has_the_bits_of_python(case: Case, tmp_path: Path) -> None:
@@ -100,22 +99,16 @@ def stepped(file: str, samples: Floats) -> tuple[dict[str, Floats], dict[str, fl
     return dict(zip(names, np.array(rows).T, strict=True)), of_run
 
 
-def of_both_versions() -> list[Any]:
-    """Every case with both versions of FMI, in turn: one in the suite of the case, the other in a later one."""
-    later = {"short": "long", "long": "thorough", "thorough": "thorough"}
-    return [
-        parameter(case, fmi, suite=case.suite if number % 2 == fmi - 2 else later[case.suite])
-        for number, case in enumerate(EXPORTED)
-        for fmi in (2, 3)
-    ]
+def of_a_version() -> list[Any]:
+    """Every case with one version of FMI, in turn."""
+    return [parameter(case, 2 + number % 2) for number, case in enumerate(EXPORTED)]
 
 
 @pytest.mark.short
-@pytest.mark.thorough
 @needs_gcc
 @pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")
 @pytest.mark.usefixtures("quick_units", "_of_one_text")
-@pytest.mark.parametrize(("case", "fmi"), of_both_versions())
+@pytest.mark.parametrize(("case", "fmi"), of_a_version())
 def test_a_unit_has_the_bits_of_python(case: Case, fmi: int, tmp_path: Path) -> None:
     answer = python_answer(case)
     ((name, content),) = functional_unit(closed_loop(scenario_of(case)), fmi, ["linux64"]).items()

@@ -8,19 +8,19 @@ import pytest
 
 from ppafo.page.wasm import module_of
 from tests.doors.of_python import assert_near_metrics, assert_same_channels, parameter, python_answer, scenario_of
-from tests.doors.table import EXPORTED, Case
+from tests.doors.table import EXPORTED, SHORT, Case
 from tests.modules_under_node import COMPLETED, assert_alike, driven
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
 
 
 def of_modules() -> list[Any]:
-    """Every case; what needs a program that does not come with the package waits for seconds until it is built."""
-    return [parameter(case, suite="" if case.is_shipped else "thorough") for case in EXPORTED]
+    """Every shipped program, and the richest cases, which wait for seconds until theirs is built."""
+    cases = [case for case in EXPORTED if case.is_shipped or case in SHORT]
+    return [parameter(case, suite="" if case.is_shipped else "long") for case in cases]
 
 
 @pytest.mark.short
-@pytest.mark.thorough
 @pytest.mark.parametrize("case", of_modules())
 def test_a_module_of_the_page_has_the_bits_of_python(case: Case) -> None:
     answer, module = python_answer(case), module_of(scenario_of(case))

@@ -48,7 +48,6 @@ def replayed(file: str, time: Floats, channels: dict[str, Floats]) -> dict[str, 
 
 
 @pytest.mark.short
-@pytest.mark.thorough
 @pytest.mark.usefixtures("quick_units")
 @pytest.mark.parametrize("case", parameters())
 def test_a_plant_under_recorded_inputs_has_the_bits_of_the_loop(case: Case, tmp_path: Path) -> None:

@@ -32,7 +32,6 @@ from tests.doors.table import CASES, Case
 VARIED = "supply.pressure"
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("case", parameters())
 def test_compiled_code_has_the_bits_of_python(case: Case) -> None:
     answer, found = python_answer(case), answer_of(compiled_result(case))
@@ -49,7 +48,6 @@ def of_ensembles() -> list[Any]:
 
 
 @pytest.mark.short
-@pytest.mark.thorough
 @pytest.mark.parametrize("case", of_ensembles())
 def test_a_run_of_an_ensemble_has_the_bits_of_the_run_alone(case: Case) -> None:
     """Among others, of which one has another supply; those of short vanes are run by Python, which is quick enough."""
@@ -70,7 +68,6 @@ def test_a_run_of_an_ensemble_has_the_bits_of_the_run_alone(case: Case) -> None:
 
 
 @pytest.mark.short
-@pytest.mark.thorough
 @pytest.mark.parametrize("case", parameters())
 def test_a_result_that_was_stored_is_read_with_its_bits(case: Case, tmp_path: Path) -> None:
     answer = python_answer(case)

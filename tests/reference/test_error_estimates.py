@@ -65,7 +65,7 @@ def test_an_error_above_the_promised_one_is_estimated_and_makes_the_run_sensitiv
 
 @pytest.mark.parametrize("family", ["gases", "slow valves", "thermal rebounds", "on a stop", "backflow", "legs"])
 def test_the_estimated_error_of_a_draw_is_above_the_true_one_and_not_far(family: str) -> None:
-    for number in range(4):
+    for number in range(2):
         scenario = scenario_from_dict(draw(family, 8, number))
         wrong = true_error(scenario)
         if wrong > 1.0e-5 * pressure_range(scenario, independent_run(scenario)):
@@ -78,11 +78,6 @@ def test_a_hundredth_of_the_tolerance_makes_less_than_a_tenth_of_the_error_and_t
     assert true_error(fine) < 0.1 * true_error(usual)
     told, untold = simulate(usual).recording, simulate(load_scenario("step-response", case)).recording
     assert np.array_equal(told["pressure_1"], untold["pressure_1"])
-
-
-def test_the_steps_of_a_held_vane_follow_the_tolerance_too() -> None:
-    usual, fine = (load_scenario("torque-task-solenoid", [f"run.tolerance={value}"]) for value in (1e-3, 1e-6))
-    assert simulate(fine).error().pressure < 0.1 * simulate(usual).error().pressure
 
 
 def test_rows_of_an_ensemble_have_the_errors_of_single_runs() -> None:

@@ -8,7 +8,7 @@ import pytest
 from ppafo.simulation import numbers
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
-from scripts.one_meaning import at_gym, at_library, at_numbers, at_page, at_study
+from scripts.one_meaning import at_library, at_page, at_study
 
 PAGE = Path(__file__).parents[2] / "page" / "node_modules" / "esbuild"
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -17,24 +17,9 @@ needs_node = pytest.mark.skipif(shutil.which("node") is None or not PAGE.exists(
 
 @pytest.mark.parametrize("name", [*list_scenarios(), *list_walks()])
 def test_columns_of_a_study_are_single_runs_with_the_same_words(name: str) -> None:
-    found = at_study(name, 36, seed=11)
+    found = at_study(name, 12, seed=11)
     assert found.differing == []
-    assert found.same >= 18
-
-
-@pytest.mark.parametrize("name", [*list_scenarios(), *list_walks()])
-def test_replaced_numbers_are_single_runs_with_the_same_words(name: str) -> None:
-    found = at_numbers(name, 12, seed=12)
-    assert found.differing == []
-    assert found.same > 6
-
-
-@pytest.mark.parametrize("name", ["step-response", "torque-task-solenoid"])
-def test_ranges_of_an_environment_are_single_runs_with_the_same_words(name: str) -> None:
-    pytest.importorskip("gymnasium")
-    found = at_gym(name, 30, seed=15)
-    assert found.differing == []
-    assert found.same > 8
+    assert found.same >= 4
 
 
 @needs_gcc

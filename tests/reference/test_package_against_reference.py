@@ -19,26 +19,18 @@ from tests.reference.reference_solver import chamber_pressures_of, solve_referen
 from tests.reference.simulator import independent_run
 
 SEED = 1
-DRAWS = range(4), range(4, 9)
-"""Numbers of the draws that continuous integration compares, and of those that it leaves out."""
-COSTLY = {"dead volumes": (range(3), range(3, 5)), "loops without friction": (range(3), range(3, 5))}
-"""The same of families whose reference takes many seconds for each."""
+DRAWS = range(3)
+"""Numbers of the draws that are compared."""
+COSTLY = {"dead volumes": range(2), "loops without friction": range(2)}
+"""Those of families whose reference takes many seconds for each."""
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("part", [0, 1])
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name != "mixed"])
-def test_determined_draws_are_within_the_limits(family: str, part: int) -> None:
-    draws = COSTLY.get(family, DRAWS)[part]
+def test_determined_draws_are_within_the_limits(family: str) -> None:
+    draws = COSTLY.get(family, DRAWS)
     verdicts = {number: verdict(scenario_from_dict(draw(family, SEED, number))) for number in draws}
     assert 2 * sum(case.is_determined for case in verdicts.values()) >= len(draws), "the family must say something"
     assert {number: case for number, case in verdicts.items() if case.is_wrong} == {}
-
-
-def test_the_same_number_draws_the_same_document_and_another_one_another() -> None:
-    assert draw("mixed", 3, 4) == draw("mixed", 3, 4)
-    assert draw("mixed", 3, 4) != draw("mixed", 3, 5)
-    assert draw("mixed", 3, 4) != draw("mixed", 4, 4)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +68,7 @@ def reference_gap(scenario: Scenario) -> float:
     ],
 )
 def test_independent_run_and_reference_solver_agree(family: str) -> None:
-    assert {n: gap for n in range(3) if (gap := reference_gap(scenario_from_dict(draw(family, SEED, n)))) > 1e-2} == {}
+    assert {n: gap for n in range(2) if (gap := reference_gap(scenario_from_dict(draw(family, SEED, n)))) > 1e-2} == {}
 
 
 @pytest.mark.parametrize(("angle", "speed"), [("20 deg", "-100 deg/s"), ("130 deg", "100 deg/s")])
