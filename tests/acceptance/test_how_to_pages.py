@@ -14,7 +14,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
 import pytest
 
 import ppafo
@@ -28,7 +27,6 @@ from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.device import Valve
 from ppafo.parameters.loading import parse_parameter_set
-from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
@@ -38,32 +36,6 @@ from tests.scenario_text import parse_scenario
 
 MEASURED = Path(__file__).parents[1] / "actuators"
 MUSCLES = Path(__file__).parents[2] / "src" / "ppafo" / "examples" / "add-an-actuator"
-
-
-PUBLICATION = """\
-schema_version = 1
-name = "mine"
-title = "subject of the publication"
-citation = "Somebody, Journal, 2020"
-
-[[claims]]
-id = "torque_at_60_psig"
-statement = "At 60 psig the device holds 6 N m."
-published = 6.0
-unit = "N m"
-where = "page 3"
-computation = "held_torque"
-arguments = { pressure = "60 psi_g" }
-at_least = 5.5
-at_most = 6.5
-
-[[claims]]
-id = "comfort"
-statement = "Wearers find it comfortable."
-words = "comfortable"
-where = "page 5"
-not_testable = "Nothing here feels anything."
-"""
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -239,22 +211,6 @@ def elbow(tmp_path: Path) -> Path:
     return tmp_path / "mine.toml"
 
 
-def test_the_lines_of_the_page_make_volumes_of_torques(elbow: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    degrees, gauges = np.meshgrid(np.linspace(0.0, 90.0, 7), np.linspace(0.0, 60.0, 4), indexing="ij")
-    torques = 1e-3 * gauges * (60.0 - 20.0 * np.radians(degrees)) * (1.0 + gauges / 600.0)
-    columns = np.stack([degrees.ravel(), gauges.ravel(), torques.ravel()], axis=1)
-    np.savetxt(elbow.parent / "bend.csv", columns, "%.4f", ",", header="deg,kPa_g,N m", comments="")
-    monkeypatch.chdir(elbow.parent)
-    exec(extension('np.loadtxt("bend.csv"'), {})
-    elbow.write_text(elbow.read_text(encoding="utf-8").replace("measured-bladder.csv", "soft.csv"), encoding="utf-8")
-    stops = ["actuator.angle_min=0 deg", "actuator.angle_max=90 deg", "actuator.passive_stiffness=0 N m/rad"]
-    plant = plant_parameters(ppafo.load_device(elbow, overrides=[*stops, "supply.pressure=60 kPa_g"]))
-    room = plant.atmospheric_pressure
-    for degree, gauge, torque in columns.tolist():
-        modelled = ACTUATORS["table"].model.torque(plant, math.radians(degree), room + 1e3 * gauge, room)
-        assert modelled == pytest.approx(torque, abs=2e-3 * torques.max())
-
-
 WITHIN = ("actuator.angle_max=110 deg", "supply.pressure=60 kPa_g")
 """What keeps the elbow within the table."""
 
@@ -317,16 +273,6 @@ def test_the_step_response_of_the_actuator_of_the_page_agrees_with_the_reference
     agreement = compare_with_reference(plan_run(scenario))
     assert agreement.angle < 2e-4
     assert agreement.worst_pressure < 1e-3
-
-
-def test_a_publication_of_your_own_is_judged(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.toml").write_text(PUBLICATION, encoding="utf-8")
-    assert main(["reproduce", "--study", "mine.toml"]) == 0
-    printed = [line.split()[1:] for line in capsys.readouterr().out.splitlines()[1:3]]
-    assert [(line[0], line[-1]) for line in printed] == [("torque_at_60_psig", "consistent"), ("comfort", "testable")]
 
 
 @pytest.mark.thorough

@@ -9,8 +9,7 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import FreeMotion, GasModel, PrescribedMotion, ProfileChoice, Scenario
-from tests.convergence.draws import random_scenario
+from ppafo.simulation.scenario import GasModel, PrescribedMotion, ProfileChoice, Scenario
 from tests.reference.reference_solver import measure_agreement, plant_states, solve_reference
 
 LARGEST_ANGLE = 2.0e-4
@@ -88,33 +87,3 @@ def test_a_vane_that_is_pushed_back_is_held_by_the_gas_that_cannot_leave(is_reli
     angle = plant_states(run, run_batch(batch_of(run)))[-1, 0]
     assert (gas.min() < -PUMPED) == is_relieving
     assert (angle == run.plant.angle_min) == is_relieving
-
-
-def pushed_about(scenario: Scenario, seed: int) -> Scenario:
-    """A random scenario whose vane is pushed against its supplies: thrown and loaded when free, else swung."""
-    chance = np.random.default_rng(seed)
-    device = scenario.device
-    if isinstance(scenario.motion, FreeMotion):
-        angle = chance.uniform(device.actuator.angle_min, device.actuator.angle_max)
-        motion = FreeMotion(float(angle), float(chance.uniform(-8.0, 8.0)), float(chance.uniform(-25.0, 25.0)))
-        return dataclasses.replace(
-            scenario, motion=motion, initial=dataclasses.replace(scenario.initial, pressure_1=device.supply.pressure)
-        )
-    swing = SWING | {"frequency": float(chance.uniform(0.5, 4.0)), "phase": float(chance.uniform(-1.0, 1.0))}
-    return dataclasses.replace(scenario, motion=PrescribedMotion(ProfileChoice("sine", swing)))
-
-
-@pytest.mark.parametrize("first", [0, 10])
-def test_drawn_gas_never_falls_with_random_devices_that_are_pushed_about(first: int) -> None:
-    fallen = 0
-    for seed in range(first, first + 10):
-        scenario = pushed_about(random_scenario(seed), seed)
-        thermal = GasModel(200.0, 300.0) if seed % 3 == 0 else None
-        relieving = dataclasses.replace(scenario.device.supply, relieving=True)
-        device = dataclasses.replace(scenario.device, supply=relieving)
-        for given in (scenario, dataclasses.replace(scenario, device=device)):
-            run = plan_run(dataclasses.replace(given, gas_model=thermal))
-            falls = float(np.diff(plant_states(run, run_batch(batch_of(run)))[:, 4]).min()) < 0.0
-            assert given is not scenario or not falls, f"seed {seed}"
-            fallen += falls
-    assert fallen >= 5, "too few of the relieving supplies were pushed back"

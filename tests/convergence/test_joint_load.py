@@ -6,9 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.scheme import motion
-from ppafo.model import plant
-from ppafo.model.plant import net_torque
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from tests.reference import bench as peer
@@ -63,30 +60,6 @@ def test_a_drag_limits_the_speed_to_where_it_takes_the_whole_torque() -> None:
     # sqrt(torque constant times 55 psi over the drag): the actuator can drive no faster.
     bound = math.sqrt(1.451e-5 * 55.0 * 6894.757 / 0.05)
     assert 0.9 * bound < result.metrics["largest_speed"].value < bound
-
-
-def dragged(driving: float, friction: float, damping: float, angle: float, angular_velocity: float) -> float:
-    """Equation (1) with a drag written where it is read."""
-    taken = 0.05 * angular_velocity * abs(angular_velocity)
-    return net_torque(driving, friction, damping, angle, angular_velocity) - taken
-
-
-def test_a_drag_that_is_written_into_equation_1_is_that_of_the_load(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PPAFO_BACKEND", "python")
-    short = ("motion.kind=free", "run.duration=60 ms")
-    of_load = simulate(load_scenario("step-response", (*short, *settings(0.05, 0.0, 0.0)))).recording
-    for module in (plant, motion):
-        monkeypatch.setattr(module, "net_torque", dragged)
-    of_equation = simulate(load_scenario("step-response", short)).recording
-    assert of_load["angular_velocity"].max() > 3.0
-    assert of_equation["angular_velocity"] == pytest.approx(of_load["angular_velocity"], rel=1e-9, abs=1e-9)
-
-
-def test_python_finds_the_bits_of_compiled_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario = load_scenario("step-response", ("motion.kind=free", "run.duration=0.1 s", *settings(0.05, 5.0, 3.0)))
-    compiled = simulate(scenario).recording
-    monkeypatch.setenv("PPAFO_BACKEND", "python")
-    assert np.array_equal(simulate(scenario).recording["angle"], compiled["angle"])
 
 
 def test_the_torque_that_prescribes_a_motion_has_the_load_in_it() -> None:

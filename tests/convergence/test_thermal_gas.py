@@ -104,16 +104,15 @@ def test_warm_walls_make_the_gas_isothermal(name: str) -> None:
     assert nearest < near < far
 
 
-@pytest.mark.parametrize("coefficient", [0.0, 100.0, 1.0e4, 1.0e7])
+@pytest.mark.parametrize("coefficient", [0.0, 1.0e4])
 @pytest.mark.parametrize("name", ["step-response", "torque-task-proportional", "torque-task-solenoid"])
 def test_energy_balance_is_within_the_limits(name: str, coefficient: float) -> None:
     scenario = with_walls(load_scenario(name), coefficient)
     assert_within_limits(scenario, f"{name}, {coefficient:g} W/(m^2 K)")
 
 
-@pytest.mark.parametrize("first", [0, 4, 8])
-def test_energy_balance_of_random_devices_is_within_the_limits(first: int) -> None:
-    for seed in range(first, first + 4):
+def test_energy_balance_of_random_devices_is_within_the_limits() -> None:
+    for seed in range(4):
         coefficient = (0.0, 50.0, 2.0e3)[seed % 3]
         assert_within_limits(with_walls(random_scenario(seed), coefficient), f"seed {seed}")
 

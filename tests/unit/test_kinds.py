@@ -153,32 +153,6 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
             load_scenario("torque-task-proportional", [f"controller.kind={name}"])
 
 
-def test_the_folder_of_an_editable_package_is_searched_from_within_as_from_elsewhere(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own, empty, packages = (tmp_path / name for name in ("own", "empty", "packages"))
-    for folder in (own, empty, packages):
-        folder.mkdir()
-    (packages / "mine.pth").write_text(f"import something\n{own}\n")
-    monkeypatch.chdir(own)
-    monkeypatch.setattr(plugins.site, "getsitepackages", lambda: [str(empty)])
-    assert plugins.is_working_folder(own)
-    monkeypatch.setattr(plugins.site, "getsitepackages", lambda: [str(packages)])
-    assert not plugins.is_working_folder(own)
-
-
-def test_metadata_of_an_editable_package_in_the_working_folder_do_not_hide_the_installed_ones(
-    install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    install("other_laws", LAW.format(name="on_off", call="mine"), controllers="mine")
-    about = tmp_path / "project" / "other_laws.egg-info"
-    about.mkdir(parents=True)
-    (about / "PKG-INFO").write_text("Metadata-Version: 2.1\nName: other_laws\nVersion: 1.0\n")
-    monkeypatch.chdir(about.parent)
-    monkeypatch.syspath_prepend("")
-    assert load_scenario("torque-task-proportional", ["controller.kind=mine"]).controller.kind == "mine"
-
-
 def test_profiles_and_metrics_are_found_too(install: Install) -> None:
     profile = "from dataclasses import replace\nfrom ppafo.control.profiles import SINE\n"
     install("other_profiles", profile + 'KIND = replace(SINE, name="wave")\n', profiles="wave")
@@ -190,22 +164,6 @@ def test_profiles_and_metrics_are_found_too(install: Install) -> None:
     assert scenario_from_dict(document).reference.kind == "wave"
     assert "mine" in METRICS
     assert "nothing" not in METRICS
-
-
-def test_misspelt_names_are_still_told_with_the_nearest_one(install: Install) -> None:
-    install("other_laws", LAW.format(name="on_off", call="hysteresis"), controllers="hysteresis")
-    with pytest.raises(ppafo.PpafoError, match="did you mean 'hysteresis'"):
-        load_scenario("torque-task-proportional", ["controller.kind=hysteresys"])
-
-
-def test_kinds_are_a_mapping_that_can_be_changed_for_a_while() -> None:
-    kinds: Kinds[object] = Kinds("ppafo.none", "thing", object, {})  # type: ignore[type-var]
-    kinds["a"] = 1.0
-    assert list(kinds) == ["a"]
-    assert kinds["a"] == 1.0
-    del kinds["a"]
-    assert kinds.get("a") is None
-    assert len(kinds) == 0
 
 
 def test_a_kind_of_a_room_that_is_not_installed_is_not_listed_and_says_so() -> None:
@@ -235,17 +193,6 @@ def test_a_package_is_named_by_its_folder_a_file_or_a_module(
     monkeypatch.setenv(plugins.VARIABLE, "")
     plugins.name_plugins([given])
     assert CONTROLLERS["laws.inner:KIND"].name == "anything"
-
-
-def test_a_module_of_the_name_of_another_one_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "json.py").write_text("KIND = 1")
-    monkeypatch.setattr(plugins, "_named", {})
-    monkeypatch.setenv(plugins.VARIABLE, "")
-    plugins.name_plugins(tmp_path / "json.py")
-    with pytest.raises(
-        KindError, match=r"module 'json' of .* has the same name as another module .*; rename the module in"
-    ):
-        METRICS["json:KIND"]
 
 
 def test_child_processes_know_what_was_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -74,35 +74,6 @@ def sampled(self, step_count):
 lanes.LaneBlock.advance = sampled
 """
 """A signal while SciPy reads its direction numbers: Cython prints the exception that it raises, and drops it."""
-MODEL = """
-from pydantic._internal import _model_construction
-from pydantic_core import SchemaValidator, core_schema
-class Value:
-    def __hash__(self):
-        os.kill(os.getpid(), signal.NAME)
-        return 0
-_model_construction.create_schema_validator = lambda *_, **__: SchemaValidator(core_schema.literal_schema([Value()]))
-"""
-"""A signal while pydantic builds a model: it makes an error of its own of the exception, which it drops."""
-REFUSED = """
-from ppafo.cli import simulate
-from ppafo.errors import ScenarioError
-def interrupted(scenario, *, check=False, overrides=(), out=None):
-    try:
-        os.kill(os.getpid(), signal.NAME)
-    except BaseException:
-        raise ScenarioError("file: is wrong") from None
-simulate.simulate = interrupted
-"""
-"""A signal of which somebody makes a mistake of the user."""
-
-
-@each_signal(while_a_model_is_built=MODEL, taken_for_a_mistake=REFUSED)
-def test_a_signal_that_became_another_error_is_one_line(middle: str, name: str, tmp_path: Path) -> None:
-    code = START.replace("MIDDLE", middle.replace("NAME", name))
-    words = [sys.executable, "-c", code, str(tmp_path / "run")]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120)
-    assert (done.returncode, done.stderr) == (130, "ppafo: interrupted; no file is incomplete\n")
 
 
 @each_signal(lost_in_a_finaliser=LOST, caught_by_a_library=CAUGHT, dropped_by_compiled_code=COMPILED)
@@ -181,30 +152,3 @@ def cpu_seconds(process: int) -> float:
     except (FileNotFoundError, ProcessLookupError):
         return 0.0
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-LOADING = """
-import os, signal, sys
-sys.orig_argv = {started!r}
-class Interrupts:
-    def find_spec(self, name, path=None, target=None):
-        if name == "ppafo.engine":
-            os.kill(os.getpid(), signal.SIGINT)
-sys.meta_path.insert(0, Interrupts())
-signal.signal(signal.SIGINT, signal.default_int_handler)
-import ppafo
-"""
-
-
-@pytest.mark.parametrize(
-    ("started", "code"), [(["python", "-m", "ppafo"], 130), (["python", "mine.py"], -signal.SIGINT)]
-)
-def test_an_interrupt_while_the_package_loads_is_one_line_of_the_command_alone(started: list[str], code: int) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", LOADING.format(started=started)], check=False, capture_output=True, text=True
-    )
-    assert done.returncode == code
-    # A program that imports the package has its own way to end.
-    is_command = code == 130
-    assert (done.stderr == "ppafo: interrupted; no file is incomplete\n") == is_command
-    assert ("KeyboardInterrupt" in done.stderr) != is_command

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -54,10 +53,6 @@ def heavy(modules: list[str]) -> set[str]:
     return {name.partition(".")[0] for name in modules} & HEAVY
 
 
-def own(modules: list[str]) -> set[str]:
-    return {name for name in modules if name.partition(".")[0] == "ppafo"}
-
-
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], list[str]]:
     """What ``ppafo simulate`` loads, with everything made that is kept."""
@@ -85,37 +80,3 @@ def run_from_python() -> list[str]:
 
 def test_a_run_from_python_draws_and_writes_nothing(run_from_python: list[str]) -> None:
     assert heavy(run_from_python) == READING
-
-
-def said_by(*words: str) -> tuple[int, str]:
-    """Exit code and all words of a command in a process of its own, which has loaded no kinds before."""
-    done = subprocess.run([sys.executable, "-m", "ppafo", *words], capture_output=True, text=True, check=False)
-    return done.returncode, done.stdout + done.stderr
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        'schema_version = 1\nname = "x"\n',
-        'schema_version = 1\nname = "x"\n[controler]\nkind = "pid"\n',
-        'schema_version = 1\nname = "x"\n[controller]\nproportional_gain = "1 1/(N m)"\n',
-        'schema_version = 2\nname = "x"\n',
-    ],
-)
-def test_a_file_that_names_no_kind_is_refused_in_one_line_by_a_process_that_has_loaded_none(
-    content: str, tmp_path: Path
-) -> None:
-    (tmp_path / "x.toml").write_text(content)
-    code, said = said_by("simulate", str(tmp_path / "x.toml"))
-    assert code == 2
-    assert said.count("\n") == 1
-    assert "x.toml: " in said
-
-
-@pytest.mark.long
-def test_an_effect_that_nothing_has_named_before_can_be_varied() -> None:
-    condition = ("--such-that", "rms_error <= 0.9 N m")
-    code, said = said_by(
-        "find", "torque-task-proportional", "--vary", "effects.ice.blockage_per_gas=1..2000 1/kg", *condition
-    )
-    assert code == 0, said

@@ -2,14 +2,13 @@
 
 import json
 import re
-import shlex
 from importlib import resources
 from pathlib import Path
 
 import pytest
 
 from ppafo import load_device, load_parameter_set, simulate
-from ppafo.cli.main import build_parser, main
+from ppafo.cli.main import main
 from ppafo.cli.new import KINDS
 from ppafo.kinds import kind_at
 from ppafo.parameters.audit import findings_of
@@ -82,23 +81,3 @@ def test_every_file_of_the_package_is_copied_under_a_new_name_and_loads(kind: st
     differing = [line for old, line in zip(first.split("\n"), made.split("\n"), strict=True) if old != line]
     assert 'name = "my-own"' in differing
     assert all(line == 'name = "my-own"' or line.startswith("#   ppafo ") for line in differing)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_next_command_is_one_that_there_is(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["new", kind, "my-own", "--out", "out of the way/mine.toml"]) == 0
-    line = capsys.readouterr().out.splitlines()
-    assert len(line) == 1
-    words = shlex.split(line[0].partition("; next: ")[2])
-    assert "out of the way/mine.toml" in words
-    assert build_parser(words[1:]).parse_args(words[1:]).command == words[1]
-
-
-def test_a_copy_that_does_not_load_is_not_left(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["new", "set", "bench"])
-    main(["new", "scenario", "task"])
-    text = Path("task.toml").read_text().replace('"ppafo2011"', '"bench.toml"')
-    Path("task.toml").write_text(text)
-    assert main(["new", "scenario", "task", "--from", "task.toml", "--out", "other/task.toml"]) == 2
-    assert "bench.toml" in capsys.readouterr().err
-    assert not list(Path().glob("other/*"))

@@ -67,17 +67,3 @@ def test_several_sets_are_audited_side_by_side(capsys: pytest.CaptureFixture[str
     document = json.loads(capsys.readouterr().out)
     assert [one["set"] for one in document["sets"]] == ["ppafo2011", "ppafo2011-printed"]
     assert document["sets"][1]["counts"]["error"] == 9
-
-
-def test_a_set_without_a_parent_begins_with_its_findings_and_may_be_compared_with_any(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    main(["sets", "audit", "cylinder-lever", "--json"])
-    assert json.loads(capsys.readouterr().out)["parent"] is None
-    main(
-        ["sets", "audit", "cylinder-lever", "--parent", "cylinder-lever", "--set", "gas.temperature=30 degC", "--json"]
-    )
-    document = json.loads(capsys.readouterr().out)
-    assert document["parent"] == "cylinder-lever"
-    (change,) = document["changes"]
-    assert change == {"path": "gas.temperature", "before": "293.15 K", "after": "30 degC", "origin": "assumed"}

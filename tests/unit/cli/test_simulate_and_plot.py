@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-import html
 import io
 import json
 import os
@@ -11,7 +10,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -56,15 +54,6 @@ def test_a_run_writes_a_whole_result_folder_and_nothing_else(saved: Path) -> Non
     assert names(saved.parent) == ["step"]
     assert read_result(saved).document["status"]["kind"] == "completed"
     assert read_result(saved).recording.kind == "simulated"
-
-
-def test_the_report_has_the_metrics_the_figure_and_the_run_to_drag(saved: Path) -> None:
-    page = html.unescape((saved / "report.html").read_text(encoding="utf-8")).replace("\N{NO-BREAK SPACE}", " ")
-    metrics = read_result(saved).document["metrics"]
-    assert f"{1000.0 * metrics['gas_supplied']['value']:.4g} g" in page
-    assert 'src="data:image/svg+xml;base64,' in page
-    assert '<div id="workbench">' in page
-    assert "default-src 'none'" in page
 
 
 def test_the_same_command_gives_the_same_files_without_a_folder_under_out_and_json_alone_is_printed(
@@ -124,25 +113,6 @@ def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_t
         assert figure.read_bytes() == drawn
     (tmp_path / "walk" / "walk.json").write_text('{"configuration": {"device": [3]}}')
     assert main(["export", "figure", str(tmp_path / "walk")]) == 2
-
-
-@pytest.mark.parametrize("damage", [{"files": 3}, {"files": [3]}, {"sha256": [3]}])
-def test_a_mark_that_says_its_files_in_another_form_is_refused(
-    damage: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    recording = Recording("walk", 0.1 * np.arange(11), {"torque": Channel(np.zeros(11), "N m")}, "simulated")
-    write_marked_folder(tmp_path, {"recording.nc": netcdf_bytes(recording, None)}, "walk")
-    mark = tmp_path / "ppafo.json"
-    document = json.loads(mark.read_text())
-    assert damage.keys() <= document.keys()
-    mark.write_text(json.dumps(document | damage))
-    assert main(["export", "figure", str(tmp_path)]) == 2
-    assert (
-        capsys.readouterr().err
-        == f"ppafo: {mark}: 'files' must be a JSON list of names and 'sha256' a JSON object; run the command "
-        "that wrote this result again\n"
-    )
-    assert names(tmp_path) == ["ppafo.json", "recording.nc"]
 
 
 def test_overrides_reach_the_saved_device_and_a_pressure_is_shown_above_its_atmosphere(

@@ -28,15 +28,6 @@ def test_a_run_loads_nothing_that_only_others_need(tmp_path: Path, monkeypatch: 
     assert printed_by(code).splitlines()[-1] == "[]"
 
 
-def test_main_leaves_the_garbage_collection_of_a_calling_program_alone() -> None:
-    code = (
-        "import gc\nbefore = gc.get_threshold()\nfrom ppafo.cli.main import main\n"
-        "main(['doctor', '--schema', 'scenario'])\n"
-        "print(gc.isenabled() and gc.get_threshold() == before)"
-    )
-    assert printed_by(code).splitlines()[-1] == "True"
-
-
 INTERRUPTED = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -16,7 +16,6 @@ from ppafo.parameters.measured_volumes import MeasuredVolumes, read_measured_vol
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.tracking.shortfall import shortfall
 
 EXAMPLE = Path(__file__).parents[2] / "actuators"
 HEADER = "angle [deg],pressure [kPa_g],volume_1 [mL]"
@@ -39,14 +38,6 @@ def test_a_set_without_a_kind_has_a_vane_and_one_that_names_it_is_the_same() -> 
     named = text.replace("[actuator.torque_constant]", '[actuator]\nkind = "vane"\n\n[actuator.torque_constant]', 1)
     assert parse_parameter_set(named.encode(), "a.toml") == parse_parameter_set(text.encode(), "a.toml")
     assert load_device("ppafo2011").actuator.kind == "vane"
-
-
-def test_a_table_of_torques_is_told_how_volumes_follow(tmp_path: Path) -> None:
-    path = measured(tmp_path, "angle [deg],pressure [kPa_g],Torque [N m]", "20,0,0")
-    with pytest.raises(
-        ParameterError, match=r"'Torque': the table must have volumes.*dV/dangle = dT/dpressure.*extend.md"
-    ):
-        read_measured_volumes(path)
 
 
 def test_the_torque_constant_of_another_kind_is_its_mean_growth() -> None:
@@ -223,12 +214,6 @@ def test_a_run_of_a_study_that_the_table_does_not_hold_for_is_refused_as_alone(
     assert (screen.members.tolist(), list(screen.reasons)) == ([0], [1])
     assert said in screen.reasons[1]
     assert str(alone.value).endswith(screen.reasons[1])
-
-
-def test_of_another_actuator_no_torque_ceiling_and_no_lower_bound_is_known() -> None:
-    # The cylinder gives 6.5 N m where lever and rod are square, and 5.5 as the mean over the angles.
-    scenario = load_scenario(EXAMPLE / "torque-task-cylinder.toml", ["reference.level=6 N m"])
-    assert shortfall(scenario).tolist() == [0.0]
 
 
 def test_stops_beyond_what_was_measured_are_refused(tmp_path: Path) -> None:

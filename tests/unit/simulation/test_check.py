@@ -11,7 +11,6 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement
-from ppafo.report.display_units import metric_change
 from ppafo.running import simulate
 from ppafo.simulation.check import FINER, MOVED_MEASUREMENT, MOVED_START, Check, ErrorEstimate, NumberCheck
 from ppafo.simulation.loading import list_scenarios, load_scenario
@@ -124,16 +123,6 @@ def test_what_only_the_error_changes_is_told_from_what_nobody_could_measure() ->
     assert not diverged.is_determined
     assert "completion: the run with start moved diverged." in diverged.sentence
     assert diverged.sentence.endswith(" The runs separate at t = 0.1 s.")
-
-
-def test_a_check_prints_each_metric_with_what_changed_and_marks_what_is_open(chaotic: Check) -> None:
-    lines = repr(chaotic).splitlines()
-    printed = {line.split("  ")[0]: line for line in lines[2:-2]}
-    for row in (*chaotic.metrics, *chaotic.courses):
-        assert printed[row.name].endswith("sensitive") == (not row.is_determined)
-        change, _ = metric_change(row.changes[FINER], row.unit)
-        assert (f" {change:+.1e} " if change else " 0 ") in printed[row.name]
-    assert lines[-1] == chaotic.sentence
 
 
 def test_a_decision_by_a_hair_of_the_start_is_found(torque_task: Callable[[str], Scenario]) -> None:

@@ -10,15 +10,12 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import PROFILES
 from ppafo.control.profiles import Knot, TabulatedProfile, smooth_bounds, smooth_value
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
 from ppafo.metrics import METRICS
 from ppafo.model.gait import shank_in_gait
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
@@ -143,31 +140,6 @@ def test_the_shank_of_a_gait_is_that_of_its_file_from_the_phase_on() -> None:
     assert now.knee_up == pytest.approx(float(gait.knee_up.values_at(phase)), abs=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("shank", "path", "unit"),
-    [("at rest", "shank.level", "rad"), ("gait", "shank.start", ""), ("sine", "shank.frequency", "Hz")],
-)
-def test_rows_of_a_leg_have_the_bits_of_single_runs(shank: str, path: str, unit: str) -> None:
-    base = on_leg(SHANKS[shank])
-    columns = {
-        "motion.foot_mass": np.array([0.6, 1.0, 2.0]),
-        f"motion.{path}": np.array([0.1, 0.3, 0.5]),
-        "foot_plate.inertia": np.array([4e-3, 8e-3, 2e-2]),
-        "motion.ankle_torque": np.array([-1.0, 0.0, 1.0]),
-    }
-    units = {"motion.foot_mass": "kg", f"motion.{path}": unit, "motion.ankle_torque": "N m"}
-    plan = plan_ensemble(check_columns(base, columns))
-    assert plan.reasons == {}
-    for places, batch in plan.batches:
-        for column, run in enumerate(places):
-            lines = [
-                f"{name}={float(values[run])!r} {units.get(name, 'kg m^2')}".strip() for name, values in columns.items()
-            ]
-            single = batch_of(plan_run(on_leg(SHANKS[shank], *lines)))
-            assert batch.parameters[:, column].tobytes() == single.parameters.tobytes()
-            assert batch.states[:, column].tobytes() == single.states.tobytes()
-
-
 def test_a_shank_with_corners_is_refused_in_one_line() -> None:
     with pytest.raises(ScenarioError, match=r"motion\.shank\.kind = 'ramp_hold': this profile has corners.* gait"):
         on_leg({"kind": "ramp_hold", "level": "10 deg"})
@@ -233,19 +205,6 @@ def test_the_reference_of_the_swing_is_the_torque_that_moves_the_measured_foot()
         needed = run.leg.load.inertia * bend - torque_on_foot(run.leg.load, shank_in_gait(run.leg.shank, time), here)
         needed += device.friction.viscous_damping * rate + math.copysign(device.friction.dynamic_torque, rate)
         assert settings[f"value_{number:02}"] == pytest.approx(needed, abs=0.012)
-
-
-def test_either_valve_lifts_the_foot_in_swing_and_the_proportional_one_lifts_the_toes_higher_with_less_gas() -> None:
-    nothing = ("controller.kind=constant", "controller.command=0", "initial.pressure_2=atmosphere")
-    laws = ((), ("device.valve=solenoid", "controller.kind=on_off"), nothing)
-    found = [simulate(load_scenario(SWING, law)).metrics for law in laws]
-    errors = [metrics["foot_angle_error"].value for metrics in found]
-    toes = [metrics["toe_clearance_error"].value for metrics in found]
-    # Of the error without help 0.28 (proportional) and 0.17 (solenoid) are left, with dead volumes of 36 cm^3.
-    assert errors[0] < 0.3 * errors[2]
-    assert errors[1] < 0.18 * errors[2]
-    assert toes == sorted(toes, reverse=True)
-    assert found[0]["gas_supplied"].value < 0.5 * found[1]["gas_supplied"].value
 
 
 def test_metrics_of_the_swing_are_the_same_in_a_study() -> None:

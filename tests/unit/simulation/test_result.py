@@ -82,14 +82,6 @@ def test_the_document_holds_every_number_of_the_device_in_si(result: Result) -> 
     assert device["valve"]["area"] == scenario.device.valve.area
 
 
-def test_the_document_holds_assumptions_seed_versions_and_engine(result: Result) -> None:
-    document = result.to_dict()
-    assert document["seed"] == result.scenario.sensors.seed
-    assert document["versions"] == {"ppafo": "0"}
-    assert document["engine"] == {"step": 1e-3, "steps": 100}
-    assert len(document["scenario"]["assumptions"]) == len(result.scenario.assumptions)
-
-
 def test_a_number_that_json_does_not_know_becomes_null(result: Result) -> None:
     document = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert document["metrics"]["broken"]["value"] is None
@@ -114,19 +106,6 @@ def test_a_saved_result_is_read_back(result: Result, tmp_path: Path) -> None:
     assert (tmp_path / "task" / "figure.png").read_bytes() == b"png"
 
 
-def test_the_dataset_carries_the_scenario(result: Result) -> None:
-    dataset = result.dataset()
-    assert dataset["angle"].values.tolist() == [0.3, 0.4]
-    assert json.loads(dataset.attrs["scenario"])["name"] == "step-response"
-
-
-def test_a_plot_of_a_completed_run_has_no_remark_and_one_of_a_diverged_run_has(result: Result) -> None:
-    diverged = dataclasses.replace(result, status=Status("diverged", 0.05, "diverged at t = 0.05 s"))
-    assert "diverged at t = 0.05 s" not in [text.get_text() for text in result.plot().texts]
-    assert "diverged at t = 0.05 s" in [text.get_text() for text in diverged.plot().texts]
-    assert not diverged.status.is_completed
-
-
 def test_the_ten_reversals_of_the_torque_task_switch_each_valve_of_the_pair_ten_times() -> None:
     result = ppafo.simulate("torque-task-solenoid")
     assert np.count_nonzero(np.diff(np.sign(result.recording["command"]))) == 10
@@ -143,18 +122,6 @@ def test_a_metric_that_is_not_there_is_answered_with_the_nearest(name: str, near
         metrics[name]
     assert metrics.get(name) is None
     assert name not in metrics
-
-
-def test_a_run_that_is_useless_says_so_where_it_is_printed() -> None:
-    good = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5})
-    assert good.warnings == ()
-    changed = "values changed: run.duration=0.5 s"
-    assert str(good).splitlines()[:4] == ["torque-task-proportional: completed", good.following, changed, ""]
-    wild = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5, "controller.proportional_gain": 40.0})
-    (warning,) = wild.warnings
-    assert "the torque loop oscillates" in warning
-    changed += ", controller.proportional_gain=40 1/(N m)"
-    assert str(wild).splitlines()[:4] == ["torque-task-proportional: completed", warning, changed, ""]
 
 
 def test_times_and_units_are_at_hand(result: Result) -> None:

@@ -116,27 +116,12 @@ def test_a_rate_and_its_period_are_the_same_sampling() -> None:
     assert by_rate.controller.period == by_period.controller.period == 0.05
 
 
-def test_any_controller_goes_with_any_valve() -> None:
-    on_off = small(controller={"kind": "on_off", "rate": "20 Hz"})
-    pid = small(device={"set": "ppafo2011", "valve": "solenoid"})
-    assert (on_off.controller.kind, on_off.device.valve.kind) == ("on_off", "proportional")
-    assert (pid.controller.kind, pid.device.valve.kind) == ("pid", "solenoid")
-
-
 def test_a_set_file_is_found_beside_the_scenario(tmp_path: Path) -> None:
     original = Path(__file__).parents[3] / "src" / "ppafo" / "parameters" / "sets" / "ppafo2011.toml"
     (tmp_path / "bench.toml").write_text(original.read_text().replace('name = "ppafo2011"', 'name = "bench"'))
     file = tmp_path / "small.toml"
     file.write_text(SMALL_TEXT.replace('"ppafo2011"', '"bench.toml"'))
     assert load_scenario(file).device.name == "bench"
-
-
-def test_the_given_values_are_not_changed_later() -> None:
-    content = copy.deepcopy(SMALL)
-    scenario = scenario_from_dict(content, ["motion.angle=80 deg"])
-    assert content == SMALL
-    content["motion"]["angle"] = "20 deg"
-    assert scenario.origin.content["motion"]["angle"] == "75 deg"
 
 
 class Relay:
@@ -150,11 +135,6 @@ def test_a_python_object_takes_the_place_of_the_controller() -> None:
     relay = Relay()
     control = small().controlled_by(relay).controller
     assert (control.kind, control.custom, control.period, control.settings) == ("python", relay, 0.001, {})
-
-
-def test_an_object_without_update_is_no_controller() -> None:
-    with pytest.raises(ScenarioError, match="type object has no method 'reset'"):
-        small().controlled_by(object())  # type: ignore[arg-type]
 
 
 def test_an_assumption_carries_the_value_it_is_about() -> None:

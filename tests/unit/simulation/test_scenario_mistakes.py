@@ -251,14 +251,6 @@ def test_a_mistake_in_the_device_names_scenario_and_set() -> None:
     assert "use the completed set 'ppafo2011'" in message
 
 
-def test_a_set_without_the_valve_of_the_scenario_names_the_option_that_takes_its_own() -> None:
-    text = TEXT.replace('"ppafo2011"', '"cylinder-lever"').replace('valve = "proportional"', 'valve = "solenoid"')
-    message = problem_with(text.encode(), ParameterError)
-    assert message.endswith(
-        "there is no valve 'solenoid'; available: proportional; give overrides=['device.valve=proportional']"
-    )
-
-
 @pytest.mark.parametrize(
     "change", [{1: 2}, {"run": None}, {"run": 3}, {"assumed": {"run.step": 3}}, {"assumed": {1: ""}}, {"name": "a\nb"}]
 )
@@ -268,14 +260,6 @@ def test_plain_values_of_a_wrong_type_are_clean_errors(change: dict[Any, Any]) -
         scenario_from_dict({**content, **change})
     assert str(caught.value).startswith("scenario ")
     assert "\n" not in str(caught.value)
-
-
-def test_a_parameter_set_that_is_given_as_a_scenario_is_called_what_it_is() -> None:
-    with pytest.raises(
-        ScenarioError,
-        match=r"^bench\.toml: is a parameter set, .*overrides=\['device\.set=bench\.toml', 'device\.valve=main'\]$",
-    ):
-        parse_scenario(b'name = "bench"\ndefault_valve = "main"\n', "bench.toml")
 
 
 def test_only_a_controller_that_follows_nothing_may_be_without_a_reference() -> None:

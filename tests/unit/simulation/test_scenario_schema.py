@@ -45,15 +45,3 @@ def test_the_schema_knows_every_controller_and_profile_and_their_settings() -> N
         assert (controller.name, frozenset(names)) in described
     for profile in PROFILES.values():
         assert (profile.name, frozenset({"kind", *(quantity.name for quantity in profile.quantities)})) in described
-
-
-def test_the_schema_says_which_levels_a_reference_of_an_angle_requires() -> None:
-    levels = {
-        (table["properties"]["kind"]["const"], name): field["description"]
-        for section, table in json_schema()["$defs"].items()
-        if section.endswith("Reference")
-        for name, field in table["properties"].items()
-        if name in ("level", "start_level") and name not in table["required"]
-    }
-    assert set(levels) == {("ramp_hold", "start_level"), *((kind, "level") for kind in ("sine", "smooth", "tabulated"))}
-    assert all("required unless a torque is followed" in text for text in levels.values())

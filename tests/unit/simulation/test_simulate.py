@@ -2,10 +2,6 @@
 
 import dataclasses
 import math
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -14,14 +10,14 @@ import pytest
 from ppafo.engine.lanes import run_batch, write_source
 from ppafo.engine.run import TOO_MANY_PARTS, batch_of, state_row_numbers
 from ppafo.engine.step import loop
-from ppafo.errors import ScenarioError, SimulationError
+from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, DIVERGED, run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
-from ppafo.simulation.simulate import REMEDY, result_of, simulate_many
+from ppafo.simulation.simulate import REMEDY, result_of
 from tests.reference.reference_solver import compare_with_reference
 
 CHANNELS = {
@@ -63,13 +59,6 @@ def test_recording_has_every_channel_at_every_output_time(torque_task: Callable[
     assert result.recording.time[-1] == pytest.approx(3.0)
     assert np.diff(result.recording.time) == pytest.approx(1e-3)
     assert result.status.kind == "completed"
-
-
-def test_many_scenarios_give_what_each_gives_alone(torque_task: Callable[[str], Scenario]) -> None:
-    scenarios = [torque_task("proportional"), torque_task("solenoid"), load_scenario("step-response")]
-    for together, scenario in zip(simulate_many(scenarios), scenarios, strict=True):
-        alone = simulate(scenario)
-        assert np.array_equal(together.recording["torque"], alone.recording["torque"])
 
 
 def test_python_controller_gives_what_the_same_law_in_the_catalogue_gives(
@@ -213,32 +202,6 @@ def test_a_vane_led_close_to_its_stops_fifty_times_a_second_is_followed_at_steps
     run = plan_run(load_scenario("torque-task-moving-ankle", [*overrides, "run.duration=0.1 s"]))
     assert run.step == 1e-3
     assert compare_with_reference(run).worst_pressure <= 1e-3
-
-
-def test_run_with_too_many_steps_is_refused_before_it_starts(step_response: Scenario) -> None:
-    long = dataclasses.replace(step_response.run, duration=9.0e5, step=1.0e-4)
-    with pytest.raises(ScenarioError, match=r"steps of 0\.0001 s.*run\.step"):
-        simulate(dataclasses.replace(step_response, run=long))
-
-
-def test_interrupt_is_seen_in_the_middle_of_a_long_run() -> None:
-    code = (
-        # Whoever runs the tests in the background lets them ignore interrupts, and a child would inherit that.
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-        "import ppafo, sys; scenario = ppafo.load_scenario('step-response', ['run.duration=20000 s', "
-        "'run.output_interval=1 s']); ppafo.simulate('step-response'); print('ready', flush=True); "
-        "ppafo.simulate(scenario)"
-    )
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as running:
-        assert running.stdout is not None
-        assert running.stdout.readline().strip() == b"ready"
-        time.sleep(1.5)
-        assert running.poll() is None, "the run must be long enough to be interrupted"
-        running.send_signal(signal.SIGINT)
-        start = time.monotonic()
-        running.wait(timeout=30)
-        assert time.monotonic() - start < 5.0
-        assert running.returncode != 0
 
 
 def test_a_step_that_is_not_done_in_the_most_parts_ends_the_run_with_time_and_remedy(

@@ -32,13 +32,6 @@ def test_a_joint_that_friction_holds_is_named_with_a_stiffness_that_moves_it() -
     assert re.match(r"controller.angle_stiffness=\S+ N m/rad", mended.mended[0])
 
 
-def test_loops_that_move_and_those_that_want_nothing_are_left_alone() -> None:
-    assert simulate(servo()).tracking is None
-    still = servo("reference.amplitude=0 deg", "reference.level=70 deg", "motion.angle=70 deg")
-    assert simulate(still).tracking is None
-    assert simulate("step-response").tracking is None
-
-
 @pytest.mark.parametrize(
     ("overrides", "said"),
     [
