@@ -20,7 +20,7 @@ from tests.doors.of_python import (
     run_by,
     scenario_of,
 )
-from tests.doors.table import Case
+from tests.doors.table import GROUPS, SHORT, Case
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")
 pytestmark = [
@@ -49,7 +49,7 @@ def replayed(file: str, time: Floats, channels: dict[str, Floats]) -> dict[str, 
 
 @pytest.mark.short
 @pytest.mark.usefixtures("quick_units")
-@pytest.mark.parametrize("case", parameters())
+@pytest.mark.parametrize("case", parameters((*SHORT, *GROUPS)))
 def test_a_plant_under_recorded_inputs_has_the_bits_of_the_loop(case: Case, tmp_path: Path) -> None:
     scenario = scenario_of(case)
     plant = plant_alone(scenario)

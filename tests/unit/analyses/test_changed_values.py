@@ -38,16 +38,6 @@ def test_an_answer_states_what_was_changed_for_it(question: str) -> None:
     assert "Values changed: <code>run.duration</code>=1.5" in files_of(finding)[REPORT].decode()
 
 
-@pytest.mark.parametrize("question", [*(name for name in ASKED if name != "linearise"), "tune"])
-def test_an_answer_says_which_gains_another_kind_of_controller_keeps(
-    question: str, caplog: pytest.LogCaptureFixture
-) -> None:
-    changes = ["controller.kind=pid_feedforward"]
-    finding = ppafo.tune("pid-gains", overrides=changes) if question == "tune" else ASKED[question]([*changes, SHORT])
-    said = f"{finding}{caplog.text}"
-    assert "kept from pid for pid_feedforward: controller.proportional_gain=0.095 1/(N m)" in said
-
-
 def test_an_answer_about_values_as_they_are_states_no_change() -> None:
     finding = ppafo.compare(BOTH)
     assert "values changed" not in str(finding)

@@ -11,7 +11,7 @@ from ppafo.analyses.reproduce.decision_phases import phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
 from ppafo.analyses.reproduce.question import reproduce
 from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED, ReportedSet, arithmetic_claims, load_reported
-from ppafo.analyses.reproduce.result import PROPORTIONAL, SOLENOID, STEP, Reproduction
+from ppafo.analyses.reproduce.result import STEP, Reproduction
 from ppafo.analyses.reproduce.solve import EXPERIMENTS, reproduce_paper, torque_task_observations
 from ppafo.errors import PpafoError, SimulationError
 from ppafo.parameters.audit.evidence import Evidence
@@ -191,14 +191,6 @@ def test_a_window_that_is_missed_leaves_the_claim_undetermined(changed: Reproduc
     assert {claim.verdict for claim in changed.missed} == {"undetermined"}
 
 
-@pytest.mark.thorough
-def test_a_task_without_a_ramp_has_nothing_to_oscillate_on() -> None:
-    changed = reproduce_paper(["reference.kind=constant", "reference.level=3 N m"])
-    told = {item.id: item for item in changed.torque_observations}
-    assert told["solenoid_oscillates_on_ramp"].holds is False
-    assert "no ramp" in told["solenoid_oscillates_on_ramp"].evidence
-
-
 def test_a_restless_hold_is_not_called_quiet(reproduction: Reproduction) -> None:
     metrics = dict(reproduction.solenoid.metrics)
     metrics["oscillations_hold"] = dataclasses.replace(metrics["oscillations_hold"], value=7.0)
@@ -218,10 +210,3 @@ def test_a_run_that_diverges_stops_the_reproduction_with_its_name(
     monkeypatch.setattr(study, "simulate", diverged)
     with pytest.raises(SimulationError, match="step-response' failed: diverged at t"):
         reproduce()
-
-
-@pytest.mark.thorough
-def test_every_experiment_is_told_of_before_it_runs() -> None:
-    heard: list[str] = []
-    reproduce(progress=lambda progress: heard.append(progress.activity))
-    assert [name for name in (STEP, SOLENOID, PROPORTIONAL) if not any(name in text for text in heard)] == []

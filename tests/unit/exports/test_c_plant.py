@@ -12,27 +12,8 @@ import pytest
 from ppafo.exports.c_library import c_library
 from ppafo.exports.c_library.plant import plant_library
 from ppafo.exports.fmu.platforms import FLAGS
-from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 
-FREE = (
-    "torque-task-proportional",
-    ("motion.kind=free", "run.duration=0.3 s", "reference.ramp_time=0.1 s", "motion.external_torque=3 N m"),
-)
-SWUNG = ("step-response", ("run.duration=0.3 s", "motion.ankle_torque=0.2 N m"))
-LATE = (
-    "cylinder-servo",
-    (
-        "run.duration=0.2 s",
-        "sensors.delay=2.3 ms",
-        "sensors.pressure_noise=0.1 psi_d",
-        "sensors.pressure_bandwidth=4 kHz",
-    ),
-)
-"""Sensors that look inside a step, and follow so quickly that they shorten it."""
-MOVED = ("torque-task-moving-ankle", ("run.duration=0.3 s",))
-LOCKED = ("torque-task-anti-windup", ("run.duration=0.2 s",))
-"""Its valve stands wide open, so that the error would divide steps that a locked joint takes whole."""
 LED = "torque-task-proportional", ()
 """A locked ankle, which inputs lead."""
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "export.md").read_text(encoding="utf-8")
@@ -76,49 +57,6 @@ class Run:
         """Its outputs now."""
         self.call("read_outputs")(self.memory, self.numbers)
         return dict(zip(self.outputs, self.numbers, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("scenario", "channels", "seen"),
-    [
-        (FREE, ("command", "external_torque"), ("angle", "angular_velocity", "pressure_1", "torque")),
-        (SWUNG, ("command",), ("angle", "angular_velocity", "pressure_1", "torque", "supplied_mass")),
-        (LATE, ("command", "external_torque"), ("angle", "angular_velocity", "pressure_1", "leaked_mass")),
-        (MOVED, ("command",), ("angle", "angular_velocity", "pressure_1", "torque", "supplied_mass")),
-        (LOCKED, ("command", "angle", "angular_velocity"), ("pressure_1", "torque", "supplied_mass")),
-    ],
-)
-def test_under_the_commands_of_a_closed_loop_the_plant_in_c_moves_as_it_did(
-    scenario: tuple[str, tuple[str, ...]],
-    channels: tuple[str, ...],
-    seen: tuple[str, ...],
-    tmp_path: Path,
-) -> None:
-    recording = simulate(*scenario).recording
-    # A recording has no channel of the torque on the ankle of a leg: it is constant.
-    constant = (0.2,) if "ankle_torque" in plant_header(scenario) else ()
-    run = Run(tmp_path, scenario, len(channels) + len(constant))
-    largest = 0.0
-    for number in range(len(recording)):
-        given = [float(recording[name][max(number - 1, 0)]) for name in channels]
-        ended = (
-            run.call("step")(run.memory, *given, *constant)
-            if number
-            else run.call("initialise")(run.memory, run.settings, *given, *constant)
-        )
-        assert ended == 0
-        found = run.seen()
-        assert found["time"] == pytest.approx(number * 1e-3, abs=1e-12)
-        largest = max(largest, *(abs(found[name] - float(recording[name][number])) for name in seen))
-    assert largest == 0.0
-
-
-def plant_header(scenario: tuple[str, tuple[str, ...]]) -> str:
-    """The part of the header of a plant that declares its step."""
-    (header,) = (
-        content.decode() for file, content in plant_library(load_scenario(*scenario)).items() if file.endswith(".h")
-    )
-    return header[header.index("_step(") :]
 
 
 def test_an_input_that_is_no_number_leaves_the_run_as_it_was(tmp_path: Path) -> None:

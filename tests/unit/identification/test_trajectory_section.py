@@ -17,7 +17,7 @@ from ppafo.identification.problem import json_schema
 from ppafo.identification.source import UsedRecording, double_use
 from ppafo.parameters.device import Orifice
 from ppafo.parameters.loading import load_device, parameter_set_toml, parse_parameter_set
-from ppafo.report.finding import files_of, text_of
+from ppafo.report.finding import text_of
 from ppafo.rig.experiments import record
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
@@ -170,14 +170,6 @@ def test_the_document_has_all_that_the_fit_says(both: Identification) -> None:
     assert len(document["tolerances"]) > 15
 
 
-def test_every_recording_has_a_figure(both: Identification) -> None:
-    names = {"fit-step", "fit-replayed"}
-    files = files_of(finding_of(both))
-    pictures = {f"trajectory-{name}.{kind}" for name in names for kind in ("png", "svg")}
-    assert set(files) == pictures | {"fitted.toml", "identify.json", "identify.txt", "report.html"}
-    assert files["trajectory-fit-step.png"].startswith(b"\x89PNG")
-
-
 def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(both: Identification) -> None:
     text = text_of(finding_of(both))
     assert "trajectory (synthetic): 2 numbers fitted to 2 recordings" in text
@@ -269,17 +261,6 @@ def test_a_fit_that_contradicts_the_bench_says_so(solve: Solve) -> None:
         "friction.viscous_damping: fitted " in remark and ", bench procedure " in remark
         for remark in outcome.trajectory.remarks
     )
-
-
-def test_a_model_that_is_not_that_of_the_recordings_holds_for_itself_only(solve: Solve, laboratory: Path) -> None:
-    slow = 'scenario = "step-response"\noverrides = ["controller.command=0.1"]'
-    wrong = FIT.replace('scenario = "step-response"', slow).replace("valve.discharge_coefficient", "actuator.leak.area")
-    outcome = solve(wrong)
-    assert outcome.trajectory is not None
-    assert outcome.trajectory.fit.conflict
-    assert not any(estimate.is_identified for estimate in outcome.estimates)
-    assert not outcome.is_good
-    assert main(["identify", str(laboratory / "problem.toml")]) == 1
 
 
 def test_a_scenario_file_beside_the_problem_and_a_column_map_are_found(solve: Solve, laboratory: Path) -> None:

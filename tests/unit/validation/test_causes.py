@@ -28,8 +28,6 @@ from ppafo.validation.search import CauseSearch, SizedCause
 from ppafo.validation.settings import ReplaySettings
 
 ROOM = 101325.0
-AGAIN = (pytest.mark.long, pytest.mark.thorough)
-"""Marks of a value between two others that are tried everywhere."""
 SUPPLY = ["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g"]
 
 
@@ -336,7 +334,7 @@ def later(one: Recording, samples: int) -> Recording:
     return one
 
 
-@pytest.mark.parametrize("late", [22, *(pytest.param(late, marks=AGAIN) for late in (26, 50)), 38, 70])
+@pytest.mark.parametrize("late", [22, 38, 70])
 def test_a_delay_of_all_sensors_is_named_whole_beside_the_common_delay_that_is_taken_out(
     late: int, bench: Recording
 ) -> None:

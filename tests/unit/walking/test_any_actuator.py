@@ -7,14 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.engine.lanes import run_batch
-from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
-from ppafo.engine.run import batch_of
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.walking import load_walk, walk
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import WalkResult, compare_walks
 from tests.actuators import vane_of_others
@@ -101,14 +97,6 @@ def test_a_cylinder_brings_the_ankle_near_to_the_healthy_one() -> None:
     for sample in range(0, recording.time.size, 97):
         values = (float(recording[name][sample]) for name in ("angle", "pressure_1", "pressure_2"))
         assert recording["torque"][sample] == pytest.approx(actuator.torque(plant, *values), abs=1e-9)
-
-
-@pytest.mark.parametrize("actuator", [CYLINDER, BLADDER], ids=["cylinder", "bladder"])
-def test_compiled_and_in_python_a_walk_has_the_same_bits(actuator: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    batch = batch_of(plan_walk(with_duration(load_walk("proportional", [actuator, *NOISY]), 0.4)))
-    compiled = run_batch(batch)
-    monkeypatch.setenv(BACKEND_VARIABLE, PYTHON)
-    assert run_batch(batch).states.tobytes() == compiled.states.tobytes()
 
 
 class Watching:
