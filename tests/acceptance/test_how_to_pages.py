@@ -2,7 +2,6 @@
 
 import dataclasses
 import importlib
-import itertools
 import math
 import re
 import shlex
@@ -132,43 +131,6 @@ def test_the_controller_of_the_page_keeps_its_command_inside_the_band(hysteresis
     assert hysteresis.update(parameters, state, 2.0, above, 1e-3)[0] == -1.0
 
 
-def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteresis: ModuleType) -> None:
-    content = {
-        "schema_version": 1,
-        "name": "band",
-        "device": {"set": "ppafo2011"},
-        "run": {"duration": "0.5 s"},
-        "motion": {"kind": "locked", "angle": "75 deg"},
-        "controller": {"kind": "hysteresis", "rate": "200 Hz", "band": "0.3 N m"},
-        "reference": {"kind": "constant", "level": "2 N m"},
-    }
-    assert hysteresis.KIND.name not in set(CONTROLLERS)
-    wide = ppafo.simulate(scenario_from_dict(content, ["controller.band=1 N m"]))
-    narrow = ppafo.simulate(scenario_from_dict(content))
-    assert hysteresis.KIND.name == narrow.scenario.controller.kind
-    content["controller"] = tomllib.loads(extension("[controller]"))["controller"]
-    by_module = ppafo.simulate(scenario_from_dict(content))
-    assert by_module.scenario.controller.kind == "my_laws.hysteresis:KIND"
-    assert by_module.metrics == narrow.metrics
-    assert 1 <= wide.metrics["switchings"].value < narrow.metrics["switchings"].value
-
-
-@pytest.mark.usefixtures("hysteresis")
-def test_the_controller_of_the_page_walks() -> None:
-    words = shlex.split(extension("ppafo walk"))
-    overrides = [after for word, after in itertools.pairwise(words) if word == "--set"]
-    assert overrides[0] == "controller.kind=my_laws.hysteresis:KIND"
-    walked = ppafo.walk(words[2], minutes=0.1, overrides=overrides)
-    assert walked.status.is_completed
-    assert "safe_state_time" not in walked.metrics
-    assert walked.metrics["net_push_off_work"].value > 0.5
-    command = walked.recording["command"]
-    assert set(command.round(12)) <= {-1.0, 0.0, 1.0, VENT}
-    # By its short name, as step 3 of the page has it, it is the same controller.
-    named = ppafo.walk(words[2], minutes=0.1, overrides=["controller.kind=hysteresis", *overrides[1:]])
-    assert (named.recording["command"] == command).all()
-
-
 @pytest.fixture
 def three_position(install: Callable[..., ModuleType]) -> ModuleType:
     """The valve of the page, installed for the length of a test."""
@@ -215,16 +177,6 @@ WITHIN = ("actuator.angle_max=110 deg", "supply.pressure=60 kPa_g")
 """What keeps the elbow within the table."""
 
 
-def test_a_set_with_the_section_of_the_page_has_the_actuator_that_was_measured(elbow: Path) -> None:
-    device = ppafo.load_device(elbow, overrides=list(WITHIN))
-    actuator = device.actuator
-    assert (device.joint.name, device.joint.positive) == ("elbow", "extension")
-    same = ppafo.load_device(MEASURED / "measured-bladder.toml").actuator
-    assert actuator.kind == "table"
-    assert actuator.settings == same.settings
-    assert actuator.table == same.table
-
-
 def test_the_elbow_ends_where_the_page_says_with_the_observed_load_and_without(elbow: Path) -> None:
     page = (Path(ppafo.__file__).parents[2] / "docs" / "how-to" / "control-an-angle.md").read_text(encoding="utf-8")
     written = tomllib.loads(block_with("how-to/control-an-angle.md", 'kind = "cascade"'))
@@ -265,14 +217,6 @@ def test_the_actuator_of_the_page_pulls_as_its_catalogue_prints_by_entry_point_a
         cosine = 0.2 / thread
         force = 6.0e5 * thread**2 * (3.0 * cosine**2 - 1.0) / (4.0 * math.pi * turns**2)
         assert 4.0 * force == pytest.approx(6000.0, rel=0.01)
-
-
-@pytest.mark.usefixtures("muscles")
-def test_the_step_response_of_the_actuator_of_the_page_agrees_with_the_reference_solver() -> None:
-    scenario = ppafo.load_scenario(MUSCLES / "step-response-muscles.toml", ["run.duration=0.3 s"])
-    agreement = compare_with_reference(plan_run(scenario))
-    assert agreement.angle < 2e-4
-    assert agreement.worst_pressure < 1e-3
 
 
 @pytest.mark.thorough

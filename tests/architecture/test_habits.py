@@ -1,33 +1,11 @@
-"""Habits that no linter knows: rows are built by keyword, every test can fail."""
+"""A habit that no linter knows: every test can fail."""
 
 import ast
-from collections.abc import Iterator, Mapping
-from functools import cache
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 CHECKERS = ("assert", "check", "raises", "warns", "fail")
-
-Rows = Mapping[tuple[str, str], int]
-
-
-@cache
-def trees() -> Mapping[Path, ast.Module]:
-    return {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted((ROOT / "src").rglob("*.py"))}
-
-
-def module_of(path: Path) -> str:
-    return ".".join(path.relative_to(ROOT / "src").with_suffix("").parts).removesuffix(".__init__")
-
-
-def rows() -> Rows:
-    """Number of fields of every NamedTuple, by module and name."""
-    return {
-        (module_of(path), node.name): sum(isinstance(item, ast.AnnAssign) for item in node.body)
-        for path, tree in trees().items()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ClassDef) and any(ast.unparse(base) == "NamedTuple" for base in node.bases)
-    }
 
 
 def silent_tests(tree: ast.Module) -> Iterator[str]:

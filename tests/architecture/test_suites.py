@@ -14,17 +14,6 @@ from tests.repeatable import TOO_SLOW
 
 ROOT = Path(__file__).parents[2]
 needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="no make on this machine")
-BURNS = """
-import pytest
-
-def test_a():
-    assert sum(range(20_000_000)) > 1
-
-@pytest.mark.short
-def test_b():
-    assert sum(range(20_000_000)) > 1
-"""
-"""Tests of about half a second of CPU time."""
 
 
 def words_of(target: str) -> list[str]:
@@ -39,22 +28,6 @@ def test_make_test_leaves_out_what_is_long_and_make_test_all_nothing() -> None:
     short, everything = words_of("test"), words_of("test-all")
     assert [word for word in short if word not in everything] == ["-m", "not long"]
     assert [word for word in everything if word not in short] == []
-
-
-@pytest.fixture
-def costly(tmp_path: Path) -> Path:
-    """A folder with a costly file and a light one, of which nothing is recorded, and limits that are soon reached."""
-    (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
-    (tmp_path / "conftest.py").write_text(
-        "from pathlib import Path\nfrom tests import costs\npytest_plugins = ('tests.costs',)\n"
-        "costs.RECORDED = Path(__file__).parent / 'tests' / 'costs.toml'\n"
-        "costs.LONG, costs.NOTED, costs.LARGEST, costs.SHOWN = 0.05, 0.05, 0.1, 0.05\n",
-        encoding="utf-8",
-    )
-    (tmp_path / "tests").mkdir()
-    (tmp_path / "tests" / "test_burns.py").write_text(BURNS, encoding="utf-8")
-    (tmp_path / "tests" / "test_light.py").write_text("def test_c():\n    assert True\n", encoding="utf-8")
-    return tmp_path
 
 
 def test_the_recorded_files_and_tests_are_there() -> None:

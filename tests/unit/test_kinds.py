@@ -12,11 +12,10 @@ import ppafo
 from ppafo import plugins
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.errors import KindError, ScenarioError, StudyError
+from ppafo.errors import KindError, ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.metrics import METRICS
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.walking import load_walk
 
 LAW = """
 from dataclasses import replace
@@ -102,29 +101,6 @@ def test_what_is_no_law_of_that_name_is_refused(install: Install, text: str, pro
     install("odd_laws", text, controllers="odd")
     with pytest.raises(KindError, match=problem):
         CONTROLLERS["odd"]
-
-
-@pytest.mark.parametrize("name", ["BANG", "bang", "Bang", "reversing", "anything"])
-def test_a_name_without_its_module_is_told_the_object_of_the_plugin(
-    install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    (tmp_path / "broken.py").write_text("raise RuntimeError")
-    text = LAW.format(name="on_off", call="reversing").replace("KIND", "BANG")
-    (tmp_path / "bang.py").write_text(f"{text}from ppafo.metrics import METRICS\nMINE = METRICS['rms_error']\n")
-    monkeypatch.setattr(plugins, "_named", {})
-    monkeypatch.setenv(plugins.VARIABLE, "")
-    both, before = [tmp_path / "broken.py", tmp_path / "bang.py"], [*CONTROLLERS, *WALKING_CONTROLLERS, *METRICS]
-    hint = "" if name == "anything" else ", did you mean 'bang:BANG'\\?"
-    for load, task in ((ppafo.load_scenario, "torque-task-proportional"), (load_walk, "proportional")):
-        with pytest.raises(ScenarioError, match=rf"kind = '{name}' is not known{hint}; allowed: [^:]*$"):
-            load(task, [f"controller.kind={name}"], plugins=both)
-        # A controller is no motion, and no metric.
-        with pytest.raises(ScenarioError, match=r"is not known; allowed: [^:]*$"):
-            load(task, [f"motion.kind={name}"])
-    with pytest.raises(StudyError, match="no metric 'MINE', did you mean 'bang:MINE'"):
-        ppafo.find("torque-task-proportional", vary="reference.level=1..3 N m", such_that="MINE <= 1 N m")
-    assert [*CONTROLLERS, *WALKING_CONTROLLERS, *METRICS] == before
-    assert load_scenario("torque-task-proportional", ["controller.kind=bang:BANG"]).controller.kind == "bang:BANG"
 
 
 def test_a_law_is_named_by_module_and_object_from_the_working_folder(

@@ -1,7 +1,6 @@
 """Words that the command line does not understand, and output that nobody can take."""
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -41,25 +40,6 @@ def test_what_comes_with_the_package_is_listed_by_name_with_what_it_is(
     assert {row["name"] for row in rows} >= set(names)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["si\nmulate"], "there is no command 'si mulate', did you mean 'simulate'?"),
-        (["export", "figure", "a\nb"], "a b"),
-        (["sets", "audit", "a\nb"], "a b"),
-        (["simulate", "a\nb.toml"], "a b"),
-        (["doctor", "--schema", "a\nb"], "a b"),
-    ],
-)
-def test_a_line_break_in_a_word_does_not_break_the_line_of_the_message(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(words) == 2
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
-
-
 @pytest.mark.skipif(not FULL.exists(), reason="there is no full device here")
 @pytest.mark.parametrize(
     "words",
@@ -72,16 +52,6 @@ def test_output_that_cannot_be_written_is_one_line_and_exit_code_2(words: list[s
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.stderr == "ppafo: cannot write to standard output: no space left on device\n"
     assert done.returncode == 2
-
-
-def test_a_reader_that_has_gone_is_no_mistake() -> None:
-    code = "import sys; from ppafo.cli.main import main; sys.exit(main(['sets', 'list']))"
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        process.stdout.close()
-        assert process.stderr.read() == b""
-        assert process.wait(timeout=30) == 0
 
 
 @pytest.mark.parametrize(
@@ -101,14 +71,6 @@ def test_name_that_is_not_utf_8_is_refused_before_anything_runs(
     assert "is not valid UTF-8; rename the file or folder" in said
     assert said.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
-
-
-def test_terminal_that_cannot_show_a_character_gets_its_escape() -> None:
-    code = "from ppafo.cli.output import print_result; print_result('5 \\u00b0 \\udcff', {'a': '\\udcff'}, False)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], env={**os.environ, "PYTHONIOENCODING": "ascii"}, capture_output=True, check=True
-    )
-    assert done.stdout == b"5 \\xb0 \\udcff\n"
 
 
 MANY = "9" * 5000

@@ -1,26 +1,20 @@
 """Laws on a valve that opens beyond a dead band: every law of the catalogues that asks for openings knows it."""
 
-import numpy as np
 import pytest
 
 import ppafo
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.controllers.switching import CONSTANT, ON_OFF, ON_OFF_DEAD_ZONE
+from ppafo.control.controllers.switching import CONSTANT, ON_OFF
 from ppafo.control.kind import nominal_term
 from ppafo.control.torque_loop import OPENING
 from ppafo.control.walking.catalog import walking_controllers
-from ppafo.engine.loading import PYTHON
-from ppafo.running import simulate
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import with_duration
-from tests.doors.of_python import run_by
 
 OUTSIDE = ("hysteresis",)
 """Laws of the tests' own plugins."""
 WHOLE = {CONSTANT.name, ON_OFF.name, "on_off_fixed_point", "event_on_off", "off"}
 """Laws whose command is what is given, or full opening: there is nothing to be made up for."""
 TASK = "torque-task-slow-valve"
-SHORT = ("valve.dead_band=0.3", "run.duration=60 ms", "reference.ramp_time=30 ms")
 
 
 def test_every_law_that_asks_for_openings_follows_the_dead_band_of_its_valve() -> None:
@@ -40,29 +34,6 @@ def test_a_dead_band_that_a_law_believes_in_costs_it_nothing(kind: str) -> None:
         ppafo.simulate(TASK, [*changes, f"valve.dead_band={band}"]).metrics["rms_error"].value for band in (0.0, 0.3)
     ]
     assert errors[1] == pytest.approx(errors[0], rel=0.02)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", sorted({*CONTROLLERS} - {CONSTANT.name, "cascade", *OUTSIDE}))
-def test_compiled_laws_have_the_bits_of_python_beyond_a_dead_band(kind: str) -> None:
-    scenario = ppafo.load_scenario(TASK, [f"controller.kind={kind}", *SHORT])
-    runs = []
-    for backend in (PYTHON, ""):
-        with run_by(backend):
-            runs.append(ppafo.simulate(scenario).recording["command"])
-    assert runs[0].tobytes() == runs[1].tobytes()
-    assert kind in (ON_OFF.name, ON_OFF_DEAD_ZONE.name) or np.max(np.abs(runs[0])) > 0.3
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", ["event_proportional", "event_damped_learning"])
-def test_compiled_laws_that_walk_have_the_bits_of_python_beyond_a_dead_band(kind: str) -> None:
-    scenario = with_duration(load_walk("proportional", [f"controller.kind={kind}", "valve.dead_band=0.3"]), 1.0)
-    runs = []
-    for backend in (PYTHON, ""):
-        with run_by(backend):
-            runs.append(simulate(scenario).recording["torque"])
-    assert runs[0].tobytes() == runs[1].tobytes()
 
 
 @pytest.mark.long
