@@ -230,7 +230,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
         "platforms": tested("FMUs for other computers", "Wine, QEMU", "tests/unit/exports/test_fmu_platforms.py"),
         "wasm": tested("WebAssembly", "node", "tests/unit/exports/test_wasm.py"),
         "page": tested("The page that simulates", "Chromium, Firefox, WebKit; axe-core; Python", "tests/unit/live"),
-        "firmware": tested("The controller on processors", "mspdebug, QEMU", "tests/unit/exports/test_firmware.py"),
+        "firmware": tested("The controller on its processor", "mspdebug", "tests/unit/exports/test_firmware.py"),
     },
     "Identification and statistics": {
         "real": tested(
@@ -251,7 +251,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
 NOT_JUDGED = (
     "No recording of the paper's device: its curves are not available, so its validation cannot be repeated.",
     "No person has worn anything that ppafo designed; the gait is prescribed and does not answer the device.",
-    "No board: firmware has run on simulators of the processors only.",
+    "No board: firmware has run on a simulator of its processor only.",
     "No graphics card: kernels for one have run on the processor.",
     "No Mac, and Windows and 64-bit ARM only as emulated.",
     "How far the gas is from that of the paper's device, whose volumes and gains are not printed.",

@@ -73,4 +73,6 @@ def test_tuning_walk_and_firmware_give_what_the_page_says(names: Mapping[str, An
     assert "some 7 % of what a healthy ankle gives" in PAGE
     assert round(100.0 * names["walked"].metrics["push_off_share"].value) == 7
     assert (names["folder"] / "firmware" / "controller.c").is_file()
-    assert "the same bits as without the processor" in names["printed"] or "there is no mspdebug" in names["printed"]
+    assert (
+        "0 different from the fixed-point controller" in names["printed"] or "there is no mspdebug" in names["printed"]
+    )

@@ -1,1 +1,1 @@
-"""Controller on a small processor: fixed-point laws, firmware, and processor in the loop."""
+"""Controller on a small processor: fixed-point laws, their firmware, and its trial on a simulator."""

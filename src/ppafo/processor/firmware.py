@@ -1,134 +1,52 @@
-"""Firmware of a controller for a small processor: range proof, C translation, board layer, make file."""
+"""Firmware of a controller for the paper's processor, an MSP430F2013: law in C, numbers, board layer, make file."""
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple, get_type_hints
-
-from ppafo.control.catalog import CONTROLLERS, FIXED_POINT
-from ppafo.engine.rows import is_number, is_row, leaf_paths, leaves, members, rebuilt
-from ppafo.engine.source_text import SourceCollector
-from ppafo.errors import ProgramError, ScenarioError
+from ppafo.control.catalog import CONTROLLERS
 from ppafo.exports import filled, in_markdown, template
-from ppafo.model.controlled import TORQUE
-from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
-from ppafo.processor.catalog import TARGETS, target_of
-from ppafo.processor.fixed_point import (
-    COMMAND_STEPS,
-    LARGEST_READING,
-    SETTINGS,
-    ConverterCounts,
-    ConverterLimits,
-    CountResolution,
-)
-from ppafo.processor.torque_laws.catalog import FIXED_LAWS
-from ppafo.processor.torque_laws.law import FixedLaw
-from ppafo.simulation.nominal import converter_range
-from ppafo.simulation.plan import plan_run
+from ppafo.processor.controller import TICK, FixedPointController, fixed_point_controller
+from ppafo.processor.fixed_point import SETTINGS
+from ppafo.processor.law_in_c import law_source, macro
 from ppafo.simulation.scenario import Scenario
-from ppafo.translation.c99 import c_source, documents_of
-from ppafo.translation.value_types import INT, Row
-from ppafo.translation.walk import walk_module
-from ppafo.translation.widths import IntegerRange, Narrowed, Range, hull, narrowed
 from ppafo.units.shown import written_text
 from ppafo.version import __version__
 
-PRELUDE = "prelude_whole.h"
-_NUMBER = r"(?:bool|int16_t|int32_t) \w+"
-_OF_NUMBERS = re.compile(rf"^PPAFO_INLINE(?= {_NUMBER}\((?:{_NUMBER},\s+)*{_NUMBER}\)$)", re.MULTILINE)
-"""Pattern of the qualifier of a C function whose parameters and result are numbers."""
+_LONGEST_FEEDING = 2.05e-3
+"""Time after which the watchdog resets a processor that does not feed it [s]."""
+_TEMPLATES = (
+    *("Makefile", "README.md", "board.h", "board_msp430f2013.c", "board_simulated.c", "controller.h", "host.c"),
+    *("main.c", "msp430f2013.ld", "start_msp430.c"),
+)
 
 
-def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
-    """Prove the integer widths of a law; return its typed functions, and ranges of command and next state.
-
-    The proof covers every number in the declared ranges of ``numbers`` (default: the numbers of the law), every state
-    in the ranges of the law, and every reading. Raises ProgramError if a value may exceed 32 bits, or the next state
-    its ranges.
-    """
-    collector = SourceCollector("")
-    entry = collector.add(law.sample)
-    state = type(law.begins)
-    parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, ConverterCounts))
-    module = walk_module(collector.text(), {entry: parameters})
-    declared = (
-        IntegerRange(int(quantity.minimum), int(quantity.maximum)) for quantity in numbers or law.number_quantities
-    )
-    own_names = (path.rpartition(".")[2] for path in leaf_paths(state, ""))
-    ranges: dict[str, Range] = {
-        "numbers": _nested(law.numbers, declared),
-        "state": _nested(state, (IntegerRange(*law.state_ranges[name]) for name in own_names)),
-        "readings": (IntegerRange(0, LARGEST_READING),) * len(ConverterCounts._fields),
+def firmware(scenario: Scenario) -> dict[str, bytes]:
+    """Return the firmware files of a controller by name. Raises ScenarioError without an integer form."""
+    fixed = fixed_point_controller(scenario)
+    scenario, steps, (top, middle) = fixed.scenario, fixed.steps, fixed.limits
+    words = {
+        "title": scenario.name,
+        "description": in_markdown(scenario.description),
+        "kind": fixed.law.kind.name,
+        "version": __version__,
+        "period": written_text(scenario.controller.period, "s"),
+        "range": f"{scenario.controller.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
+        "step": f"{steps.pressure_step:.4g} Pa",
+        "torque_step": f"{steps.torque_step * 1.0e3:.4g} mN m",
+        "lowest": f"{-middle * steps.torque_step:.4g} N m",
+        "highest": f"{(top - middle) * steps.torque_step:.4g} N m",
+        "silence": f"{(2 * fixed.ticks * TICK + _LONGEST_FEEDING) * 1.0e3:.4g} ms",
     }
-    proved = narrowed(module, ranges)
-    allowed: Range = (IntegerRange(-COMMAND_STEPS, COMMAND_STEPS), ranges["state"])
-    # Within it where the hull of both is no wider.
-    if hull(proved.returned, allowed) != allowed:
-        raise ProgramError(
-            f"{law.kind.name}: in fixed-point arithmetic, the command or the state can leave its allowed range: "
-            f"{proved.returned}"
-        )
-    return proved
+    texts = {name: filled(template("ppafo.processor", name), words) for name in _TEMPLATES}
+    texts["LICENSE"] = template("ppafo.exports.c_library", "LICENSE")
+    texts["controller.c"] = law_source(fixed.law)
+    texts["parameters.h"] = parameters_header(fixed)
+    return {name: text.encode() for name, text in sorted(texts.items())}
 
 
-def law_source(law: FixedLaw) -> str:
-    """Return the C source of a law, with its state and the numbers of ``parameters.h``."""
-    collector = SourceCollector("")
-    entry = collector.add(law.sample)
-    documents = documents_of(collector)
-    title = f"The controller '{law.kind.name}' of ppafo {__version__} in fixed point. Not to be edited."
-    text = c_source(proof(law).module, documents, title, prelude=PRELUDE)
-    text = _OF_NUMBERS.sub("PPAFO_CALLED", text)
-    numbers, state, readings = (
-        collector.add(row_type) for row_type in (law.numbers, type(law.begins), ConverterCounts)
-    )
-    numbers_in_c = rebuilt(law.numbers, [macro(quantity) for quantity in law.number_quantities])
-    parameters = ", ".join(f"int16_t {name}" for name in ConverterCounts._fields)
-    return f"""#include "controller.h"
-
-#include "parameters.h"
-
-{text}
-static {state} state;
-
-void controller_begin(void)
-{{
-    static const {state} begin = {_written(law.begins)};
-    state = begin;
-}}
-
-int16_t controller_sample({parameters})
-{{
-    static const {numbers} numbers = {_written(numbers_in_c)};
-    const {readings} readings = {{{", ".join(ConverterCounts._fields)}}};
-    const {entry}_result result = {entry}(numbers, state, readings);
-    state = result.item_1;
-    return result.item_0;
-}}
-
-bool controller_is_sound(void)
-{{
-    return state.sound == 1;
-}}
-"""
-
-
-def _written(row: Any) -> str:
-    """Return the C initialiser of a NamedTuple, nested NamedTuples included."""
-    return "{" + ", ".join(_written(part) if isinstance(part, tuple) else str(part) for part in row) + "}"
-
-
-def macro(quantity: Quantity) -> str:
-    """Return the macro name of a number in ``parameters.h``."""
-    return f"CONTROLLER_{quantity.name.upper()}"
-
-
-def parameters_header(fixed: "FixedPointController") -> str:
+def parameters_header(fixed: FixedPointController) -> str:
     """Return ``parameters.h``: the numbers of a law with unit, meaning, origin and range check."""
     scenario, law = fixed.scenario, fixed.law
     control = scenario.controller
-    declared: dict[str, Quantity] = {quantity.name: quantity for quantity in CONTROLLERS[control.kind].quantities}
+    declared = {quantity.name: quantity for quantity in CONTROLLERS[control.kind].quantities}
     source = scenario.origin.file or "a scenario without a file"
     settings = (
         f"{name} {value:.9g} {declared[name].unit} (controller.{name})".replace("  ", " ")
@@ -156,108 +74,3 @@ def parameters_header(fixed: "FixedPointController") -> str:
         lines += [f"#if {macro(quantity)} < {quantity.minimum:.0f} || {macro(quantity)} > {quantity.maximum:.0f}"]
         lines += [f'#error "{macro(quantity)} is beyond its range"', "#endif"]
     return "\n".join([*lines, "", "#endif", ""])
-
-
-def _nested(row: type, ranges: Iterator[IntegerRange]) -> Range:
-    """Arrange ranges of numbers in the nested form of a NamedTuple."""
-    return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
-
-
-def _typed_row(kind: Any, collector: SourceCollector) -> Row:
-    """Return the row type of a NamedTuple of integers."""
-    hints = get_type_hints(kind)
-    fields = tuple((name, _typed_row(hints[name], collector) if is_row(hints[name]) else INT) for name in kind._fields)
-    return Row(collector.add(kind), fields)
-
-
-TICK = 125.0e-6
-"""Timer tick [s], the unit of the sample period."""
-MOST_TICKS = 32767
-"""Largest number of timer ticks in a signed 16-bit integer."""
-_TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controller.h", "host.c", "main.c")
-
-
-class FixedPointController(NamedTuple):
-    """Integer controller: scenario, law, integers by name, converter resolution and limits, timer ticks per sample."""
-
-    scenario: Scenario
-    law: FixedLaw
-    numbers: Mapping[str, float]
-    steps: CountResolution
-    limits: ConverterLimits
-    ticks: int
-
-
-def integer_form(scenario: Scenario) -> Scenario:
-    """Return a scenario with its controller in integer arithmetic, with default converter settings.
-
-    Raises ScenarioError if the controller has no integer form.
-    """
-    kind = scenario.controller.kind
-    if scenario.controlled != TORQUE:
-        raise ScenarioError(
-            f"{scenario.name}: reference.of = '{scenario.controlled}': a fixed-point controller follows a torque "
-            f"only; give a scenario with reference.of = 'torque'"
-        )
-    if kind in FIXED_LAWS:
-        return scenario
-    if f"{kind}{FIXED_POINT}" not in FIXED_LAWS:
-        raise ScenarioError(
-            f"{scenario.name}: the controller '{kind}' has no fixed-point form; available: "
-            f"{', '.join(name.removesuffix(FIXED_POINT) for name in FIXED_LAWS)}"
-        )
-    scenario.device.check_torque_constant("a fixed-point controller")
-    supply, (bits, pressure_range) = scenario.device.supply, SETTINGS
-    shown = converter_range(float(supply.pressure), float(supply.dorsiflexion_pressure))
-    settings = {**scenario.controller.settings, bits.name: bits.default or 0.0, pressure_range.name: shown}
-    return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{FIXED_POINT}", settings=settings))
-
-
-def fixed_point_controller(scenario: Scenario) -> FixedPointController:
-    """Return the integer controller of a scenario. Raises ScenarioError if the timer cannot produce its period."""
-    scenario = integer_form(scenario)
-    period = scenario.controller.period
-    ticks = round(period / TICK)
-    # Half of the range: the watchdog waits for two sample periods.
-    if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:
-        raise ScenarioError(
-            f"{scenario.name}: controller.period = {period:.9g} s: must be a multiple of 0.125 ms on the processor, "
-            f"at most {MOST_TICKS // 2 * TICK:.3g} s"
-        )
-    law = FIXED_LAWS[scenario.controller.kind]
-    row = plan_run(scenario).controller
-    numbers = dict(zip((quantity.name for quantity in law.number_quantities), leaves(row.numbers), strict=True))
-    return FixedPointController(
-        scenario=scenario, law=law, numbers=numbers, steps=row.steps, limits=row.numbers.limits, ticks=ticks
-    )
-
-
-def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
-    """Return the firmware files of a controller by name. Raises ScenarioError without an integer form."""
-    chosen = target_of(target)
-    fixed = fixed_point_controller(scenario)
-    scenario, steps, (top, middle) = fixed.scenario, fixed.steps, fixed.limits
-    words = {
-        "title": scenario.name,
-        "description": in_markdown(scenario.description),
-        "kind": fixed.law.kind.name,
-        "target": chosen.name,
-        "processor": chosen.processor,
-        "board": chosen.board,
-        "own_bits": str(chosen.converter_bits),
-        "version": __version__,
-        "period": written_text(scenario.controller.period, "s"),
-        "range": f"{scenario.controller.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
-        "step": f"{steps.pressure_step:.4g} Pa",
-        "torque_step": f"{steps.torque_step * 1.0e3:.4g} mN m",
-        "lowest": f"{-middle * steps.torque_step:.4g} N m",
-        "highest": f"{(top - middle) * steps.torque_step:.4g} N m",
-        "silence": f"{(2 * fixed.ticks * TICK + 2.05e-3) * 1.0e3:.4g} ms",
-        **chosen.words,
-    }
-    words["wiring"] = filled(template("ppafo.processor", chosen.wiring), words).rstrip()
-    texts = {name: filled(template("ppafo.processor", name), words) for name in (*_TEMPLATES, *chosen.templates)}
-    texts["LICENSE"] = template("ppafo.exports.c_library", "LICENSE")
-    texts["controller.c"] = law_source(fixed.law)
-    texts["parameters.h"] = parameters_header(fixed)
-    return {name: text.encode() for name, text in sorted(texts.items())}

@@ -12,6 +12,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.torque_loop import beyond_dead_band
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.model.sensors import Measurement
+from ppafo.processor.controller import FIXED_LAWS
 from ppafo.processor.fixed_point import (
     COMMAND_STEPS,
     FRACTION_BITS,
@@ -28,7 +29,6 @@ from ppafo.processor.fixed_point import (
     read,
     shifted,
 )
-from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.processor.torque_laws.pid import FULL, PID, largest_pid
 

@@ -2,26 +2,31 @@
 
 import shutil
 import subprocess
-import sys
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 import ppafo.cli
-from ppafo.errors import ProgramError, ScenarioError
-from ppafo.processor.catalog import CATALOG
-from ppafo.processor.firmware import firmware, fixed_point_controller, proof
-from ppafo.processor.fixed_point import ConverterCounts
-from ppafo.processor.images import Target, make_firmware, missing_tools, processor_simulator, read_image, sizes
-from ppafo.processor.lock_step import PythonProcessor, compare_drawn, drawn_readings, run_on_processor
-from ppafo.processor.qemu import QemuSimulator
-from ppafo.processor.torque_laws.catalog import FIXED_LAWS
+from ppafo.errors import ProgramError, ScenarioError, SimulationError
+from ppafo.processor.controller import FIXED_LAWS, PythonProcessor, fixed_point_controller
+from ppafo.processor.firmware import firmware
+from ppafo.processor.law_in_c import proof
+from ppafo.processor.simulated import (
+    CLOCK,
+    FLASH,
+    INTERRUPT_STACK,
+    RAM,
+    build_firmware,
+    drawn_readings,
+    missing_tools,
+    try_firmware,
+)
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import add_files
+from ppafo.translation.compiling import asked
 from ppafo.translation.widths import IntegerRange
 
 SCENARIOS = {
@@ -40,21 +45,7 @@ SCENARIOS = {
     "on_off": ("torque-task-solenoid", "controller.kind=on_off_fixed_point"),
     "on_off_dead_zone": ("torque-task-proportional", "controller.kind=on_off_dead_zone_fixed_point"),
 }
-MSP430, CORTEX_M0, CORTEX_M4 = CATALOG.values()
-
-
-def if_here(target: Target) -> pytest.MarkDecorator:
-    """Skip where a tool of the target is missing."""
-    missing = missing_tools(target)
-    return pytest.mark.skipif(bool(missing), reason=f"not on this machine: {', '.join(missing)}")
-
-
-every_target = pytest.mark.parametrize(
-    "target", [pytest.param(item, marks=if_here(item), id=item.name) for item in CATALOG.values()]
-)
-on_cortex = pytest.mark.parametrize(
-    "target", [pytest.param(item, marks=if_here(item), id=item.name) for item in (CORTEX_M0, CORTEX_M4)]
-)
+if_simulated = pytest.mark.skipif(bool(missing_tools()), reason=f"not on this machine: {', '.join(missing_tools())}")
 with_compiler = pytest.mark.skipif(
     shutil.which("make") is None or shutil.which("cc") is None, reason="no make or no cc on this machine"
 )
@@ -89,8 +80,9 @@ def test_a_state_that_may_leave_a_narrower_range_is_not_proved() -> None:
 def test_a_converter_of_sixteen_bits_is_not_proved() -> None:
     law = FIXED_LAWS["pid_fixed_point"]
     wider = [replace(item, maximum=item.maximum * 2.0 + 1.0) for item in law.number_quantities[:2]]
+    others = [replace(item, maximum=65535.0) for item in law.number_quantities[2:]]
     with pytest.raises(ProgramError):
-        proof(law, (*wider, *(replace(item, maximum=65535.0) for item in law.number_quantities[2:])))
+        proof(replace(law, number_quantities=(*wider, *others)))
 
 
 def test_drawn_readings_reach_edges_saturation_and_faults() -> None:
@@ -108,7 +100,8 @@ def test_drawn_readings_reach_edges_saturation_and_faults() -> None:
 def test_the_c_of_a_law_decides_as_python_does_under_the_sanitizer(tmp_path: Path, law: str) -> None:
     scenario = scenario_of(law)
     add_files(tmp_path, firmware(scenario))
-    make_firmware(tmp_path, ("host", "checked"))
+    for goal in ("host", "checked"):
+        build_firmware(tmp_path, goal)
     fixed = PythonProcessor(fixed_point_controller(scenario))
     lines, wanted = [], []
     for number, readings in enumerate(drawn_readings(int(fixed_point_controller(scenario).limits.top), 20_000, 5)):
@@ -125,90 +118,38 @@ def test_the_c_of_a_law_decides_as_python_does_under_the_sanitizer(tmp_path: Pat
         assert done.stderr == ""
 
 
-@every_target
+@if_simulated
 @pytest.mark.parametrize("law", SCENARIOS)
-def test_the_processor_decides_as_python_does_within_its_memory_and_time(law: str, target: Target) -> None:
+def test_the_processor_decides_as_python_does_within_its_memory_and_time(law: str) -> None:
     scenario = scenario_of(law)
-    found = compare_drawn(scenario, 600, seed=2, target=target.name)
-    assert found.first_difference == ""
-    assert found.differences == 0
-    cost = found.cost
-    assert 0 < cost.sizes.flash <= min(2048, len(target.flash))
-    assert cost.stack > 0
-    # The controller and its layer, without the vectors of a Cortex-M and the words that it puts on the stack at once.
-    assert cost.sizes.data + cost.stack + target.interrupt_stack <= (128 if target is MSP430 else 160)
-    # Instructions of a Cortex-M take up to four cycles where no block of registers is moved.
-    longest = 1.0 if target.counted == "cycles" else 4.0
-    assert 0 < cost.mean <= cost.worst <= 0.5 * target.clock * scenario.controller.period / longest
+    found = try_firmware(scenario, 600, seed=2)
+    assert (found.samples, found.differences, found.first_difference) == (600, 0, "")
+    assert 0 < found.flash <= FLASH
+    assert 10 < found.ram <= RAM - INTERRUPT_STACK
+    assert 0 < found.mean_cycles <= found.worst_cycles <= 0.5 * CLOCK * scenario.controller.period
 
 
-@every_target
-@pytest.mark.parametrize("law", ["pid", "on_off"])
-def test_the_torque_task_with_the_processor_in_charge_has_the_bits_of_the_lanes(law: str, target: Target) -> None:
-    found = run_on_processor(scenario_of(law, "run.duration=0.3 s"), target.name)
-    assert found.samples == (300 if law == "pid" else 6)
-    assert found.differences == 0
-    assert found.same_bits
-    assert len(set(found.processor.recording["command"])) > 1 or law == "on_off"
-
-
-@on_cortex
-def test_instructions_are_as_many_as_single_steps(target: Target) -> None:
-    scenario = scenario_of("pid")
-    readings = ConverterCounts(2000, 1500, 1502)
-    with processor_simulator(firmware(scenario, target.name), target) as (simulator, image):
-        assert isinstance(simulator, QemuSimulator)
-        counted = simulator.samples([readings, readings])[1].work
-        debugger, stop = simulator.debugger, image.symbols["simulated_stop"] & ~1
-        debugger.packet(f"z0,{stop:x},2")
-        steps, place = 0, 0
-        while place != stop:
-            debugger.packet("s")
-            steps += 1
-            # Register 15 is the program counter.
-            place = int.from_bytes(bytes.fromhex(debugger.packet("g")[120:128]), "little")
-    # From the stop to the first look at the counter three instructions, from the last look to the stop two.
-    assert steps - 5 == counted
-
-
-@on_cortex
-@pytest.mark.parametrize("compiler", ["clang", "zig"])
-def test_other_compilers_build_for_a_cortex_too(target: Target, compiler: str, tmp_path: Path) -> None:
-    zig = find_spec("ziglang")
-    if compiler == "clang" and not (shutil.which("clang") and shutil.which("ld.lld")):
-        pytest.skip("no clang or no lld on this machine")
-    if compiler == "zig" and zig is None:
-        pytest.skip("no zig on this machine")
-    name = target.name.replace("-", "_")
-    given = {
-        "clang": ["COMPILER=clang --target=arm-none-eabi", "LINKER=$(COMPILER) -fuse-ld=lld"],
-        "zig": [
-            f"COMPILER={sys.executable} -m ziglang cc -target thumb-freestanding-eabi -mcpu={name}",
-            "PROCESSOR=",
-        ],
-    }
-    add_files(tmp_path, firmware(scenario_of("pid"), target.name))
-    make_firmware(tmp_path, ["all", *given[compiler]])
-    simulator = target.simulator(target, read_image(tmp_path, target))
-    fixed = PythonProcessor(fixed_point_controller(scenario_of("pid")))
-    for readings in drawn_readings(4095, 100, 3):
-        assert simulator.samples([readings])[0][:2] == fixed.sample(readings)
-    simulator.close()
-
-
-@every_target
-def test_a_processor_with_other_numbers_is_found_out(
-    target: Target, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    scenario = scenario_of("pid")
-    wrong = firmware(scenario_of("pid", "controller.proportional_gain=0.0951 1/(N m)"), target.name)
-    monkeypatch.setattr("ppafo.processor.lock_step.firmware", lambda *_: wrong)
-    found = compare_drawn(scenario, 400, target=target.name)
+@if_simulated
+def test_a_processor_with_other_numbers_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = firmware(scenario_of("pid", "controller.proportional_gain=0.0951 1/(N m)"))
+    monkeypatch.setattr("ppafo.processor.simulated.firmware", lambda _: wrong)
+    found = try_firmware(scenario_of("pid"), 400)
     assert found.differences > 0
     assert "on the processor" in found.first_difference
-    add_files(tmp_path, wrong)
-    make_firmware(tmp_path)
-    assert sizes(tmp_path / "firmware.elf", target).flash > sizes(tmp_path / "simulated.elf", target).flash
+
+
+@if_simulated
+def test_a_simulator_that_ends_early_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ppafo.processor.simulated.asked", lambda line, **given: asked([*line[:-1], "exit"], **given))
+    monkeypatch.setattr("ppafo.processor.simulated.build_firmware", lambda _: None)
+    with pytest.raises(SimulationError, match="answered 0 of 5 samples"):
+        try_firmware(scenario_of("pid"), 5)
+
+
+def test_tools_that_are_missing_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ppafo.processor.simulated.which", lambda tool: None if tool == "mspdebug" else tool)
+    with pytest.raises(SimulationError, match="needs mspdebug; install"):
+        try_firmware(scenario_of("pid"), 5)
 
 
 def test_numbers_stand_in_a_header_with_range_and_origin() -> None:
@@ -243,8 +184,3 @@ def test_gains_that_nobody_gives_are_the_devices_in_firmware_too(tmp_path: Path)
 def test_what_has_no_firmware_is_refused(name: str, overrides: tuple[str, ...], said: str) -> None:
     with pytest.raises(ScenarioError, match=said):
         firmware(load_scenario(name, overrides))
-
-
-def test_an_unknown_target_is_refused() -> None:
-    with pytest.raises(ScenarioError, match="there is no target 'avr'; available: msp430f2013, cortex-m0, cortex-m4"):
-        firmware(scenario_of("pid"), "avr")

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import pytest
 
-from ppafo.processor.firmware import firmware, fixed_point_controller
-from ppafo.processor.lock_step import EPISODE, drawn_readings
+from ppafo.processor.controller import fixed_point_controller
+from ppafo.processor.firmware import firmware
+from ppafo.processor.simulated import EPISODE, drawn_readings
 from tests.unit.exports.test_firmware import SCENARIOS, scenario_of
 
 SAMPLES = 4000

@@ -6,9 +6,8 @@ import pytest
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import c_library
 from ppafo.model.sensors import Measurement
-from ppafo.processor.firmware import FixedPointController, fixed_point_controller, integer_form
+from ppafo.processor.controller import FixedPointController, PythonProcessor, fixed_point_controller, integer_form
 from ppafo.processor.fixed_point import read
-from ppafo.processor.lock_step import PythonProcessor
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict

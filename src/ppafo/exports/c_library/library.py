@@ -12,7 +12,6 @@ from ppafo.parameters.joint import ANKLE, JointNames
 
 _OWN_FILES = {"main", "expected", "unit", "plugin", "fmi2", "fmi3", "makefile", "readme", "license"}
 _OWN_TARGETS = {"all", "check", "clean", "test"}
-_OF_BOARDS = {"board", "board_simulated", "start_cortex"}
 _OF_CMAKE = {"help", "install", "package", "m"}
 _WITH_ANOTHER_END = {"prepare", "prepared", "is", "begin", "ppafo_whole", "at_result", "at_step_aside_result"}
 """Names that would collide with another function or type after adding ``_run``, ``_size`` or ``_TOO_MANY_PARTS``."""
@@ -20,7 +19,7 @@ _OF_WINDOWS = {"con", "aux", "nul", "prn"}
 _HEADERS_1 = {"assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits", "locale", "math"}
 _HEADERS_2 = {"setjmp", "signal", "stdarg", "stdbool", "stddef", "stdint", "stdio", "stdlib", "string", "tgmath"}
 _OF_C = _HEADERS_1 | _HEADERS_2 | {"time", "wchar", "wctype"}
-_TAKEN = _OWN_FILES | _OWN_TARGETS | _OF_BOARDS | _OF_CMAKE | _OF_WINDOWS | _OF_C | _WITH_ANOTHER_END
+_TAKEN = _OWN_FILES | _OWN_TARGETS | _OF_CMAKE | _OF_WINDOWS | _OF_C | _WITH_ANOTHER_END
 """Reserved names of a library: its other files and types, targets in make files, and C headers."""
 
 
