@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.linearise.question import linearise
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import EFFECTS
 from ppafo.running import simulate
@@ -51,16 +50,6 @@ def test_the_reference_solver_has_the_same_load() -> None:
     agreement = compare_with_reference(plan_run(load_scenario("step-response", (*FREE, SPRING, FAN))))
     assert agreement.angle < 2e-4
     assert agreement.worst_pressure < 1e-3
-
-
-def test_a_linear_model_damps_by_the_slope_of_the_drag() -> None:
-    without, model = (linearise("step-response", at=0.05, overrides=(*FREE, *more)).found for more in ((), (FAN,)))
-    names = [state.name for state in model.states]
-    row = names.index("angular_velocity")
-    speed = model.states[row].value
-    assert speed > 1.0
-    inertia = load_scenario("step-response", FREE).device.foot_plate.inertia
-    assert model.a[row, row] - without.a[row, row] == pytest.approx(-2.0 * 0.05 * speed / inertia, rel=1e-3)
 
 
 def test_a_load_that_is_too_stiff_for_the_steps_of_a_walk_is_refused_with_a_step_that_does() -> None:

@@ -6,7 +6,6 @@ import shutil
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from ppafo.analyses.identify.question import identify
@@ -56,22 +55,6 @@ def test_page_and_identify_give_one_answer_on_friction_over_pressure(
         assert {one.is_identified for one in result.estimates} == {seal.is_line}, name
         # Where a line holds, each pressure is in the band that the others predict.
         assert seal.is_line == all(one.is_predicted for one in seal.left_out), name
-
-
-def test_a_tight_line_of_friction_is_predicted_and_a_bent_one_is_not(tmp_path: Path) -> None:
-    area, time = 5.0e-4, np.arange(0.0, 80.0, 0.05)
-    position = 20.0 + 20.0 * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * time / 8.0))
-    sign = np.sign(np.gradient(position))
-    for name, bend in (("straight", 0.0), ("bent", 0.25)):
-        for bar in (1, 3, 5, 7):
-            friction = 2.0 + 0.5 * bar + bend * (bar - 4.0) ** 2
-            force = area * bar * 1e5 + sign * friction
-            rows = [time * 1e3, 0 * time, 0 * time, 0 * time, position, bar + 0 * time, force]
-            np.savetxt(tmp_path / f"{name}_{bar}bar.csv", np.column_stack(rows), fmt="%.3f", delimiter="\t")
-    found = {seal.name: seal for seal in measured.seals_in(tmp_path)}
-    assert found["straight"].verdict == "identify: a straight line"
-    assert found["straight"].line == pytest.approx((2.0, 0.5e-5), rel=1e-3)
-    assert "NO STRAIGHT LINE; bends upwards" in found["bent"].verdict
 
 
 def test_the_recordings_are_those_of_the_source_file() -> None:

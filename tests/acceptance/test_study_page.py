@@ -8,7 +8,6 @@ import pytest
 
 from ppafo.analyses.sweep.solve import sweep
 from ppafo.studies.declaration import VARIED
-from ppafo.studies.loading import load_study
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "study.md").read_text(encoding="utf-8")
 
@@ -16,11 +15,6 @@ PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "study.md").read_text(en
 def blocks(language: str) -> list[str]:
     """The code blocks of the page in one language."""
     return re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
-
-
-def test_the_study_of_the_page_has_the_runs_that_the_page_says() -> None:
-    study = load_study(tomllib.loads(blocks("toml")[0]))
-    assert f"= {study.runs:,} runs" in PAGE
 
 
 def test_the_table_of_the_page_has_every_kind_with_its_keys() -> None:

@@ -8,8 +8,6 @@ from typing import Any
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.simulation.recorded.channels import COMMAND, SUPPLY
-from ppafo.storage import read_csv
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "validate-a-model.md").read_text(encoding="utf-8")
 
@@ -44,11 +42,3 @@ def test_a_real_device_is_told_as_the_page_shows(
     assert main(shlex.split(validate)[1:]) == 1
     printed = capsys.readouterr().out.splitlines()
     assert [line for line in blocks("text")[0].splitlines() if line not in printed] == []
-
-
-def test_the_recording_of_the_page_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "bench.csv"
-    path.write_text(blocks("csv")[0])
-    recording = read_csv(path)
-    assert recording.names == (COMMAND, SUPPLY, "angle", "pressure_1", "pressure_2")
-    assert recording["pressure_1"][0] == pytest.approx(101325.0 + 0.1 * 6894.757293168)

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from ppafo.model import plant, ports, sensors
+from ppafo.model import plant, sensors
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.kind import Effect, PlantSnapshot
+from ppafo.model.effects.kind import Effect
 from ppafo.parameters import declaration, device
 from ppafo.signals.recording import CHANNELS
 
@@ -183,12 +183,6 @@ def test_an_effect_has_its_lines_in_nomenclature_and_equations(effect: Effect) -
         missing += ["paste into docs/equations.md, below 'Effects beside the paper's equations', with its mathematics:"]
         missing += [title, equation, *laws]
     assert missing == [], "\n".join(missing)
-
-
-def test_the_page_on_effects_lists_every_field_of_a_moment_and_every_place() -> None:
-    page = (ROOT / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
-    laws = [name for name, law in inspect.getmembers(ports, inspect.isfunction) if law.__module__ == ports.__name__]
-    assert [name for name in (*PlantSnapshot._fields, *laws) if f"`{name}" not in page] == []
 
 
 def test_units_of_the_nomenclature_are_the_declared_ones() -> None:

@@ -12,7 +12,6 @@ ROOT = Path(__file__).parents[2]
 EVIDENCE = (ROOT / "docs" / "evidence.md").read_text(encoding="utf-8")
 PAGE = EVIDENCE.partition("## Tools that have run the exports")[2].partition("\n## ")[0]
 TESTS = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", PAGE)
-LOCKED = {name: name.lower() for name in ("FMPy", "Gymnasium", "Playwright")}
 
 
 def test_every_row_of_the_table_names_a_test() -> None:
@@ -24,14 +23,6 @@ def test_every_row_of_the_table_names_a_test() -> None:
 @pytest.mark.parametrize(("file", "name"), TESTS)
 def test_a_test_that_the_page_names_exists(file: str, name: str) -> None:
     assert f"\ndef {name}(" in (ROOT / file).read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(("said", "package"), LOCKED.items())
-def test_a_version_that_the_page_names_is_the_one_that_the_tests_have(said: str, package: str) -> None:
-    lock = (ROOT / "requirements-dev.lock").read_text(encoding="utf-8")
-    locked = re.search(rf"^{package}==([\d.]+)", lock, re.MULTILINE)
-    assert locked is not None
-    assert set(re.findall(rf"{said} (\d[\d.]*\d)", PAGE)) == {locked[1]}
 
 
 def test_every_export_is_on_the_page() -> None:

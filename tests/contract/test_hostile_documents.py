@@ -1,6 +1,5 @@
 """Whatever lies in the place of a file that people write, the answer is one line, soon, whatever kind of file it is."""
 
-import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -9,25 +8,21 @@ from typing import Any
 import pytest
 
 from ppafo.analyses.design.loading import load_design
-from ppafo.analyses.endurance.walk_gas import read_walk_gas
 from ppafo.analyses.reproduce.publication import load_publication
-from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.analyses.tune.problem import load_tuning
 from ppafo.cli.doctor import FORMATS
 from ppafo.documents.json_text import MAXIMUM_LEVELS, is_nested_too_deeply, json_document
-from ppafo.errors import DataError, PpafoError
+from ppafo.errors import PpafoError
 from ppafo.gait.document import load_gait
 from ppafo.gait.recorded.mapping import load_map
 from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
-from ppafo.rig.folder import check_rig_folder
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.storage.column_map import load_column_map
 from ppafo.storage.reading import read_recording
-from ppafo.storage.result_folder import read_document
 from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk
 from ppafo.walking.task_sequence import load_task_sequence
@@ -131,83 +126,6 @@ def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path, ending: str
     path = tmp_path / f"hostile.{ending}"
     make(path)
     assert_refused(read_recording, path)
-
-
-FOLDERS: dict[str, Callable[[Path], Any]] = {
-    "run.json": read_document,
-    "walk.json": read_walk_gas,
-    "rig.json": lambda folder: check_rig_folder(folder, "step-response"),
-    "study.json": load_study_results,
-    "summary.json": load_study_results,
-}
-JSON_CONTENTS = {
-    "objects in objects": b'{"a": ' * 600 + b"1" + b"}" * 600,
-    "lists without end": b"[" * 500_000,
-    "not UTF-8": b'{"a": "\xff"}',
-    "not an object": b"[1]",
-    "nothing": b"null",
-    "a number": b"3",
-    "a text": b'"text"',
-    "another format": b'{"format": "another"}',
-    "a long number": b"9" * 10_000,
-    "cut off": b'{"format": "ppafo',
-}
-STUDY_DOCUMENT = {
-    "format": "ppafo study results",
-    "schema_version": 2,
-    "study": {"name": "task", "configurations": [{"name": "one"}], "outputs": {}},
-    "scenarios": {"task": {"assumptions": []}},
-    "sha256": "0" * 64,
-    "runs": 1,
-    "chunks": 1,
-    "varied": {},
-    "metrics": {},
-}
-
-
-def put(folder: Path, name: str) -> Path:
-    """The path of a file in a folder of results that is otherwise in order."""
-    if name == "summary.json":
-        (folder / "study.json").write_text(json.dumps(STUDY_DOCUMENT))
-    return folder / name
-
-
-@pytest.mark.parametrize("kind", JSON_CONTENTS)
-@pytest.mark.parametrize("name", FOLDERS)
-def test_hostile_document_of_a_folder_is_refused_in_one_line(tmp_path: Path, name: str, kind: str) -> None:
-    put(tmp_path, name).write_bytes(JSON_CONTENTS[kind])
-    with pytest.raises(DataError) as refused:
-        FOLDERS[name](tmp_path)
-    assert name in str(refused.value)
-    assert len(str(refused.value).splitlines()) == 1
-
-
-@pytest.mark.parametrize("make", PLACES, ids=lambda make: make.__name__)
-@pytest.mark.parametrize("name", FOLDERS)
-def test_what_is_no_document_of_a_folder_is_refused_in_one_line(
-    tmp_path: Path, name: str, make: Callable[[Path], None]
-) -> None:
-    if name == "rig.json" and make in (dangling, loop):
-        pytest.skip("a name that leads nowhere: the rig writes its own file there")
-    make(put(tmp_path, name))
-    with pytest.raises(DataError):
-        FOLDERS[name](tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("study", []),
-        ("study", {"name": 1}),
-        ("runs", "many"),
-        ("chunks", 1e400),
-        ("metrics", 3),
-    ],
-)
-def test_damaged_document_of_a_study_is_refused_by_its_key(tmp_path: Path, key: str, value: object) -> None:
-    (tmp_path / "study.json").write_text(json.dumps(STUDY_DOCUMENT | {key: value}))
-    with pytest.raises(DataError, match=rf"study\.json: .*{key}"):
-        load_study_results(tmp_path)
 
 
 def test_depth_of_a_document_is_counted_and_a_circle_has_none() -> None:

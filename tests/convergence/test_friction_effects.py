@@ -13,14 +13,6 @@ SEALS = (
 )
 
 
-def test_seals_that_the_gas_presses_hold_the_vane_for_longer() -> None:
-    departures = [
-        simulate(load_scenario("step-response", texts)).metrics["departure_time"].value
-        for texts in ((), ("effects.seal_friction.static_per_pressure=2e-6 N m/Pa",))
-    ]
-    assert departures[1] > departures[0]
-
-
 def test_the_formulas_are_those_that_they_name() -> None:
     seals = SealFriction(2.0e-6, 1.0e-6)
     assert static_seal_friction(0.5, 1.0e5, 4.0e5, seals) == pytest.approx(1.1)

@@ -150,27 +150,6 @@ def test_a_kind_of_a_room_that_is_not_installed_is_not_listed_and_says_so() -> N
         laws["there"]
 
 
-@pytest.mark.parametrize(
-    ("given", "files"),
-    [
-        *((given, ("__init__.py", "inner.py")) for given in ("laws/inner.py", "laws", "laws.inner", "laws.inner:KIND")),
-        *((given, ("inner.py",)) for given in ("laws/inner.py", "laws.inner", "laws.inner:KIND")),
-    ],
-)
-def test_a_package_is_named_by_its_folder_a_file_or_a_module(
-    given: str, files: tuple[str, ...], install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    package = tmp_path / "laws"
-    package.mkdir()
-    for name in files:
-        (package / name).write_text(LAW.format(name="on_off", call="anything") if name == "inner.py" else "")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(plugins, "_named", {})
-    monkeypatch.setenv(plugins.VARIABLE, "")
-    plugins.name_plugins([given])
-    assert CONTROLLERS["laws.inner:KIND"].name == "anything"
-
-
 def test_child_processes_know_what_was_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "my_law.py").write_text(LAW.format(name="on_off", call="anything"))
     monkeypatch.setattr(plugins, "_named", {})

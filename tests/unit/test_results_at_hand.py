@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -122,23 +121,8 @@ def test_a_channel_is_given_in_si_and_in_the_unit_that_is_asked() -> None:
         _ = result["torqe"]
 
 
-def test_a_notebook_shows_table_and_figure_without_a_word_of_its_own() -> None:
-    shown = ppafo.simulate(TASK)._repr_html_()
-    assert "RMS error" in shown
-    assert "<img" in shown
-    assert vars(ppafo.simulate(TASK).plot())["_repr_png_"]().startswith(b"\x89PNG")
-
-
 def test_a_result_that_is_read_back_has_the_figure_of_its_run(tmp_path: Path) -> None:
     result = ppafo.simulate("torque-task-proportional", overrides=["run.duration=0.3 s", "supply.pressure=3 bar_g"])
     again = ppafo.read_result(result.save(tmp_path / "run")).plot()
     assert [axes.get_title("left") for axes in again.axes] == [axes.get_title("left") for axes in result.plot().axes]
     assert "Pressure (bar gauge)" in [axes.get_title("left") for axes in again.axes]
-
-
-def test_a_result_prints_in_the_units_that_people_are_shown() -> None:
-    result = ppafo.simulate("torque-task-proportional", overrides=["run.duration=0.3 s", "reference.level=400 N cm"])
-    text = repr(result)
-    assert re.search(r"peak_torque +[\d.]+ N cm", text)
-    assert re.search(r"gas_imbalance +0 g", text)
-    assert re.search(r"\de[-+]", text) is None

@@ -59,13 +59,3 @@ def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pyte
     report = (out / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert "<td><code>bottle.room_heat_transfer</code></td><td>0.5 W/K</td><td>assumed</td>" in report
     assert (out / "endurance.png").stat().st_size > 10_000
-
-
-def test_the_largest_flow_is_said_and_written_in_the_unit_in_which_it_was_given(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    flow = ["--peak-flow", "40 L/min (ANR, air)"]
-    assert main(["bottle", "--gas-per-stride", "0.5 g", *flow, "--longest", "1 min", "--out", str(tmp_path / "b")]) == 0
-    assert "23 L/min (ANR, air), largest 40 L/min (ANR, air)" in capsys.readouterr().out
-    assert main(["bottle", "--gas-per-stride", "0.5 g", "--peak-flow", "10 L/min (ANR, air)"]) == 2
-    assert "the largest flow is 10 L/min (ANR, air); it must be at least" in capsys.readouterr().err

@@ -44,16 +44,6 @@ def test_the_set_of_the_template_passes_the_audit() -> None:
     assert load_device("bench.toml").valve.kind == "proportional"
 
 
-def test_what_was_reported_of_the_paper_s_device_is_no_evidence_on_a_copy(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["new", "set", "own", "--from", "ppafo2011"])
-    assert "written: own.toml, still with values, sources and citation of ppafo2011; next: " in capsys.readouterr().out
-    text = Path("own.toml").read_text(encoding="utf-8")
-    assert ("[reported." in text, "[[accepted]]" in text) == (False, False)
-    # A valve of one's own, whose flow nobody reported.
-    Path("own.toml").write_text(text.replace("value = 12.6\n", "value = 5.0\n", 1), encoding="utf-8")
-    assert not [one.id for one in findings_of(load_parameter_set("own.toml")) if one.id.startswith("flow-of")]
-
-
 @pytest.mark.parametrize("device", ["ppafo2011", "my-device.toml"])
 def test_the_task_of_the_template_is_followed_smoothly_by_the_device_of_the_paper_and_by_that_of_the_template(
     device: str,

@@ -115,22 +115,6 @@ def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_t
     assert main(["export", "figure", str(tmp_path / "walk")]) == 2
 
 
-def test_overrides_reach_the_saved_device_and_a_pressure_is_shown_above_its_atmosphere(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["supply.atmospheric_pressure=83 kPa_a", "supply.pressure=55 psi_g", "run.duration=0.2 s"]
-    sets = [part for word in words for part in ("--set", word)]
-    assert main(["simulate", "step-response", *sets, "--check", "--out", str(tmp_path / "high")]) == 0
-    scenario = read_result(tmp_path / "high").document["scenario"]
-    assert scenario["device"]["supply"]["atmospheric_pressure"] == 83e3
-    assert scenario["origin"]["overrides"] == words
-    shown = [line.split()[:3] for line in capsys.readouterr().out.splitlines() if "largest_pressure" in line]
-    assert [row[0] for row in shown[:2]] == ["largest_pressure", "largest_pressure"]
-    assert {tuple(row[1:]) for row in shown[:2]} == {("55", "psi_g")}
-    page = (tmp_path / "high" / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    assert "55 psi_g" in page
-
-
 def test_a_damaged_result_is_one_line_and_exit_code_2(
     saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

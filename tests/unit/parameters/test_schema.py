@@ -9,7 +9,6 @@ from typing import Any
 import jsonschema  # type: ignore[import-untyped]
 import pytest
 
-from ppafo.model.catalog import VALVES
 from ppafo.parameters import list_sets
 from ppafo.parameters.loading import json_schema
 
@@ -37,10 +36,3 @@ def test_the_schema_refuses_a_name_of_a_valve_that_no_path_can_hold(of: tuple[st
     valves["mhj.10"] = valves.pop("solenoid")
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(document, json_schema())
-
-
-def test_the_schema_knows_every_valve_of_the_catalogue_and_its_settings() -> None:
-    definitions = json_schema()["$defs"]
-    for kind in VALVES.values():
-        properties = definitions[f"{kind.name.capitalize()}Valve"]["properties"]
-        assert {quantity.name for quantity in kind.quantities} <= set(properties)

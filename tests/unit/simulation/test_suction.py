@@ -13,9 +13,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ppafo.errors import PpafoError
-from ppafo.parameters.audit import findings_of
-from ppafo.parameters.loading import load_device, load_parameter_set
-from ppafo.parameters.overrides import apply_overrides
+from ppafo.parameters.loading import load_device
 from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
@@ -239,12 +237,3 @@ def test_a_walk_on_a_vacuum_is_refused_in_one_line() -> None:
         PpafoError, match=r"^solenoid: \[device\]: a walk, .* needs a supply above atmospheric pressure"
     ):
         load_walk("solenoid", SUCTION)
-
-
-@pytest.mark.parametrize(("text", "severity"), [("-60 kPa_g", "note"), ("0.5 bar_a", "warning")])
-def test_an_audit_tells_of_a_vacuum_and_doubts_an_absolute_unit(text: str, severity: str) -> None:
-    changed = apply_overrides(load_parameter_set("ppafo2011"), [f"supply.pressure={text}"])
-    found = {finding.id: finding for finding in findings_of(changed)}
-    assert found["vacuum-1"].severity == severity
-    assert found["torque-ceiling"].sides[0].value > 0.0
-    assert "from the atmosphere to" in found["open-flow-of-proportional"].paragraph

@@ -230,28 +230,6 @@ def test_the_wrong_sign_is_named_for_one_of_two_opposite_laws(band: float, rate:
     assert right.cause.startswith("the valve stays open 1 N m beyond the reference") == (band == 2.0)
 
 
-def test_a_swing_about_an_earlier_level_is_named_beside_the_verdict_on_the_last_one() -> None:
-    """A stiff loop swings at 65 deg, near a stop, and settles at 115 deg; a softer one settles at both."""
-    knots = {"01": (0.0, 65), "02": (1.5, 65), "03": (1.6, 115), "04": (19.0, 115)}
-    table = [f"reference.value_{key}={level} deg" for key, (_, level) in knots.items()]
-    table += [f"reference.time_{key}={time} s" for key, (time, _) in knots.items() if time]
-    table += ["reference.kind=tabulated", "reference.level=0 deg", "reference.period=20 s", "motion.angle=70 deg"]
-    stiff, calm = (
-        simulate("cylinder-servo", [*table, "run.duration=8 s", f"controller.angle_stiffness={stiffness} N m/rad"])
-        for stiffness in (60, 40)
-    )
-    assert stiff.tracking is None
-    assert calm.tracking is None
-    angle = stiff.recording["angle"][(stiff.recording.time > 0.75) & (stiff.recording.time < 1.5)]
-    swing = round(float(np.ptp(np.degrees(angle))), 1)
-    assert swing > 10.0
-    assert [text for text in stiff.warnings if "the reference rests" in text] == [
-        f"while the reference rests from 0 s to 1.5 s, the angle swings by {swing} deg: the verdict is about the end "
-        "of the run alone"
-    ]
-    assert not any("the reference rests" in text for text in calm.warnings)
-
-
 def test_a_limit_cycle_beside_the_reference_oscillates_in_a_run_and_in_a_study() -> None:
     base = load_scenario("torque-task-solenoid", ["supply.pressure=4 bar_g"])
     columns = {"reference.level": np.array([3.0, 4.0, 5.0, 6.0])}
@@ -314,13 +292,6 @@ def test_valves_that_swing_by_more_than_their_limit_do_not_follow_in_a_run_or_an
     metered = run_ensemble(base, columns, with_companions([], base)).metrics
     assert excess(metered, base, columns).follows.tolist() == [0.0, 1.0]
     assert simulate(with_numbers(base, {"reference.level": 4.0})).tracking is None
-
-
-@pytest.mark.parametrize(("frequency", "most"), [("0.5 Hz", 20.0), ("6 Hz", 60.0)])
-def test_a_command_may_turn_with_a_reference_that_turns_itself(frequency: str, most: float) -> None:
-    changes = ["reference.kind=sine", "reference.amplitude=1 N m", "reference.level=2 N m", "run.duration=2 s"]
-    scenario = load_scenario("torque-task-slow-valve", [*changes, f"reference.frequency={frequency}"])
-    assert most_reversals(scenario) == pytest.approx(most, abs=8.0)
 
 
 def test_an_error_of_the_steps_beyond_what_is_promised_is_said_with_a_tolerance_that_keeps_to_it() -> None:
@@ -519,22 +490,6 @@ def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> Non
     slow = simulate(TASK, ["controller.kind=on_off", "reference.level=3 N m", "valve.slew_limit=50 1/s"])
     (remark,) = (said for said in slow.warnings if "a second" in said)
     assert "`valve.slew_limit` lets them open and shut fully at most 25 times a second" in remark
-
-
-def test_a_verdict_has_the_limits_by_which_it_was_judged_and_the_swing() -> None:
-    """The wide limit of valves without gradual openings is given its reason."""
-    torque = simulate("torque-task-solenoid", ["reference.level=3 N m", "valve.area=3.45 mm^2"]).following
-    allowed = r"\(0.75 N m allowed, because the valves are either open or shut\)"
-    assert re.fullmatch(
-        rf"the torque follows its reference; from 2 s on: RMS error 0.\d+ N m {allowed}, "
-        r"swing 1?[.]?\d+ N m, \d+ % of the requested change \(1.8 N m allowed\)",
-        torque,
-    )
-    assert simulate("pressure-loop").following.endswith("0.15 bar allowed), swing 0 bar")
-    angle = simulate("cylinder-servo").following
-    assert re.search(r"RMS error [\d.]+ deg \(2 deg allowed\), largest error [\d.]+ deg \(2 deg allowed\)$", angle)
-    still = ["reference.kind=constant", "reference.level=60 deg", "motion.angle=55 deg"]
-    assert re.search(r"swing [\d.e-]+ deg \(1 deg allowed\)$", simulate("cylinder-servo", still).following)
 
 
 @pytest.mark.parametrize(
