@@ -31,9 +31,6 @@ from ppafo.errors import PpafoError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import library_files
-from ppafo.gym.lanes import FromOutside
-from ppafo.gym.scenario_episodes import scenario_episodes
-from ppafo.gym.world import TARGETS
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.page.content import page_content, program_content
@@ -152,32 +149,6 @@ def at_numbers(name: str, count: int, seed: int) -> Judged:
         # What contradicts itself is for the caller to check here.
         if isinstance(alone, str):
             found.refused += 1
-        else:
-            found.compare(timeless, alone, door)
-    return found
-
-
-def at_gym(name: str, count: int, seed: int) -> Judged:
-    """Ranges of an environment of Gymnasium whose two ends are the same words; nothing else of an episode is drawn.
-
-    Its commands come from an agent, so that there is no controller to set.
-    """
-    found, base = Judged(), load_scenario(name)
-    for words in settings_of(name, count, seed):
-        timeless = {path: text for path, text in words.items() if path not in TIMES and "controller." not in path}
-        given = {path: int(text) if path == "sensors.seed" else text for path, text in timeless.items()}
-        alone = single(name, timeless, FromOutside())
-        try:
-            episodes = scenario_episodes(base, True, {path: (text, text) for path, text in given.items()}, TARGETS)
-            only = {path: episodes.ranges[path] for path in given}
-            episodes = replace(episodes, ranges=only, gauge=episodes.gauge & set(only))
-            columns, _ = episodes.draw([np.random.default_rng(1)])
-            clock = alone.clock if isinstance(alone, Planned) else ()
-            door: Planned | str = Planned(columns.parameters[:, 0].copy(), columns.states[:, 0].copy(), clock)
-        except PpafoError as error:
-            door = str(error)
-        if isinstance(door, str) and "another program" in door and isinstance(alone, Planned):
-            found.other += 1
         else:
             found.compare(timeless, alone, door)
     return found
@@ -310,7 +281,6 @@ Door = Callable[[str, int, int], Judged]
 DOORS: Mapping[str, tuple[Door, Sequence[str]]] = {
     "study": (at_study, (*list_scenarios(), *list_walks())),
     "numbers": (at_numbers, (*list_scenarios(), *list_walks())),
-    "gym": (at_gym, list_scenarios()),
     "page": (at_page, (*list_scenarios(), *list_walks())),
     "library": (at_library, (*list_scenarios(), *list_walks())),
 }

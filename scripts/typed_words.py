@@ -5,7 +5,6 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -173,18 +172,14 @@ def planned(batch: Batch, place: int = 0) -> Planned:
     )
 
 
-def single(name: str, words: Words, controller: Any = None) -> "Planned | str":
-    """What `ppafo simulate --set` or `ppafo walk --set` runs; the line with which it refuses.
-
-    ``controller`` takes the place of that of a scenario.
-    """
+def single(name: str, words: Words) -> "Planned | str":
+    """What `ppafo simulate --set` or `ppafo walk --set` runs; the line with which it refuses."""
     texts = [f"{path}={text}" for path, text in words.items()]
     try:
         if name in list_walks():
             walk = load_walk(name, texts)
             return planned(batch_of(plan_walk(walk)))
-        scenario = load_scenario(name, texts)
-        return planned(batch_of(plan_run(scenario if controller is None else scenario.controlled_by(controller))))
+        return planned(batch_of(plan_run(load_scenario(name, texts))))
     except PpafoError as error:
         return str(error)
 

@@ -243,9 +243,6 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
     },
     "Published studies": {"claims": claims},
     "Walking": {"alarms": alarms},
-    "Environments": {
-        "gym": tested("The device in Gymnasium", "Gymnasium; the lanes", "tests/unit/gym"),
-    },
 }
 
 NOT_JUDGED = (

@@ -1,14 +1,20 @@
 """Every example runs from beginning to end and writes what it says."""
 
 import os
+import runpy
 import subprocess
 import sys
+import warnings
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "src" / "ppafo" / "examples").glob("*/*.py"))
-EXAMPLES = [example for example in EXAMPLES if example.parent.name == "first-steps"]
+import ppafo
+
+FOLDER = Path(__file__).parents[2] / "src" / "ppafo" / "examples"
+EXAMPLES = sorted(FOLDER.glob("first-steps/*.py"))
 WRITTEN = {
     "first_steps": {
         "first-steps/torque-task.png",
@@ -39,3 +45,40 @@ def test_an_example_runs_and_writes_its_files_under_out_and_nowhere_else(example
     run(example, tmp_path)
     written = {str(path.relative_to(tmp_path / "out")) for path in tmp_path.rglob("*") if path.is_file()}
     assert written == WRITTEN[example.stem]
+
+
+@pytest.fixture
+def env() -> Any:
+    """The environment of the example for Gymnasium."""
+    gymnasium = pytest.importorskip("gymnasium")
+    runpy.run_path(str(FOLDER / "gymnasium" / "torque_task.py"))
+    return gymnasium.make("ppafo/TorqueTask-v0", duration="0.1 s").unwrapped
+
+
+def test_gymnasium_finds_nothing_to_warn_of(env: Any) -> None:
+    from gymnasium.utils.env_checker import check_env
+
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        check_env(env)
+    assert [str(item.message) for item in found] == []
+
+
+def test_an_episode_of_gymnasium_is_the_run_that_its_result_names(env: Any) -> None:
+    _, drawn = env.reset(seed=4)
+    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (100, 1)).astype(np.float32)
+    steps = [env.step(action) for action in actions]
+    assert [ended for *_, ended, _ in steps] == [False] * 99 + [True]
+    result = env.run.result()
+    again = ppafo.simulate(result.scenario)
+    assert again.recording == result.recording
+    assert again.scenario.reference.level == drawn["reference.level"]
+    assert [info["supplied_mass"] for *_, info in steps] == again["supplied_mass"][1:].tolist()
+    gas = again["supplied_mass"][-1] / 1e-3
+    squared = sum(info["error"] ** 2 for *_, info in steps)
+    assert sum(step[1] for step in steps) == pytest.approx(-(1e-3 * squared + gas), rel=1e-12)
+
+
+def test_the_example_for_gymnasium_runs_as_its_page_says(tmp_path: Path) -> None:
+    pytest.importorskip("gymnasium")
+    assert "return -0." in run(FOLDER / "gymnasium" / "torque_task.py", tmp_path)

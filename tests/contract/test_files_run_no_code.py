@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 import ppafo
-import ppafo.gym
 from ppafo import plugins
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS

@@ -10,7 +10,7 @@ import pytest
 
 import ppafo
 
-GUESTS = ("gym", "page", "processor")
+GUESTS = ("page", "processor")
 
 PROFILE = """
 schema_version = 1

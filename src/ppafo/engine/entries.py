@@ -19,7 +19,7 @@ SystemError if the garbage collector lets a second thread parse before the first
 """
 
 FLOAT, INT = "float64", "int64"
-ARRAY, ARRAY_2D, ARRAY_3D = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
+ARRAY = "float64[::1]"
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
 

@@ -63,8 +63,6 @@ class StepText:
     collector: SourceCollector
     ending: str = ""
     """Suffix for the names of functions that another program has in a different form."""
-    further: Mapping[str, Any] = field(default_factory=dict)
-    """Classes of groups that do not belong to the program."""
     states: dict[str, Any] = field(init=False)
     parameters: dict[str, Any] = field(init=False)
     of_step: dict[str, Any] = field(init=False)
@@ -81,7 +79,7 @@ class StepText:
         """Look up the groups of the program, and link the functions of its components."""
         self.states, self.parameters = self.parts.state_rows(), self.parts.parameter_rows()
         self.of_step = self.parts.step_rows()
-        self.rows = {**self.parameters, **self.states, **self.of_step, **self.further}
+        self.rows = {**self.parameters, **self.states, **self.of_step}
         link_program(self.parts, self.collector.replacements)
         self.module = StepModule(
             collector=self.collector,
@@ -92,13 +90,13 @@ class StepText:
             add_called=self.add_called,
         )
 
-    def phase(self, function: PlainFunction, known: Mapping[str, Any] | None = None) -> ComposedFunction:
+    def phase(self, function: PlainFunction) -> ComposedFunction:
         """Add a function called by the loop over steps; the function returns the groups that later phases may read.
 
         Raises ProgramError if the function reads a group that no earlier phase has stored.
         """
         assert isinstance(function, FunctionType), "it is no other callable"
-        phase = self._composed(function, known or {}, is_phase=True)
+        phase = self._composed(function, {}, is_phase=True)
         for name in phase.handed:
             if name not in self.rows and name not in (NUMBER, *HISTORIES):
                 raise self.refuse_unkept(name, phase)

@@ -1,6 +1,6 @@
 """Execution of steps by Python: the functions of ``in_python.py`` over many runs, bit-identical to compiled code."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,50 +27,31 @@ class PythonProgram:
 
     def advance(self, states: Floats, parameters: Floats, *arrays_and_clock: Any) -> None:
         """Advance all runs by some steps; arrays of histories and samples precede the numbers of the clock."""
-        program = self._program
+        program, histories, clock = self._program, arrays_and_clock[:4], arrays_and_clock[4:]
         tables = (program.state_rows(), states), (program.parameter_rows(), parameters)
-        run_lanes(program, loop.advance, tables, arrays_and_clock[:4], arrays_and_clock[4:])
 
+        def run(operations: Operations | None) -> None:
+            lanes = PythonLanes(tables, *histories)
+            linked = functions_of(program, lanes, operations)
+            parts: Any = linked.parts(program)
+            linked.of(loop.advance)(parts, lanes, *clock)
+            for groups, table in tables:
+                for number, lane in enumerate(lanes.lanes):
+                    table[:, number] = _numbers_of(lane, groups)
 
-def run_lanes(
-    program: Program,
-    function: Callable[..., None],
-    tables: Sequence[Table],
-    histories: Sequence[Floats],
-    arguments: Sequence[Any],
-) -> None:
-    """Run a function of the loop, ``function(parts, lanes, *arguments)``, on tables that the function modifies.
-
-    The first table is the state of the runs; ``histories`` are signals, commands, samples and traces, as far as
-    present.
-    """
-
-    def run(operations: Operations | None) -> None:
-        lanes = PythonLanes(tables, *histories)
-        linked = functions_of(program, lanes, operations)
-        parts: Any = linked.parts(program)
-        linked.of(function)(parts, lanes, *map(linked.replaced, arguments))
-        for groups, table in tables:
-            for number, lane in enumerate(lanes.lanes):
-                table[:, number] = _numbers_of(lane, groups)
-
-    # What was written before Python raised is as it was: all is done again from where it began.
-    before = [array.copy() for array in histories[:2]]
-    try:
-        run(None)
-    except (ArithmeticError, ValueError):
-        for array, kept in zip(histories, before, strict=False):
-            array[:] = kept
-        # Operations that Python refuses give what compiled code gets.
-        run(WITHOUT_EXCEPTIONS)
+        # What was written before Python raised is as it was: all is done again from where it began.
+        before = [array.copy() for array in histories[:2]]
+        try:
+            run(None)
+        except (ArithmeticError, ValueError):
+            for array, kept in zip(histories, before, strict=False):
+                array[:] = kept
+            # Operations that Python refuses give what compiled code gets.
+            run(WITHOUT_EXCEPTIONS)
 
 
 def _numbers_of(lane: Lane, groups: Iterable[str]) -> list[float]:
     return [value for name in groups for value in numbers(lane[name])]
-
-
-NONE = np.empty((0, 0, 0))
-"""Empty history or record."""
 
 
 class PythonLanes:
@@ -80,9 +61,9 @@ class PythonLanes:
         self,
         tables: Sequence[Table],
         signal_history: Floats,
-        command_history: Floats = NONE,
-        record: Floats = NONE,
-        trace: Floats = NONE,
+        command_history: Floats,
+        record: Floats,
+        trace: Floats,
     ) -> None:
         (self.groups, states), self.records, self.trace = tables[0], record, trace
         self.signal_history, self.command_history = signal_history, command_history

@@ -66,8 +66,6 @@ class RowsOfLanes:
         handed = [path for path in self.step_at if path.startswith(HANDED)]
         self.saved = [*self.state_at, "remaining", *handed] if step.parts.parts_are_rare else []
         self.count = self.aside + len(self.saved)
-        # Arrays that contain numbers, besides the arrays of the loop over steps.
-        self.arrays: frozenset[str] = frozenset()
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
         """Lines of a loop over all runs of the block."""
@@ -134,7 +132,6 @@ class RowsOfRun:
 
     def __init__(self, step: StepText, outputs: str) -> None:
         self.step, self.outputs = step, outputs
-        self.arrays: frozenset[str] = frozenset()
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
         """Lines of plain calls, whose results are assigned to the names of their groups."""

@@ -8,17 +8,16 @@ and stores the groups that it returns. For a single run, it becomes the plain ca
 import ast
 from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
-from typing import Any, get_type_hints
 
 from ppafo.engine.composer import Composer, FunctionNames
-from ppafo.engine.entries import ARRAY_2D, ARRAY_3D, FLOAT, HEADER, INT, entry_text, indent, parse_expression
+from ppafo.engine.entries import HEADER, indent, parse_expression
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, VECTOR
 from ppafo.engine.loop_rows import Call, Rows, RowsOfLanes, RowsOfRun, over_rows
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
-from ppafo.engine.reduction import HISTORIES, Reduction, is_known_part
-from ppafo.engine.rows import leaf_paths, row_numbers
+from ppafo.engine.reduction import HISTORIES, Reduction
+from ppafo.engine.rows import leaf_paths
 from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Now
@@ -31,18 +30,16 @@ class LoopText:
     """Generator of a function of the loop over steps, with called functions expanded in place.
 
     ``steps`` has the step of each program with its storage. With two programs, the loop tests ``NEEDS_PARTS`` wherever
-    they differ. ``known`` are arguments with known values. The method for a statement returns its translation, and
-    raises ProgramError for an unsupported statement.
+    they differ. The method for a statement returns its translation, and raises ProgramError for an unsupported
+    statement.
     """
 
-    def __init__(
-        self, steps: Mapping[Rows, StepText], function: Callable[..., None], known: Mapping[str, Any] | None = None
-    ) -> None:
+    def __init__(self, steps: Mapping[Rows, StepText], function: Callable[..., None]) -> None:
         (self.rows, self.step), *others = steps.items()
         self.steps, self.function = steps, function
         assert isinstance(function, FunctionType), "it is no other callable"
-        self.reduction = Reduction(self.step.module, function, known or {})
-        local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record", *self.rows.arrays})
+        self.reduction = Reduction(self.step.module, function, {})
+        local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record"})
         names = FunctionNames(local, local, self.step.placeholders, {"now": Now})
         self.composer = Composer(function, self.step.collector, names, self.step.add_inside)
         self.other = LoopText(dict(others), function) if others else None
@@ -126,40 +123,9 @@ class LoopText:
         return node.body if test.value else node.orelse
 
     def phases(self, node: ast.For) -> list[ast.stmt]:
-        """Translation of a loop over runs that calls phases, optionally with conditions and names of each run."""
-        if not all(isinstance(statement, ast.Expr) for statement in node.body):
-            return [ast.For(node.target, parse_expression("range(width)"), self.of_lane(node.body), [])]
+        """Translation of a loop over runs that calls phases."""
         own = _parsed(self.rows.over_lanes([self.phase(call) for call in node.body]))
         return own if self.other is None else self.either(own, self.other.phases(node))
-
-    def of_lane(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
-        """Body of the loop over runs: phases, names, conditions and counted loops."""
-        made: list[ast.stmt] = []
-        for node in statements:
-            match node:
-                case ast.Expr(value=ast.Call()):
-                    made += _parsed(self.rows.for_lane(self.phase(node)))
-                case ast.Assign(targets=[ast.Name() as target]):
-                    made.append(ast.Assign([target], self.number_of_lane(node.value)))
-                case ast.For(target=ast.Name()):
-                    made.append(ast.For(node.target, self.expression(node.iter), self.of_lane(node.body), []))
-                case ast.If():
-                    test = self.reduction.condition(node.test)
-                    if isinstance(test, ast.Constant):
-                        made += self.of_lane(node.body if test.value else node.orelse)
-                    else:
-                        body, otherwise = self.of_lane(node.body), self.of_lane(node.orelse)
-                        made.append(ast.If(self.number_of_lane(node.test), body or [ast.Pass()], otherwise))
-                case ast.Continue():
-                    made.append(node)
-                case _:
-                    line = ast.unparse(node).splitlines()[0]
-                    raise self.reduction.refuse(node, f"'{line}' is not supported in a loop over runs")
-        return made
-
-    def number_of_lane(self, node: ast.expr) -> ast.expr:
-        """Translation of an expression with numbers of the present run."""
-        return self.composed(self.rows.with_cells(self.reduction.visit(node)))
 
     def phase(self, node: ast.stmt) -> Call:
         """Call of a phase in a loop over runs."""
@@ -170,10 +136,8 @@ class LoopText:
         called: FunctionType = self.reduction.outside_value(node.value.func)
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
         arguments = list(zip(names, node.value.args, strict=True))[2:]
-        values = {name: self.reduction.value_of(argument) for name, argument in arguments}
-        known = {name: value for name, value in values.items() if is_known_part(value)}
-        own = {name: ast.unparse(self.expression(argument)) for name, argument in arguments if name not in known}
-        return Call(self.step.phase(called, known), own)
+        own = {name: ast.unparse(self.expression(argument)) for name, argument in arguments}
+        return Call(self.step.phase(called), own)
 
     def called(self, node: ast.Call) -> list[ast.stmt]:
         """Statements of a called function of the loop, or of a function of ``lanes``."""
@@ -247,30 +211,6 @@ def lane_loop(step: StepText, head: str, name: str, arguments: str, lanes: int =
         *over_rows(states, "states[row, lane] = x[row, lane]"),
     ]
     return "\n".join([head, f"def {name}({arguments}):", *indent(lines)])
-
-
-def lane_entry(
-    step: StepText,
-    function: Callable[..., None],
-    arrays: Mapping[str, Mapping[str, Any]],
-    known: Mapping[str, Any] | None = None,
-) -> str:
-    """Text of an entry that applies a function of the loop to arrays that keep the numbers of runs between calls.
-
-    Parameters of the entry are the ``arrays``, each with the rows of its groups and a column per run, the histories of
-    signals, and the function's own numbers except the ``known`` ones.
-    """
-    rows = RowsOfLanes(step)
-    # What a step hands on lives no longer than a call.
-    rows.cells = {path: path.replace(".", "_") for path in rows.step_at}
-    for array, groups in arrays.items():
-        rows.cells |= {path: f"{array}[{row}, lane]" for path, row in row_numbers(groups).items()}
-    rows.arrays = frozenset(arrays)
-    hints = get_type_hints(function)
-    numbers = {name: FLOAT if kind is float else INT for name, kind in hints.items() if kind in (float, int)}
-    types = dict.fromkeys(arrays, ARRAY_2D) | {"signal_history": ARRAY_3D} | numbers
-    lines = [f"width = {next(iter(arrays))}.shape[1]", *_unparsed(LoopText({rows: step}, function, known).lines())]
-    return entry_text(function.__name__, types, lines)
 
 
 LOOP_ARRAYS = {"signal_history": 3, "command_history": 2}

@@ -15,7 +15,7 @@ from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.actuators import functions_of_actuator
 from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
 from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
-from ppafo.engine.step.lane import LaneResult, LaneStart, LaneTiming, NoParameters
+from ppafo.engine.step.lane import LaneResult, LaneTiming, NoParameters
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
@@ -101,7 +101,6 @@ class Program:
         samples_inside: True if recorded samples lie inside steps
         meters: meters, updated at every sample that a recording would have
         traced: names of channels, or paths of state variables, stored at some of the samples
-        starts_apart: True if each run of a block may start at its own step, while others are in progress
         actuator: actuator between the chambers and the joint
         effects: effects, applied in this order at the ports of their laws
         shank, foot: profile of the shank, and module ``foot``, for a foot carried by an unconstrained vane
@@ -127,7 +126,6 @@ class Program:
     samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
     traced: tuple[str, ...] = ()
-    starts_apart: bool = False
     actuator: ActuatorModel = VANE
     effects: tuple[Effect, ...] = ()
     shank: ProfileKind | None = None
@@ -387,7 +385,6 @@ def groups_of(program: Program) -> Groups:
         # What only some blocks have comes last: its rows are added to those of a run.
         "course": kept(ReferenceSummary if program.follows_reference else NoParameters),
         **{group: kept(kind.state) for group, kind in program.meter_groups.items()},
-        **({"start": kept(LaneStart)} if program.starts_apart else {}),
     }
 
 

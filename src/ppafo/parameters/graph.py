@@ -1,7 +1,7 @@
 """Links between settings: default numbers computed from other numbers unless given explicitly.
 
-Overrides, study columns, tuned and fitted values, exported libraries and FMUs, and episodes of agents all resolve
-their settings here, so that a setting has the same meaning in all of them.
+Overrides, study columns, tuned and fitted values, exported libraries and FMUs all resolve their settings
+here, so that a setting has the same meaning in all of them.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence

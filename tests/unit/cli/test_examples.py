@@ -13,8 +13,8 @@ from tests.page_code import code_blocks
 
 EXAMPLES = load_examples()
 PYPROJECT = PurePosixPath("pyproject.toml")
-SCRIPT = "first-steps"
-"""The example that is no part of a page: tests/acceptance/test_examples.py runs it."""
+SCRIPTS = ("first-steps", "gymnasium")
+"""Examples that no page shows: tests/acceptance/test_examples.py runs them."""
 DATA = ("muscle-pair.toml", "step-response-muscles.toml", "lever.toml", "chamber.toml")
 """A set, its scenario, a column map and a second problem, which pages name."""
 SHOWN_IN_PART = ("muscle_pair.py",)
@@ -31,7 +31,7 @@ def test_every_folder_is_listed_and_every_entry_has_a_folder() -> None:
     assert sorted(EXAMPLES) == sorted(folders)
 
 
-@pytest.mark.parametrize("name", [name for name in EXAMPLES if name != SCRIPT])
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if name not in SCRIPTS])
 def test_the_files_of_an_example_are_what_its_page_shows(name: str) -> None:
     shown = code_blocks(EXAMPLES[name]["page"].removeprefix("docs/"), "toml", "python")
     for path, content in example_files(name).items():

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ppafo.engine.entries import (
     ARRAY,
-    ARRAY_2D,
     FLOAT,
     HEADER,
     INT,
@@ -24,6 +23,8 @@ from ppafo.engine.entries import (
 )
 from ppafo.translation.native_entries import NativeEntry
 from tests.compilers_here import modules_of
+
+ARRAY_2D = "float64[:, ::1]"
 
 Vector: TypeAlias = Annotated[NDArray[np.float64], ARRAY]
 """Numbers in a row, as a parameter of a function for ``array_module``."""

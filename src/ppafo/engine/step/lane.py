@@ -63,12 +63,6 @@ class LaneResult(NamedTuple):
     """1 if the run failed because a step needed more than ``MAXIMUM_PARTS`` parts, else 0."""
 
 
-class LaneStart(NamedTuple):
-    """Step of the block at which the run started, an integer [-]."""
-
-    step: float
-
-
 class NoParameters(NamedTuple):
     """Placeholder for the parameters of a component that the program does not have."""
 
@@ -140,7 +134,6 @@ class Lane:
     unpowered: "Unpowered"
     line_state: "LineState"
     course: "ReferenceSummary"  # of the reference over the whole run, for meters
-    start: LaneStart
     signal_history: NDArray[np.float64]  # rings of what comes late, and the traced samples
     command_history: NDArray[np.float64]
     trace: NDArray[np.float64]

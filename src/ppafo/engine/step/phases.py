@@ -25,7 +25,7 @@ IMPOSSIBLE_MASS = 1.0e3
 
 def time_of(parts: Program, lane: Lane, now: Now) -> float:
     """Time [s] since the start of the run, at the start of a step or part."""
-    time = (now.step - lane.start.step if parts.starts_apart else now.step) * lane.timing.step
+    time = now.step * lane.timing.step
     return time + lane.before if parts.is_parted else time
 
 
