@@ -4,7 +4,6 @@ import dataclasses
 import importlib
 import math
 import re
-import shlex
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
@@ -16,7 +15,6 @@ from typing import Any
 import pytest
 
 import ppafo
-from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.model.catalog import ACTUATORS, VALVES
@@ -217,12 +215,3 @@ def test_the_actuator_of_the_page_pulls_as_its_catalogue_prints_by_entry_point_a
         cosine = 0.2 / thread
         force = 6.0e5 * thread**2 * (3.0 * cosine**2 - 1.0) / (4.0 * math.pi * turns**2)
         assert 4.0 * force == pytest.approx(6000.0, rel=0.01)
-
-
-@pytest.mark.thorough
-def test_the_commands_on_published_studies_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    commands = [line for block in code_blocks("the-paper.md", "sh") for line in block.splitlines()]
-    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 4

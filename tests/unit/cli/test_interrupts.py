@@ -14,17 +14,6 @@ from pyarrow import parquet
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals work differently there")
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-THOROUGH = (pytest.mark.long, pytest.mark.thorough)
-
-
-def each_signal(**middles: str) -> pytest.MarkDecorator:
-    """Parameters of each middle with one signal, another for each, and with the others among the thorough tests."""
-    pairs = [
-        pytest.param(middle, name, id=f"{words}-{name}", marks=() if number == place % 3 else THOROUGH)
-        for place, (words, middle) in enumerate(middles.items())
-        for number, name in enumerate(SIGNALS)
-    ]
-    return pytest.mark.parametrize(("middle", "name"), pairs)
 
 
 START = """
@@ -76,7 +65,11 @@ lanes.LaneBlock.advance = sampled
 """A signal while SciPy reads its direction numbers: Cython prints the exception that it raises, and drops it."""
 
 
-@each_signal(lost_in_a_finaliser=LOST, caught_by_a_library=CAUGHT, dropped_by_compiled_code=COMPILED)
+@pytest.mark.parametrize(
+    ("middle", "name"),
+    [(LOST, "SIGINT"), (CAUGHT, "SIGTERM"), (COMPILED, "SIGHUP")],
+    ids=["lost in a finaliser", "caught by a library", "dropped by compiled code"],
+)
 def test_a_signal_whose_exception_got_lost_ends_the_run_all_the_same(middle: str, name: str, tmp_path: Path) -> None:
     code = START.replace("MIDDLE", middle.replace("NAME", name))
     words = [sys.executable, "-c", code, str(tmp_path / "run")]

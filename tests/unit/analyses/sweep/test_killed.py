@@ -83,7 +83,6 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {name: path.read_bytes() for name, path in files.items() if name != "log.jsonl" and LEFT_ASIDE not in name}
 
 
-@pytest.mark.thorough
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="this system cannot kill a process so")
 def test_a_study_killed_again_and_again_ends_with_the_same_bytes(tmp_path: Path) -> None:
     study = tmp_path / "killed.toml"
