@@ -24,7 +24,6 @@ from ppafo.report.style import (
     REFERENCE_2,
     DrawingStyle,
     look_of_valve,
-    render_figure,
 )
 from ppafo.signals import Recording
 from ppafo.units.shown import gauge_zero
@@ -156,8 +155,3 @@ def _set_limits(
     axes.set_xlim(ends)
     axes.set_ylim(min(shown) - air, max(shown) + air)
     axes.locator_params(axis="y", nbins=_MAXIMUM_TICKS)
-
-
-def figure_files(figure: "Figure") -> dict[str, bytes]:
-    """Return the files of a figure for a result folder, by name."""
-    return {f"figure.{file_format}": content for file_format, content in render_figure(figure, ("png", "svg")).items()}

@@ -2,10 +2,9 @@
 
 import io
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,7 +14,6 @@ from ppafo.signals import RecordingKind
 from ppafo.wording import set_within
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 BLACK = "#1a1a1a"
@@ -200,49 +198,6 @@ def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
     inch = print_scale() / figure.get_figheight()
     size = font_size(9.0)
     figure.text(0.972, 1.0 - 0.12 * inch, kind, ha="right", va="top", color=GREY, fontsize=size, style="italic")
-
-
-@dataclass(frozen=True, slots=True)
-class FigureMargins:
-    """Margins of a figure [inches]: at its edges, between rows and columns, and from a panel to its axis label."""
-
-    left: float
-    right: float
-    top: float
-    bottom: float
-    row_gap: float
-    column_gap: float = 0.0
-    label: float = 0.5
-
-
-def figure_of_panels(
-    size: tuple[float, float],
-    margins: FigureMargins,
-    rows: int,
-    columns: int = 1,
-    heights: Sequence[float] | None = None,
-) -> "tuple[Figure, list[list[Axes]]]":
-    """Return a figure of a width and height [inches] at full width, and its panels by row over a shared axis."""
-    from matplotlib.figure import Figure
-
-    scale, height = print_scale(), size[1]
-    # In inches of a figure of full width; all of it is smaller by the scale of the fonts.
-    width = printed_width(scale * size[0]) / scale
-    panel_width = (width - margins.left - margins.right - (columns - 1) * margins.column_gap) / columns
-    panel_height = (height - margins.top - margins.bottom - (rows - 1) * margins.row_gap) / rows
-    figure = Figure(figsize=(scale * width, scale * height))
-    figure.subplots_adjust(
-        left=margins.left / width,
-        bottom=margins.bottom / height,
-        right=1.0 - margins.right / width,
-        top=1.0 - margins.top / height,
-        wspace=margins.column_gap / panel_width,
-        hspace=margins.row_gap / panel_height,
-    )
-    grid = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights).tolist()
-    for axes in figure.axes:
-        axes.yaxis.set_label_coords(-margins.label / panel_width, 0.5)
-    return figure, grid
 
 
 def write_head(figure: "Figure", title: str, remark: str, kind: RecordingKind) -> None:

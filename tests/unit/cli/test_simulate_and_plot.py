@@ -17,7 +17,8 @@ import pytest
 from ppafo import read_result
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
-from ppafo.report.recording_figure import figure_files, recording_figure
+from ppafo.report.recording_figure import recording_figure
+from ppafo.report.style import render_figure
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario
@@ -107,7 +108,7 @@ def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_t
     walked["walk.json"] = json.dumps({"configuration": {"device": device}}).encode()
     write_marked_folder(tmp_path / "walk", walked, "walk")
     with shown_in(counted_from({}, 83e3)):
-        drawn = figure_files(recording_figure(recording))["figure.png"]
+        drawn = render_figure(recording_figure(recording), ("png",))["png"]
     for figure in (tmp_path / "rig" / "high.png", tmp_path / "walk" / "figure.png"):
         assert main(["export", "figure", str(figure.parent)]) == 0
         assert figure.read_bytes() == drawn

@@ -10,7 +10,7 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.metrics import Metric
 from ppafo.report.display_units import metrics_lines
-from ppafo.report.recording_figure import figure_files, recording_figure
+from ppafo.report.recording_figure import recording_figure
 from ppafo.report.stored_figure import draw_stored_result
 from ppafo.report.style import house_style, render_figure
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
@@ -110,7 +110,7 @@ def test_a_remark_stands_whole_below_the_panels() -> None:
 
 def test_one_sample_can_be_drawn() -> None:
     single = Recording("task", np.array([0.0]), {"angle": Channel(np.array([1.0]), "rad")})
-    assert figure_files(recording_figure(single))["figure.png"].startswith(b"\x89PNG")
+    assert render_figure(recording_figure(single), ("png",))["png"].startswith(b"\x89PNG")
 
 
 def test_a_recording_with_nothing_to_draw_is_refused() -> None:
