@@ -44,17 +44,19 @@ HEAD = f'schema_version = 1\nname = "bench"\ndevice.set = "{DEVICE}"\n'
 
 def truths(truth: Mapping[str, Any]) -> dict[str, float]:
     """Return the true value [SI] of every number that the procedures report, by path."""
-    device, preset = truth["device"], truth["preset"]["values"]
+    device = truth["device"]
     valve, actuator = device["valve"], device["actuator"]
     return {
         "actuator.torque_constant": actuator["torque_constant"],
         "friction.static_torque": device["friction"]["static_torque"],
-        "effects.seal_friction.static_per_pressure": preset["friction.static_per_pressure"],
+        "effects.seal_friction.static_per_pressure": device["effects"]
+        .get("seal_friction", {})
+        .get("static_per_pressure", 0.0),
         "friction.viscous_damping": device["friction"]["viscous_damping"],
         "friction.dynamic_torque": device["friction"]["dynamic_torque"],
         "valves.proportional.discharge_coefficient": valve["discharge_coefficient"],
-        "valves.proportional.dead_band": preset["valve.dead_band"],
-        "effects.spool_play.width": preset["valve.hysteresis"],
+        "valves.proportional.dead_band": valve["dead_band"],
+        "effects.spool_play.width": truth["preset"]["values"]["bench.hysteresis"],
         "actuator.leak.area": actuator["leak"]["area"],
     }
 

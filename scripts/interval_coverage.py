@@ -3,9 +3,9 @@
     python scripts/interval_coverage.py --seed 5 --fits 40 --cell ideal --cell white --processes 4
 
 Two step responses of 501 samples, there and back; four numbers of the device are sought beside all tolerances.
-``ideal`` and ``default`` are recorded by the simulated bench (ideal-laboratory and paper-bench), which has a solver
-and physics of its own. The kinds of noise are runs of the model, whose truth, tolerances included, is drawn anew for
-each fit. Departures are runs of a device that the fitted model is not. A seed is given, so that no fit was tuned to it.
+``ideal`` and ``default`` are recorded by the simulated bench (ideal-laboratory and paper-bench), in a tenth of the
+model's steps. The kinds of noise are runs of the model, whose truth, tolerances included, is drawn anew for each fit.
+Departures are runs of a device that the fitted model is not. A seed is given, so that no fit was tuned to it.
 """
 
 import argparse

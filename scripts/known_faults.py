@@ -2,8 +2,8 @@
 
     python scripts/known_faults.py --seeds 4711 4712 --pairs 40 --right 100 --processes 4
 
-Recordings are step responses of the simulated bench (ideal-laboratory), which shares no equation of motion and
-no integrator with the model: 1 kHz, free vane, its own noise. Each fault is one of the record or one number of the
+Recordings are step responses of the simulated bench (ideal-laboratory), runs in a tenth of the model's steps: 1 kHz,
+free vane, its own noise. Each fault is one of the record or one number of the
 device. `right`: the fault is named first, or among those that the recordings cannot tell from the first; `wrong`:
 another is named; `none`: none is. ``--pairs`` has two different faults at once, drawn with the first seed: no single
 change explains them. ``--right`` has no fault, with seeds from the first on. ``--noise`` adds a kind of noise of

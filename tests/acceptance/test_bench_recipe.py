@@ -33,16 +33,16 @@ def found(bench: Path) -> Identification:
 
 def test_every_value_lies_inside_its_interval_or_is_flagged(bench: Path, found: Identification) -> None:
     truth = json.loads((bench / "rig.json").read_text())["recordings"]["valve-map.csv"]
-    device, preset = truth["device"], truth["preset"]["values"]
+    device = truth["device"]
     true = {
         "actuator.torque_constant": device["actuator"]["torque_constant"],
         "friction.static_torque": device["friction"]["static_torque"],
-        "effects.seal_friction.static_per_pressure": preset["friction.static_per_pressure"],
+        "effects.seal_friction.static_per_pressure": device["effects"]["seal_friction"]["static_per_pressure"],
         "friction.viscous_damping": device["friction"]["viscous_damping"],
         "friction.dynamic_torque": device["friction"]["dynamic_torque"],
         "valves.proportional.discharge_coefficient": device["valve"]["discharge_coefficient"],
-        "valves.proportional.dead_band": preset["valve.dead_band"],
-        "effects.spool_play.width": preset["valve.hysteresis"],
+        "valves.proportional.dead_band": device["valve"]["dead_band"],
+        "effects.spool_play.width": truth["preset"]["values"]["bench.hysteresis"],
         "actuator.leak.area": device["actuator"]["leak"]["area"],
     }
     estimates = {item.path: item for item in found.estimates}

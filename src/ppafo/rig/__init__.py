@@ -1,4 +1,4 @@
-"""Simulated test bench: a detailed model beyond the identified model, which records synthetic data."""
+"""Simulated test bench: runs of the model with the errors of sensors, recorded as a laboratory would, synthetic."""
 
 from ppafo.rig.experiments import RigRecording, record
 from ppafo.rig.preset import Preset, list_presets, load_preset

@@ -1,134 +1,327 @@
-"""Experiments of the simulated bench by name, each a function ``ExperimentRequest -> ExperimentResult``.
+"""Experiments of the simulated bench: synthetic recordings of runs and of steady states, with the errors of sensors.
 
-``record`` runs one experiment and returns the synthetic recording with the true parameters.
+Motion and gas are those of ``simulate``, in a tenth of its steps; a preset adds effects that the identified model has
+not. Readings of steady states are formulas. ``record`` returns the recording with the true parameters.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ppafo.constants import PASCALS_PER_PSI
 from ppafo.documents.json_text import fields_of, plain
-from ppafo.errors import ParameterError
-from ppafo.parameters.device import VANE, Device
-from ppafo.parameters.loading import load_parameter_set
-from ppafo.progress import Report, report_nothing
+from ppafo.errors import ParameterError, SimulationError
+from ppafo.model.catalog import VALVES
+from ppafo.model.effects.spool_play import spool_position
+from ppafo.model.gas import temperature_flow_factor
+from ppafo.model.orifice import exact_flow
+from ppafo.parameters.device import VANE, Device, SonicOrifice
+from ppafo.parameters.loading import load_device, load_parameter_set
+from ppafo.parameters.overrides import read_overrides
+from ppafo.parameters.plant import valve_settings
 from ppafo.rig.preset import PREFIX, Preset, list_presets, load_preset
-from ppafo.rig.setup import ExperimentRequest, ExperimentResult
-from ppafo.rig.steady import record_open_valve, record_static_torque, record_steady_leak, record_valve_map
-from ppafo.rig.transient import record_free_decay, record_step_response, record_torque_task, record_vane_leak
-from ppafo.signals.recording import Recording
-from ppafo.simulation.scenario import LARGEST_SEED, UNITS
+from ppafo.rig.sensors import SENSORS, random_stream, read_off
+from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
+from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.simulation.plan import exact_orifice
+from ppafo.simulation.scenario import LARGEST_SEED, UNITS, Scenario, vane_motion
+from ppafo.simulation.simulate import simulate
 from ppafo.version import __version__
 from ppafo.wording import known_names, one_line
 
-_DEFAULT_DEVICE = "ppafo2011"
-_DEFAULT_PRESET = "paper-bench"
 NOTICE = "synthetic: made by the simulated test bench of ppafo in place of a measurement"
 """Notice in the metadata of every recording of the simulated bench."""
 
-EXPERIMENTS: dict[str, tuple[str, Callable[[ExperimentRequest], ExperimentResult]]] = {
-    "static-torque": ("torque on a scale over pressure, three times up and down", record_static_torque),
-    "free-decay": ("angle after an impulse, chambers open to the room", record_free_decay),
-    "open-valve-flow": ("flow of the open valve at many pressures", record_open_valve),
-    "vane-leak": ("pressures of plugged chambers as gas leaks across the vane", record_vane_leak),
-    "vane-leak-steady": ("flow that maintains the pressure in chamber 1", record_steady_leak),
-    "valve-map": ("flow of the valve over its command, up and down", record_valve_map),
-    "step-response": ("figure 7: valve opened fully, vane from stop to stop", record_step_response),
-    "torque-task": ("figure 8: torque ramp and hold under control", record_torque_task),
-}
-"""Experiments by name: summary, and function that records."""
+_STEP, _HIGHEST, _TURN = 5.0 * PASCALS_PER_PSI, 95.0 * PASCALS_PER_PSI, 115.0 * PASCALS_PER_PSI
+"""Step and largest pressure difference [Pa] of static torque, and the one at which pressure begins to fall."""
+_UPSTREAM_GAUGE = tuple(level * PASCALS_PER_PSI for level in (20.0, 35.0, 50.0, 65.0, 80.0))
+_PRESSURE_RATIOS = (0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.98)
+"""Upstream gauge pressures [Pa] at the open valve, and ratios of downstream to upstream pressure [-]."""
+_READING_INTERVAL, _LEAK_RATE, _SMALL_METER = 2.0, 20.0, 0.1
+"""Time between readings at rest [s], sample rate of vane-leak [Hz], range of the meter of its flow over the other's."""
+_NOTHING = 1.0e-9
+"""Torque constant [m^3] of a device without gas torque, and diameter [m] of plugged ports."""
 
 
 @dataclass(frozen=True, slots=True)
 class RigRecording:
-    """Synthetic recording with the true device and the true parameters behind it.
+    """Synthetic recording with what is true of it.
 
-    ``device``: the true device, which the sensors do not know
     ``truth``: all settings and true values as plain data, for ``rig.json``
     ``motion``: motion of the vane for ``validate``, "" for an experiment without motion
     """
 
     recording: Recording
-    device: Device
     truth: Mapping[str, Any]
     motion: str = ""
 
 
+def _static_torque(device: Device, preset: Preset, seed: int) -> dict[str, Floats]:
+    """Torque on the scale [N m] over pressure difference, three times up and down in steps of 5 psi.
+
+    The vane presses on a scale and creeps without slipping, so friction is at the static limit and opposes the
+    direction of the pressure change: a play operator without inertia.
+    """
+    rising = np.arange(1, round(_HIGHEST / _STEP) + 1) * _STEP
+    sweep = np.concatenate([rising, rising[::-1]])
+    scatter = random_stream(seed, "friction").standard_normal((3, sweep.size))
+    per_pressure = device.effects.get("seal_friction", {}).get("static_per_pressure", 0.0)
+    torque = []
+    for repetition in preset.values["bench.friction_scatter"] * scatter:
+        reading = 0.0
+        for number, (pressure, deviation) in enumerate(zip(sweep, repetition, strict=True)):
+            # On the way to the turn friction has changed sides, whatever was read before.
+            if number == rising.size:
+                reading = device.actuator.torque_constant * _TURN
+            limit = (device.friction.static_torque + per_pressure * pressure) * max(0.0, 1.0 + deviation)
+            reading = on_scale(reading, device.actuator.torque_constant * pressure, limit)
+            torque.append(reading)
+    return {
+        "torque": np.array(torque),
+        "pressure_difference": np.tile(sweep, len(scatter)),
+        "direction": np.tile(np.repeat([1.0, -1.0], rising.size), len(scatter)),
+        "repetition": np.repeat(np.arange(1.0, len(scatter) + 1.0), sweep.size),
+    }
+
+
+def on_scale(before: float, actuator: float, limit: float) -> float:
+    """Torque on a scale [N m] that cannot pull: friction [N m] takes any difference up to its limit [N m]."""
+    return max(0.0, min(max(before, actuator - limit), actuator + limit))
+
+
+def _open_valve(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
+    """Mass flow [kg/s] of the fully open valve at several upstream and downstream pressures."""
+    ambient, pairs = device.supply.atmospheric_pressure, []
+    for level in (ambient + gauge for gauge in _UPSTREAM_GAUGE):
+        pairs += [(level, ambient)]
+        pairs += [(level, level * ratio) for ratio in _PRESSURE_RATIOS if level * ratio > ambient]
+    points = np.array(pairs * 2)
+    return {
+        "upstream_pressure": points[:, 0],
+        "downstream_pressure": points[:, 1],
+        "mass_flow": np.array([_valve_flow(device, preset, up, down, 1.0) for up, down in points.tolist()]),
+        "command": np.ones(len(points)),
+    }
+
+
+def _valve_map(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
+    """Mass flow [kg/s] of the valve over command, outlet to atmosphere; positive into chamber 1."""
+    supply, ambient = device.supply, device.supply.atmospheric_pressure
+    # The openings once nothing moves any more: of the valve with every time and frequency taken out.
+    kind = VALVES[device.valve.kind]
+    still = valve_settings(device.valve)._replace(**{item.name: 0.0 for item in kind.quantities if item.unit})
+    model = kind.choose(still)
+    parameters = model.prepare(still)
+    rising = np.linspace(-1.0, 1.0, 101)
+    commands = np.concatenate([rising, rising[-2::-1]])
+    # The sweep begins at the lowest command, where the play lies behind the spool.
+    spool, flows = -1.0, []
+    for command in commands.tolist():
+        spool = spool_position(spool, command, preset.values["bench.hysteresis"])
+        openings = model.instant(parameters, model.settle(parameters, model.initial(), spool, 0.0), spool)
+        forward = _valve_flow(device, preset, supply.pressure, ambient, openings.source_1)
+        flows.append(forward - _valve_flow(device, preset, supply.dorsiflexion_pressure, ambient, openings.source_2))
+    return {
+        "command": commands,
+        "mass_flow": np.array(flows),
+        "upstream_pressure": np.where(commands < 0.0, supply.dorsiflexion_pressure, supply.pressure),
+        "downstream_pressure": np.full(commands.size, ambient),
+    }
+
+
+def _steady_leak(device: Device, _preset: Preset, _seed: int) -> dict[str, Floats]:
+    """Mass flow [kg/s] that maintains the pressure in chamber 1, with chamber 2 at the atmosphere."""
+    ambient, orifice = device.supply.atmospheric_pressure, exact_orifice(device.actuator.leak, device)
+    levels = ambient + np.tile(np.arange(5.0, 85.0, 5.0) * PASCALS_PER_PSI, 2)
+    laminar = device.effects.get("laminar_leak", {}).get("coefficient", 0.0)
+    through = [exact_flow(level, ambient, orifice.conductance, orifice) for level in levels.tolist()]
+    return {
+        "pressure_1": levels,
+        "pressure_2": np.full(levels.size, ambient),
+        "mass_flow": np.array(through) + laminar * (levels**2 - ambient**2),
+    }
+
+
+def _valve_flow(device: Device, preset: Preset, upstream: float, downstream: float, opening: float) -> float:
+    """Mass flow [kg/s] of the valve at two pressures [Pa] and an opening [-], for the gas in the flow meter."""
+    orifice = exact_orifice(device.valve.orifice, device)
+    flow = exact_flow(upstream, downstream, opening * orifice.conductance, orifice)
+    warmer = device.gas.temperature + preset.values["bench.gas_difference"]
+    return flow * temperature_flow_factor(device.gas.temperature, warmer)
+
+
+_STEADY: dict[str, Callable[[Device, Preset, int], dict[str, Floats]]] = {
+    "static-torque": _static_torque,
+    "open-valve-flow": _open_valve,
+    "vane-leak-steady": _steady_leak,
+    "valve-map": _valve_map,
+}
+"""Experiments whose readings are taken at rest, and the functions that return their true values [SI] by channel."""
+_SENSED = ("angle", "pressure_1", "pressure_2", "supply_pressure", "dorsiflexion_pressure")
+_MOVING: dict[str, tuple[str, ...]] = {
+    "free-decay": ("angle",),
+    "vane-leak": ("pressure_1", "pressure_2"),
+    "step-response": (*_SENSED, "command", "torque"),
+    "torque-task": (*_SENSED, "command", "reference", "torque"),
+}
+"""Channels of experiments that are runs."""
+EXPERIMENTS = {
+    "static-torque": "torque on a scale over pressure, three times up and down",
+    "free-decay": "angle after an impulse, chambers open to the room",
+    "open-valve-flow": "flow of the open valve at many pressures",
+    "vane-leak": "pressures of plugged chambers as gas leaks across the vane",
+    "vane-leak-steady": "flow that maintains the pressure in chamber 1",
+    "valve-map": "flow of the valve over its command, up and down",
+    "step-response": "figure 7: valve opened fully, vane from stop to stop",
+    "torque-task": "figure 8: torque ramp and hold under control",
+}
+"""Summaries of the experiments by name."""
+
+
 def record(
     experiment: str,
-    preset: str | Path | Preset = _DEFAULT_PRESET,
+    preset: str | Path = "paper-bench",
     seed: int = 1,
-    device: str = _DEFAULT_DEVICE,
+    device: str = "ppafo2011",
     overrides: Iterable[str] = (),
     valve: str | None = None,
-    progress: Report = report_nothing,
 ) -> RigRecording:
     """Run an experiment on the simulated bench; equal arguments give identical bytes.
 
-    ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (dynamic
-    experiments) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). ``progress`` is called every second with the number
-    of samples recorded. Raises SimulationError if the solver fails.
+    ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (experiments with
+    motion) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). Raises SimulationError if the run fails.
     """
-    summary, run = find_experiment(experiment)
+    if experiment not in EXPERIMENTS:
+        raise ParameterError(f"there is no experiment '{one_line(experiment)}'{known_names(experiment, EXPERIMENTS)}")
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
         raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
     overrides = tuple(overrides)
-    of_preset = tuple(override for override in overrides if override.strip().startswith(PREFIX))
-    others = tuple(override for override in overrides if override not in of_preset)
-    if not isinstance(preset, Preset):
-        preset = load_preset(preset, of_preset)
-    elif of_preset:
-        raise ParameterError(f"override '{of_preset[0]}': not allowed with a preset object; use Preset.with_value")
+    of_preset = [override for override in overrides if override.strip().startswith(PREFIX)]
+    bench = load_preset(preset, of_preset)
     kind = load_parameter_set(device).actuator_kind
     if kind != VANE:
         raise ParameterError(
-            f"the simulated test bench supports vane actuators only, but the actuator of '{one_line(device)}' is of "
-            f"kind '{kind}'; choose a device with a vane actuator"
+            f"the simulated test bench supports vane actuators only; that of '{one_line(device)}' is a '{kind}'"
         )
-    result = run(ExperimentRequest(preset, seed, device, valve, others, progress))
+    scenario = _scenario(experiment, device, valve, bench, [text for text in overrides if text not in of_preset])
+    true = scenario.device
+    true.check_pressurised("the simulated test bench", "; use the recording of a simulated run")
+    if experiment in _MOVING:
+        values, interval = _run(experiment, scenario), scenario.run.output_interval
+    else:
+        values, interval = _STEADY[experiment](true, bench, seed), _READING_INTERVAL
+    recording, errors = _read(experiment, values, interval, bench, true, seed)
+    moved = vane_motion(scenario)
+    kind = "leg" if moved.leg else getattr(moved, "kind", "free")
+    motion = {"prescribed": "measured"}.get(kind, kind) if experiment in _MOVING else ""
     truth = {
         "notice": NOTICE,
         "units": UNITS,
         "version": __version__,
         "experiment": experiment,
-        "summary": summary,
         "seed": seed,
         "parameter_set": device,
         "overrides": list(overrides),
-        "device": plain(result.device),
-        "shown": dict(result.device.shown),
-        "preset": {
-            **fields_of(preset, "name", "title"),
-            "values": plain(preset.values),
-            "reasons": dict(preset.reasons),
-        },
-        "sensor_offsets": plain(result.offsets),
-        "settings": plain(result.settings),
-        "channels": {name: result.recording.unit(name) for name in result.recording.names},
-        "samples": len(result.recording),
-        **({"replaced": result.replaced} if result.replaced else {}),
+        "device": plain(true),
+        "shown": dict(true.shown),
+        "preset": plain(fields_of(bench, "name", "title", "model", "values")),
+        "sensor_errors": errors,
+        **({"replaced": scenario.origin.replaced} if scenario.origin.replaced else {}),
     }
-    return RigRecording(result.recording, result.device, truth, result.motion)
-
-
-def find_experiment(name: str) -> tuple[str, Callable[[ExperimentRequest], ExperimentResult]]:
-    """Return summary and function of an experiment. Raises ParameterError for an unknown name."""
-    if name not in EXPERIMENTS:
-        raise ParameterError(f"there is no experiment '{one_line(name)}'{known_names(name, EXPERIMENTS)}")
-    return EXPERIMENTS[name]
+    return RigRecording(recording, truth, motion)
 
 
 def overview() -> tuple[str, dict[str, Any]]:
     """Return the list of experiments and presets with descriptions, as text and as plain data."""
-    experiments = {name: summary for name, (summary, _) in EXPERIMENTS.items()}
-    presets = {name: load_preset(name).title for name in list_presets()}
-    width = max(map(len, [*experiments, *presets]))
-    lines = ["experiments (recordings are synthetic):"]
-    lines += [f"  {name:<{width}}  {summary}" for name, summary in experiments.items()]
-    lines += ["presets:", *(f"  {name:<{width}}  {title}" for name, title in presets.items())]
-    document = {
-        "experiments": [{"name": name, "summary": summary} for name, summary in experiments.items()],
-        "presets": [{"name": name, "title": title} for name, title in presets.items()],
+    listed = {"experiments": EXPERIMENTS, "presets": {name: load_preset(name).title for name in list_presets()}}
+    lines = ["all recordings are synthetic"]
+    for title, items in listed.items():
+        lines += [f"{title}:", *(f"  {name:<16}  {summary}" for name, summary in items.items())]
+    rows = {title: [{"name": name, "summary": said} for name, said in items.items()] for title, items in listed.items()}
+    return "\n".join(lines), rows
+
+
+def _scenario(experiment: str, device: str, valve: str | None, bench: Preset, overrides: list[str]) -> Scenario:
+    """Return the scenario of an experiment: of the package, or one with a closed valve."""
+    kind = load_device(device, valve=valve).valve.kind
+    rate = _LEAK_RATE if experiment == "vane-leak" else bench.values["bench.rate"]
+    # Ten steps where the identified model makes one.
+    of_run = ("run.step=0.1 ms", f"run.output_interval={1.0 / rate!r} s")
+    given = {override.typed for override in read_overrides(overrides)}
+    of_bench = (*of_run, *bench.model, *bench.valves.get(kind, ()))
+    changes = [*(text for text in of_bench if text.partition("=")[0].strip() not in given), *overrides]
+    table = {"set": device} if valve is None else {"set": device, "valve": valve}
+    if experiment in ("step-response", "torque-task"):
+        content = load_scenario(f"torque-task-{kind}" if experiment == "torque-task" else experiment).origin.content
+        # As overrides, so that the scenario reports its values that replace values of another set.
+        chosen = {"valve": load_parameter_set(device).default_valve, **table}
+        of_device = (f"device.{key}={value}" for key, value in chosen.items() if value != content["device"][key])
+        return scenario_from_dict(content, [*of_device, *changes])
+    of_actuator = [override for override in overrides if override.strip().startswith("actuator.")]
+    actuator = load_device(device, overrides=of_actuator, valve=valve).actuator
+    is_decay = experiment == "free-decay"
+    locked = {"kind": "locked", "angle": f"{0.5 * (actuator.angle_min + actuator.angle_max)!r} rad"}
+    document: dict[str, Any] = {
+        "schema_version": 1,
+        "name": experiment,
+        "device": table,
+        "run": {"duration": "2 s" if is_decay else "30 s"},
+        "motion": {"kind": "free", "angle": "25 deg", "angular_velocity": "380 deg/s"} if is_decay else locked,
+        "initial": {"pressure_1": "atmosphere" if is_decay else "supply", "pressure_2": "atmosphere"},
+        "controller": {"kind": "constant", "command": 0, "rate": "1 kHz"},
     }
-    return "\n".join(lines), document
+    return scenario_from_dict(document, changes)
+
+
+def _run(experiment: str, scenario: Scenario) -> dict[str, Floats]:
+    """Return the true values [SI] of a run by channel. Raises SimulationError if the run fails."""
+    device = scenario.device
+    if experiment == "free-decay":
+        # Open chambers give no torque, and on its side gravity turns nothing.
+        actuator = replace(device.actuator, torque_constant=_NOTHING, displacement_per_radian=_NOTHING)
+        device = replace(device, actuator=actuator, foot_plate=replace(device.foot_plate, gravity_torque=0.0))
+    if experiment == "vane-leak":
+        orifice: Any = device.valve.orifice
+        size = "sonic_conductance" if isinstance(orifice, SonicOrifice) else "area"
+        device = replace(device, valve=replace(device.valve, orifice=replace(orifice, **{size: _NOTHING**2})))
+    result = simulate(replace(scenario, device=device))
+    if not result.status.is_completed:
+        raise SimulationError(f"the simulated test bench: {result.status}")
+    found, supply = result.recording, device.supply
+    constant = {"supply_pressure": supply.pressure, "dorsiflexion_pressure": supply.dorsiflexion_pressure}
+    values = {name: np.full(len(found), level) for name, level in constant.items()}
+    # Regulators that give way feed lines.
+    lines = {"supply_pressure": "line_pressure_1", "dorsiflexion_pressure": "line_pressure_2"}
+    values |= {name: found[line] for name, line in lines.items() if line in found}
+    values |= {name: found[name] for name in found.names}
+    return {name: values[name] for name in _MOVING[experiment]}
+
+
+def _read(
+    experiment: str, true: Mapping[str, Floats], interval: float, bench: Preset, device: Device, seed: int
+) -> tuple[Recording, dict[str, dict[str, float]]]:
+    """Return the recording of the sensors, and offset [SI] and gain error [-] of each; other channels are exact."""
+    ambient, is_run = device.supply.atmospheric_pressure, experiment in _MOVING
+    channels, errors = dict[str, Floats](), dict[str, dict[str, float]]()
+    for name, values in true.items():
+        channels[name] = values
+        if name in SENSORS and not (is_run and name == "torque"):
+            channels[name], errors[name] = read_off(
+                bench,
+                name,
+                seed,
+                values,
+                interval=interval if is_run else 0.0,
+                # A gauge sensor shows the atmosphere as 0, whatever its gain.
+                turn=ambient if CHANNELS[name].unit == "Pa" and name != "pressure_difference" else 0.0,
+                meter_range=_SMALL_METER if (experiment, name) == ("vane-leak-steady", "mass_flow") else 1.0,
+            )
+    if is_run and "torque" in true:
+        # Of the measured pressures, as a laboratory has it.
+        channels["torque"] = device.actuator.torque_constant * (channels["pressure_1"] - channels["pressure_2"])
+    times = np.arange(len(next(iter(true.values()))), dtype=np.float64) * interval
+    described = {name: Channel(values, CHANNELS[name].unit) for name, values in channels.items()}
+    return Recording(experiment, times, described, kind="synthetic"), errors

@@ -49,22 +49,12 @@ def _earlier(folder: Path, name: str) -> dict[str, Any]:
     present = {entry.name for entry in entries if LEFT_ASIDE not in entry.name}
     recordings: Any = {}
     if RIG_FILE in present:
-        path = folder / RIG_FILE
-        try:
-            document = read_json(path)
-        except DataError as error:
-            raise DataError(f"{error}, so the file is not overwritten; choose another folder") from error
-        if not isinstance(document, dict) or document.get("format") != _FORMAT:
-            raise DataError(
-                f"{path}: was not written by the simulated test bench, so it is not overwritten; choose another folder"
-            )
-        recordings = document.get("recordings")
-        if not isinstance(recordings, dict):
-            raise DataError(f"{path}: has no key 'recordings', so it is not overwritten; choose another folder")
-    elif present:
+        document = read_json(folder / RIG_FILE)
+        is_of_rig = isinstance(document, dict) and document.get("format") == _FORMAT
+        recordings = document.get("recordings") if is_of_rig else None
+    if not isinstance(recordings, dict) or (present and RIG_FILE not in present):
         raise DataError(
-            f"{folder}: is not empty and contains no recordings of the simulated test bench (it has no {RIG_FILE}); "
-            "choose another folder"
+            f"{folder}: is not empty and contains no {RIG_FILE} of the simulated test bench; choose another folder"
         )
     if name in present and name not in recordings:
         raise DataError(

@@ -1,18 +1,12 @@
-"""Sensors of the simulated bench: noise, offset and quantisation by channel, from a random seed.
-
-The bandwidth of sensors is integrated with the rig. Every channel has a separate stream of random numbers, so that an
-additional channel changes no other channel.
-"""
-
-from dataclasses import dataclass
+"""Sensors of the simulated bench: lag, gain, offset, noise and quantisation by channel, from a random seed."""
 
 import numpy as np
 
-from ppafo.model.sensors import quantise
+from ppafo.model.sensors import follow, quantise
 from ppafo.rig.preset import Preset
 from ppafo.signals.recording import Floats
 
-CHANNEL_SENSORS = {
+SENSORS = {
     "angle": "angle_sensor",
     "pressure_1": "pressure_sensor",
     "pressure_2": "pressure_sensor",
@@ -30,41 +24,42 @@ CHANNEL_SENSORS = {
 The order determines the streams: a new channel must come last, so that the other streams do not change.
 """
 
-# By its position, not its name: renaming a channel leaves its noise.
-_STREAMS = {name: number for number, name in enumerate(CHANNEL_SENSORS)}
-"""Index of the random stream of each channel."""
+
+def random_stream(seed: int, channel: str, *more: int) -> np.random.Generator:
+    """Return a random generator of a channel, separate so that an additional channel changes no other channel."""
+    # By its position, not its name: renaming a channel leaves its noise.
+    sequence = np.random.SeedSequence([seed, list(SENSORS).index(channel), *more])
+    return np.random.Generator(np.random.PCG64(sequence))
 
 
-@dataclass(frozen=True, slots=True)
-class SimulatedSensor:
-    """Simulated sensor of a run: offset, quantisation step, and noise of every sample [SI]."""
+def read_off(
+    preset: Preset,
+    channel: str,
+    seed: int,
+    true: Floats,
+    *,
+    interval: float = 0.0,
+    turn: float = 0.0,
+    meter_range: float = 1.0,
+) -> tuple[Floats, dict[str, float]]:
+    """Return readings of true values [SI] by the sensor of a channel, and its offset [SI] and gain error [-].
 
-    offset: float
-    resolution: float
-    noise: Floats
-
-    def reads(self, true: float, sample: int) -> float:
-        """Return the reading [SI] for a true value [SI] at a sample, whose index selects the noise."""
-        return quantise(true + self.offset + float(self.noise[sample]), self.resolution)
-
-    def readings(self, true: Floats) -> Floats:
-        """Return readings of a series of true values [SI], starting at sample 0."""
-        return np.array([self.reads(float(value), sample) for sample, value in enumerate(true)])
-
-
-def random_stream(seed: int, channel: str) -> np.random.Generator:
-    """Return the random generator of a channel."""
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, _STREAMS[channel]])))
-
-
-def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_range: float = 1.0) -> SimulatedSensor:
-    """Create the simulated sensor of a channel, with noise for a number of samples.
-
-    ``fraction_of_range`` [-] scales offset, noise and quantisation step for a sensor of smaller range.
+    Arguments:
+        interval: sample interval [s]; 0 for readings of steady states, which no lag changes
+        turn: value [SI] that a gain error leaves as it is, the atmosphere for a gauge sensor
+        meter_range: range relative to that of the preset's sensor [-], which scales offset, noise and resolution
     """
-    numbers = preset.section(CHANNEL_SENSORS[channel])
-    offset, noise, resolution = (fraction_of_range * numbers[name] for name in ("offset", "noise", "resolution"))
+    names = ("gain", "lag", "offset", "noise", "resolution")
+    gain, lag, offset, noise, resolution = (preset.values[f"{SENSORS[channel]}.{name}"] for name in names)
     stream = random_stream(seed, channel)
     # The offset comes first, so that a longer recording begins with the same noise.
-    drawn = offset * float(stream.standard_normal())
-    return SimulatedSensor(drawn, resolution, noise * stream.standard_normal(samples))
+    offset *= meter_range * float(stream.standard_normal())
+    gain *= float(random_stream(seed, channel, 1).standard_normal())
+    shown = np.array(true)
+    for sample in range(1, shown.size if lag > 0.0 and interval > 0.0 else 0):
+        shown[sample] = follow(
+            1.0 / lag, interval, float(shown[sample - 1]), float(true[sample - 1]), float(true[sample])
+        )
+    shown += gain * (shown - turn) + offset + meter_range * noise * stream.standard_normal(true.size)
+    readings = [quantise(float(value), meter_range * resolution) for value in shown]
+    return np.array(readings), {"offset": offset, "gain": gain}

@@ -14,7 +14,6 @@ from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.overrides import read_overrides, with_overrides
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
 from ppafo.parameters.parameter_set import entry_text, with_followers
-from ppafo.progress import Report, report_nothing
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import quantities
@@ -92,7 +91,7 @@ RIG_SEED = 1
 BENCH_PRESET = "paper-bench"
 """Preset of a bench similar to the paper's, for figures 3 and 7."""
 TASK_PRESET = "ideal-laboratory"
-"""Preset with the paper's physics and noisy sensors for the torque tasks, which take 6 s on ``paper-bench``."""
+"""Preset with the paper's physics and noisy sensors for the torque tasks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,17 +105,15 @@ class SyntheticEvidence:
     proportional: Recording
 
 
-def synthetic_evidence(
-    tasks: Mapping[str, tuple[str, ...]], step_overrides: Sequence[str], report: Report = report_nothing
-) -> SyntheticEvidence | str:
-    """Return the recordings of the rig, or an error message if its solver fails or it does not support the overrides.
+def synthetic_evidence(tasks: Mapping[str, tuple[str, ...]], step_overrides: Sequence[str]) -> SyntheticEvidence | str:
+    """Return the recordings of the rig, or an error message if a run fails or the rig does not support the overrides.
 
     ``tasks`` are the overrides of the torque task for the valves ``solenoid`` and ``proportional``. The procedures of
     figure 3 always use the paper's values, without overrides.
     """
     try:
         recorded = {
-            valve: record("torque-task", TASK_PRESET, RIG_SEED, PLANTED_SET, overrides, valve, report).recording
+            valve: record("torque-task", TASK_PRESET, RIG_SEED, PLANTED_SET, overrides, valve).recording
             for valve, overrides in tasks.items()
         }
         torque, decay = bench_figure()
@@ -135,7 +132,7 @@ def synthetic_evidence(
 def bench_figure() -> tuple[BenchResult, BenchResult]:
     """Identify torque constant and damping as in figure 3, from synthetic recordings.
 
-    Raises SimulationError if the solver of the rig fails.
+    Raises SimulationError if a run of the rig fails.
     """
     # Kept: it takes seconds, and no override reaches it.
     inertia = load_device(PLANTED_SET).foot_plate.inertia

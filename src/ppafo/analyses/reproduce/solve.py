@@ -222,7 +222,7 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     # The rig records with the overrides of the simulations.
     changes = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
     tasks = {"solenoid": changes[SOLENOID], "proportional": changes[PROPORTIONAL]}
-    synthetic = synthetic_evidence(tasks, changes[STEP], report)
+    synthetic = synthetic_evidence(tasks, changes[STEP])
     report(Progress("checking the paper's own numbers"))
     reported = load_reported()
     completed = load_parameter_set(step.scenario.origin.parameter_set)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Folder, Name, Overrides, Whole, Word
-from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
     from ppafo.cli.output import CommandOutput
@@ -22,7 +21,6 @@ def rig_simulate(
     valve: Name | None = None,
     overrides: Overrides = (),
     out: Folder = Path("out/rig"),
-    progress: Report = report_nothing,
 ) -> CommandOutput:
     """Run an experiment on the simulated test bench, and write the recording of a laboratory, marked as synthetic.
 
@@ -39,14 +37,13 @@ def rig_simulate(
     written: rig (valve-map.csv, rig.json)
     """
     from ppafo.cli.output import CommandOutput, blame_out_option
-    from ppafo.rig.experiments import NOTICE, find_experiment, record
+    from ppafo.rig.experiments import NOTICE, record
     from ppafo.rig.folder import check_rig_folder, write_rig_recording
 
-    # An unknown name and a refused folder are told before anything runs.
-    find_experiment(experiment)
+    # A refused folder is told before anything runs.
     with blame_out_option():
         check_rig_folder(out, experiment)
-    rig_recording = record(experiment, preset, seed, device, overrides, valve, progress)
+    rig_recording = record(experiment, preset, seed, device, overrides, valve)
     files = write_rig_recording(out, rig_recording)
     recording = rig_recording.recording
     samples = f"{len(recording)} samples of {', '.join(recording.names)}"
