@@ -36,6 +36,8 @@ def functions() -> Iterator[tuple[str, Callable[..., Any]]]:
 
 
 FUNCTIONS = dict(functions())
+COSTLY = ("ppafo design", "ppafo reproduce", "ppafo tune")
+"""Examples that take many seconds: their pages run these commands."""
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -48,6 +50,8 @@ def test_the_example_of_a_docstring_prints_what_it_shows(
     lines = sum(len((part.source + part.want).splitlines()) for part in example.examples)
     assert 2 <= lines <= LONGEST, f"{name}: its docstring needs an example of at most {LONGEST} lines, not {lines}"
     assert any(part.want for part in example.examples), f"{name}: its example prints nothing"
+    if name in COSTLY:
+        return
     monkeypatch.chdir(tmp_path)
     said: list[str] = []
     doctest.DocTestRunner(optionflags=FLAGS).run(example, out=said.append)

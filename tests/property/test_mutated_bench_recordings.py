@@ -97,7 +97,7 @@ def test_the_recording_that_is_damaged_is_taken_as_it_is(tmp_path: Path, kind: s
 @example("free-decay", 0.5, 8, "1e300", True)
 @example("free-decay", 0.3984375, 1, "1e300", False)
 @example("vane-leak", 0.041015625, 3, "nan", False)
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW])
+@settings(max_examples=70, suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW])
 def test_a_damaged_recording_gives_numbers_or_one_line(
     tmp_path: Path, kind: str, place: float, length: int, cell: str, through_map: bool
 ) -> None:
@@ -115,7 +115,7 @@ def test_a_damaged_recording_gives_numbers_or_one_line(
 
 
 @given(st.binary(max_size=200) | st.text(max_size=200).map(str.encode), st.booleans())
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW])
 def test_any_bytes_are_a_recording_or_one_line_that_names_the_file(
     tmp_path: Path, content: bytes, through_map: bool
 ) -> None:
@@ -131,7 +131,7 @@ def test_any_bytes_are_a_recording_or_one_line_that_names_the_file(
 
 
 @given(st.lists(st.lists(st.sampled_from(["0", "1", "2.5", "-3", "nan", "", "1e9", "x"]), max_size=4), max_size=6))
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW])
 def test_any_table_of_cells_is_a_recording_or_names_line_or_header(tmp_path: Path, rows: list[list[str]]) -> None:
     path = tmp_path / "bench.csv"
     path.write_text("\n".join(["time [s],angle [deg]", *(",".join(row) for row in rows), ""]))

@@ -68,7 +68,7 @@ def test_damaged_file_is_refused_in_one_line_or_can_be_used(name: str, tmp_path:
     originals = [item.read_text(encoding="utf-8") for item in folder.iterdir() if item.name.endswith(".toml")]
     path = tmp_path / "damaged.toml"
 
-    @settings(max_examples=200 if name == "parameters" else 60, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=60 if name == "parameters" else 20, suppress_health_check=list(HealthCheck))
     @given(text=st.sampled_from(originals), changes=CHANGES)
     def check(text: str, changes: list[Change]) -> None:
         path.write_bytes(damaged(text, changes))
@@ -85,7 +85,7 @@ def test_damaged_file_is_refused_in_one_line_or_can_be_used(name: str, tmp_path:
 def test_any_bytes_are_refused_in_one_line(name: str, tmp_path: Path) -> None:
     path = tmp_path / "bytes.toml"
 
-    @settings(max_examples=30, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=10, suppress_health_check=list(HealthCheck))
     @given(content=st.binary(max_size=200))
     def check(content: bytes) -> None:
         path.write_bytes(content)

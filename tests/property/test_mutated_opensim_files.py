@@ -54,7 +54,7 @@ def check_is_read_whole_or_refused(content: bytes) -> None:
         Path(name).unlink()
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(st.data())
 def test_a_table_with_pieces_put_in_cut_out_or_changed(data: st.DataObject) -> None:
     content = GOOD

@@ -28,7 +28,7 @@ CELLS = st.sampled_from(["", "nan", "inf", "-1", "1e300", "-1e-300", "0", "130",
 
 @given(st.integers(0, len(TEXT) - 1), st.integers(0, 40), CELLS, st.sampled_from(MOTIONS), st.booleans())
 @example(len(HEADER) + 1, 5, "-1e300", "free", False)
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW])
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW])
 def test_a_damaged_recording_is_compared_or_refused_in_one_line(
     tmp_path: Path, start: int, length: int, cell: str, motion: str, through_map: bool
 ) -> None:

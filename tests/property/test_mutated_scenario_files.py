@@ -65,7 +65,7 @@ def start_angle(scenario: Scenario) -> float:
     return angle
 
 
-@settings(max_examples=500)
+@settings(max_examples=150)
 @given(text=st.sampled_from(ORIGINALS), changes=CHANGES)
 def test_damaged_lines_give_a_clear_error_or_a_scenario_that_can_be_run(text: str, changes: list[Change]) -> None:
     scenario = outcome_of(damaged(text, changes))
@@ -73,7 +73,7 @@ def test_damaged_lines_give_a_clear_error_or_a_scenario_that_can_be_run(text: st
         assert_can_be_run(scenario)
 
 
-@settings(max_examples=250)
+@settings(max_examples=80)
 @given(
     text=st.sampled_from(ORIGINALS),
     flips=st.lists(st.tuples(st.integers(0, 10_000), st.integers(0, 255)), min_size=1, max_size=6),
@@ -91,7 +91,7 @@ def test_flipped_bytes_and_a_cut_give_a_clear_error_or_a_scenario_that_can_be_ru
             assert_can_be_run(scenario)
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(
     text=st.sampled_from(ORIGINALS),
     removed=st.lists(SECTIONS, max_size=2),
@@ -108,7 +108,7 @@ def test_sections_removed_doubled_or_from_elsewhere_give_a_clear_error_or_a_scen
         assert_can_be_run(scenario)
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(content=st.binary(max_size=200))
 @example(b"")
 @example(b"\xef\xbb\xbf")

@@ -106,19 +106,19 @@ def outcomes(load: Any, words: list[str], seed: int) -> set[str]:
 
 
 @pytest.mark.parametrize("name", ["torque-task-proportional", "torque-task-moving-ankle"])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(words=st.lists(st.sampled_from(OF_A_VANE), min_size=2, max_size=7), seed=st.integers(0, 99))
 def test_a_scenario_is_the_same_for_all_orders(name: str, words: list[str], seed: int) -> None:
     assert len(outcomes(lambda order: numbers_of(load_scenario(name, order)), words, seed)) == 1
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(words=st.lists(st.sampled_from(OF_A_WALK), min_size=2, max_size=4), seed=st.integers(0, 99))
 def test_a_walk_is_the_same_for_all_orders(words: list[str], seed: int) -> None:
     assert len(outcomes(lambda order: numbers_of(load_scenario("proportional", order)), words, seed)) == 1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(words=st.lists(st.sampled_from(OF_A_DEVICE), min_size=2, max_size=6), seed=st.integers(0, 99))
 def test_a_parameter_set_is_the_same_for_all_orders(words: list[str], seed: int) -> None:
     completed = load_parameter_set("ppafo2011")

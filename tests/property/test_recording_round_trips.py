@@ -32,14 +32,14 @@ def recordings(draw: st.DrawFn) -> Recording:
 
 
 @given(recordings())
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_a_netcdf_file_gives_back_the_same_recording(recording: Recording) -> None:
     with tempfile.TemporaryDirectory() as folder:
         assert read_netcdf(write_netcdf(Path(folder) / "any.nc", recording)) == recording
 
 
 @given(recordings())
-@settings(max_examples=100)
+@settings(max_examples=40)
 def test_a_csv_file_gives_back_the_same_recording(recording: Recording) -> None:
     with tempfile.TemporaryDirectory() as folder:
         assert read_csv(write_csv(Path(folder) / "any.csv", recording), recording.label) == recording

@@ -316,11 +316,8 @@ def matlab(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     [
         ("t", "p1", 1.0),
         ("M(:,1)", "M(:, 3)", 2.0),
-        (1, 2, 1.0),
-        ("log.time", "log.signals(1).values", 1.0),
         ("log.time", "log.signals(2).values", 2.0),
         ("ts.Time", "ts.Data", 1.0),
-        ("time", "p", 1.0),
         ("opts.data(:,1)", "opts.data(:,2)", 1.0),
     ],
 )

@@ -129,15 +129,6 @@ def test_a_recording_without_gas_is_refused(tmp_path: Path, capsys: pytest.Captu
     assert "there is no channel 'supplied_mass'" in capsys.readouterr().err
 
 
-def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = folder_of(walk_gas(solenoid()), tmp_path / "walk")
-    assert main(["bottle", str(folder), "--json", "--longest", "5 s"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    made = endurance(solenoid(), longest=5.0).found
-    assert isinstance(made, Endurance)
-    assert document["result"]["strides"] == pytest.approx(made.discharge.strides, rel=1e-6)
-
-
 def test_the_gas_on_a_bottle_differs_by_its_regulator_and_its_cold() -> None:
     walked = ppafo.walk("solenoid", minutes=0.2)
     draw = ppafo.bottle(walked, bottle="co2-16g").found.draw
@@ -159,16 +150,6 @@ def test_a_warm_bottle_ends_as_the_walk_does_and_gives_no_fewer_strides() -> Non
     assert found.discharge.recording["bottle_pressure"][-1] < regulator.set_pressure + regulator.pressure_margin
     assert found.discharge.strides <= found.strides_when_warm <= 1.05 * found.discharge.strides
     assert "regulator set to                 50 psi_g, the supply pressure of the device" in str(finding_of(found))
-
-
-def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    one, two = (folder_of(walk_gas(solenoid()), tmp_path / name) for name in ("one", "two"))
-    assert main(["bottle", str(one), str(two), "--longest", "5 s"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    titles = ["gas use", "gas per stride (g)", "walking (s)", "strides", "ended"]
-    assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == titles
-    assert lines[3].split()[0] == str(one)
-    assert lines[3].split()[1:] == lines[4].split()[1:]
 
 
 @pytest.mark.parametrize(
@@ -215,28 +196,6 @@ def test_the_largest_flow_is_that_of_the_bottles_regulator_where_there_are_lines
     assert largest_flow(both) != largest_flow(
         Recording("valve", recording.time, {"supplied_mass": channels["supplied_mass"]})
     )
-
-
-def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    words = ["--bottle", PAPER_BOTTLE]
-    assert main(["walk", "solenoid-regulators", *words, "--out", "on-bottle"]) == 0
-    said = re.search(rf"bottle {PAPER_BOTTLE}: lasts (.*?): (.*)", capsys.readouterr().out)
-    assert said is not None
-    assert re.fullmatch(r"[\d.]+ min", said[1])
-    assert said[1] in (tmp_path / "on-bottle" / "report.html").read_text()
-    assert main(["walk", "solenoid-regulators", "--minutes", "0.1", "--out", "short"]) == 0
-    assert "lasts" not in capsys.readouterr().out.replace("how long a bottle lasts", ""), "no bottle, no minutes"
-    for folder in ("on-bottle", "short"):
-        assert main(["bottle", folder]) == 0
-        out = capsys.readouterr().out
-        assert f"{said[1]} of walking" in out
-        assert said[2] in out
-    made = endurance_of_walk(walk("solenoid-regulators", minutes=0.1))
-    assert made is not None
-    assert f"{made.discharge.walking_time / 60.0:.3g} min" == said[1]
 
 
 def test_a_time_between_rests_without_a_rest_is_refused() -> None:
@@ -289,8 +248,3 @@ def test_any_number_that_was_changed_in_python_is_noticed_and_another_length_is_
     assert walk_of(on_bottle(with_duration(whole, 12.0), PAPER_BOTTLE)).bottle is not None
     with pytest.raises(ScenarioError, match="changed after loading"):
         on_bottle(with_numbers(whole, numbers), PAPER_BOTTLE)
-
-
-def test_the_folder_of_an_earlier_version_is_to_be_written_again(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="does not state the scenario of the walk; repeat the walk with 'ppafo walk'"):
-        endurance(folder_of(replace(pulses(5.0), scenario=None), tmp_path / "old"))

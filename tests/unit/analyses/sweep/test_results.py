@@ -123,7 +123,6 @@ AXIS = {"path": "reference.level", "kind": "grid", "first": "2 N m", "last": "5 
 OTHER = {"path": "valve.area", "kind": "grid", "first": "4 mm^2", "last": "16 mm^2", "count": 3}
 DRAWN = {"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"}
 LEAK = {"path": "actuator.leak.area", "kind": "uniform", "minimum": "0.2 mm^2", "maximum": "0.4 mm^2"}
-NOBODY = {"path": "actuator.angle_min", "kind": "list", "values": ["140 deg", "141 deg"]}
 
 
 def study(*vary: dict[str, Any], names: tuple[str, ...] = ("proportional",), **outputs: Any) -> dict[str, Any]:
@@ -151,12 +150,8 @@ BOTH = ("proportional", "solenoid")
         # A proportional valve switches once in every run: no panel of what is constant.
         (study(DRAWN), ["Supply pressure (psig)"]),
         (study(DRAWN, LEAK, names=BOTH, bands=["torque"]), ["Supply pressure (psig)"] * 4 + ["Time (s)"]),
-        (study(AXIS), ["Torque to hold (N m)"]),
-        (study(AXIS, OTHER), ["Torque to hold (N m)"]),
         (study(AXIS, OTHER | {"spacing": "logarithmic"}, DRAWN, names=BOTH), ["Torque to hold (N m)"] * 4),
         (study(DRAWN, metrics=[], bands=["command"]), ["Time (s)"]),
-        (study(DRAWN, metrics=[], trajectories=["command"]), []),
-        (study(NOBODY), ["Lower stop (deg)"] * 2),
         (study(names=BOTH), ["RMS error (N m)", "Switchings"]),
     ],
 )
