@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 
 from ppafo.page import html as pages
-from ppafo.page import wasm
 from ppafo.page.html import packed, packed_once
 from ppafo.page.workbench import DEFAULT, known_intervals, workbench
 from ppafo.simulation.loading import load_scenario
@@ -85,12 +84,6 @@ def test_what_pages_hold_is_packed_once_and_unpacks_to_itself(fresh_cache: Path)
     assert len(list(fresh_cache.rglob("packed-*"))) == 1
 
 
-def test_the_decision_has_the_sizes_of_the_programs() -> None:
-    sizes = sorted(file.stat().st_size // 1000 for file in Path(wasm.__file__).parent.glob("programs/*.wasm"))
-    decision = SOURCES.parent / "docs" / "decisions" / "0021-simulating-page.md"
-    assert f"{sizes[0]} to {sizes[-1]} kB" in decision.read_text(encoding="utf-8")
-
-
 @has_browser
 def test_a_text_that_a_control_shows_can_be_edited_and_what_is_refused_is_forgotten(chromium: Any, file: Path) -> None:
     page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
@@ -110,15 +103,6 @@ def test_a_text_that_a_control_shows_can_be_edited_and_what_is_refused_is_forgot
     page.get_by_role("button", name="Reset all").click()
     fault.wait_for(state="hidden")
     assert (field.input_value().split()[0], field.get_attribute("aria-invalid")) == ("50", "false")
-    # Of a configuration that is gone no controls are wanted.
-    page.get_by_label("Add a configuration").select_option("torque-task-solenoid")
-    page.locator(".target label").last.click()
-    page.get_by_role("button", name="Reset all").click()
-    page.locator(".chip").nth(2).wait_for(state="detached")
-    assert page.locator(".target input:checked").get_attribute("value") == "null"
-    assert field.is_visible()
-    assert page.locator("main h2").all_inner_texts() == ["Results"]
-    assert page.get_by_label("Side by side").count() == 1
     assert "must be" in page.evaluate("workbench.open('1=torque-task-solenoid;run.output_interval=0.7+ms')")
     assert page.said == []
 
@@ -140,11 +124,6 @@ def test_a_walk_is_short_and_no_shorter_than_python_allows(chromium: Any, file: 
     assert page.evaluate(lengths) == ["7 s", "7 s"]
     page.get_by_label("Put Length of the run back").click()
     assert page.evaluate(lengths) == ["6 s", "6 s"]
-    # The lowest stride time, 0.5192 s, is not a round one: no text of the slider is below it.
-    page.locator("summary", has_text="Controller").click()
-    page.locator(".control[data-key='controller.first_stride_time'] input[type=range]").press("Home")
-    values = page.evaluate("[workbench.values(0), workbench.values(1)].map(all => all['controller.first_stride_time'])")
-    assert values == [0.52, 0.52]
     # More samples than a module can be asked for are a message and not a trap.
     page.evaluate("workbench.open('tab=3&3=solenoid;run.duration=60+min;run.step=0.1+ms;run.output_interval=0.1+ms')")
     page.locator("#panel > .fault", has_text="too many samples").wait_for()
@@ -268,32 +247,6 @@ def test_a_slider_is_dragged_and_the_drag_is_undone_at_once(chromium: Any, file:
 
 
 @has_browser
-def test_a_map_comes_in_two_parts_and_is_run_again_only_where_that_can_change_it(chromium: Any, file: Path) -> None:
-    whole, forget = "canvas.map[data-milliseconds]", "delete document.querySelector('canvas.map').dataset.milliseconds"
-    page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
-    page.locator("summary", has_text="Map of two settings").click()
-    page.wait_for_selector(whole)
-    told = page.evaluate("({...document.querySelector('canvas.map').dataset})")
-    assert 0.0 < float(told["first"]) <= float(told["milliseconds"])
-    page.evaluate(forget)
-    page.locator("canvas.map").press("ArrowRight")
-    page.wait_for_function("workbench.address().includes('reference.level')")
-    page.wait_for_timeout(300)
-    assert page.locator(whole).count() == 0
-    # A map that a later wish ends is none; the last one is run to its end.
-    for _ in range(4):
-        # A setting that is no axis of the map.
-        page.locator(".control[data-key='actuator.torque_constant'] input[type=range]").press("ArrowRight")
-    page.wait_for_selector(whole)
-    other = opened(chromium, file, f"#{page.evaluate('workbench.address()')}", viewport={"width": 1400, "height": 1000})
-    other.locator("summary", has_text="Map of two settings").click()
-    other.wait_for_selector(whole)
-    assert page.locator(".scale").inner_text() == other.locator(".scale").inner_text()
-    error = page.evaluate("workbench.run(0).metrics.rms_error")
-    assert f"White line: current value, {error:.3g} N\u00a0m" in page.locator(".scale").inner_text()
-
-
-@has_browser
 def test_a_map_over_the_atmosphere_is_the_same_when_it_is_turned(chromium: Any, file: Path) -> None:
     page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
     page.locator("summary", has_text="Map of two settings").click()
@@ -322,16 +275,6 @@ def test_a_map_over_the_atmosphere_is_the_same_when_it_is_turned(chromium: Any, 
 
 
 @has_browser
-def test_tabs_whose_configurations_have_one_name_are_told_apart(chromium: Any, file: Path) -> None:
-    page = opened(chromium, file, "#1=torque-task-solenoid", viewport={"width": 1400, "height": 1000})
-    for title in ("Walk", "Torque task", "Walk"):
-        page.get_by_role("tab", name=title).click()
-        page.wait_for_timeout(100)
-    assert "Angle of the ankle" in page.locator(".panel figcaption").first.inner_text()
-    assert page.said == []
-
-
-@has_browser
 def test_everything_can_be_reached_and_changed_by_keyboard_alone(chromium: Any, file: Path) -> None:
     page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
     reached = set()
@@ -345,15 +288,6 @@ def test_everything_can_be_reached_and_changed_by_keyboard_alone(chromium: Any, 
     page.keyboard.press("ArrowRight")
     assert "supply.pressure" in page.evaluate("workbench.address()")
     page.get_by_label("Supply pressure", exact=True).fill("3 bar_g")
-    page.keyboard.press("Enter")
-    assert page.evaluate("workbench.values(0)")["supply.pressure"] == parse_quantity("3 bar_g", "Pa_a")
-    # A value that changes while its field is selected whole stays selected: what is typed then replaces it.
-    page.locator("[data-key='supply.pressure'] input:not([type=range])").select_text()
-    page.locator("[data-key='supply.pressure'] input[type=range]").evaluate(
-        "slider => { slider.value = '500'; slider.dispatchEvent(new Event('change')); }"
-    )
-    page.wait_for_function("workbench.values(0)['supply.pressure'] !== 401325.0")
-    page.keyboard.insert_text("3 bar_g")
     page.keyboard.press("Enter")
     assert page.evaluate("workbench.values(0)")["supply.pressure"] == parse_quantity("3 bar_g", "Pa_a")
 
@@ -389,44 +323,6 @@ def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, fi
     assert page.locator(".notice").inner_text().startswith("c.csv is overlaid")
     page.locator(".recording .note", has_text="is compared up to 3 s").wait_for(state="attached")
     assert f"{expected.rms:.3g} N\u00a0m" in page.locator(".recording tbody tr").first.inner_text()
-
-
-@has_browser
-def test_a_large_recording_is_read_and_compared_while_the_page_goes_on(chromium: Any, file: Path) -> None:
-    page = opened(chromium, file)
-    longest = page.evaluate(
-        """async () => {
-            const row = place => `${place / 1e5},${place % 1000 / 100},${place % 70},${place % 60},0.123456789`;
-            const head = 'time [s],torque [N m],pressure_1 [psi_g],pressure_2 [psi_g],command [-]';
-            const rows = Array.from({length: 1700000}, (_, place) => row(place));
-            const file = new Blob([[head, ...rows].join('\\n') + '\\n']);
-            window.size = file.size;
-            let longest = 0, before = performance.now(), isDone = false;
-            const next = now => {
-                longest = Math.max(longest, now - before);
-                before = now;
-                if (!isDone) requestAnimationFrame(next);
-            };
-            requestAnimationFrame(next);
-            await workbench.read('large.csv', file);
-            while (!document.querySelector('.recording table')) await new Promise(requestAnimationFrame);
-            isDone = true;
-            return longest;
-        }"""
-    )
-    assert page.evaluate("size") > 50_000_000
-    # A comparison on the page's own thread holds it up for seconds.
-    assert longest < 1500.0
-    assert "is overlaid on the runs" in page.locator(".notice").inner_text()
-
-
-@has_browser
-def test_without_vectors_the_page_says_what_it_needs(chromium: Any, file: Path) -> None:
-    page = chromium.new_page()
-    page.add_init_script("WebAssembly.validate = () => false")
-    page.goto(f"file://{file}")
-    page.wait_for_selector(".notice")
-    assert "128-bit vectors" in page.locator(".notice").inner_text()
 
 
 @has_browser
