@@ -8,8 +8,7 @@ With ``--joints`` it runs joints of a bench in place of walks, and counts what t
 
 Each law walks with the gains that it has where nobody gives any, and with these times 1/8 to 4. Tuned are, of
 these, the least gas among loops that do not oscillate and whose error is within a quarter of the least one, and that
-error. A cell is gas over tuned and error over tuned; `!` marks a loop that oscillates, `x` a false alarm: the
-controller stopped. All of it is synthetic.
+error. A cell is gas over tuned and error over tuned; `!` marks a loop that oscillates. All of it is synthetic.
 """
 
 import argparse
@@ -46,7 +45,7 @@ FACTORS = (1.0, 0.125, 0.25, 0.5, 2.0, 4.0)
 """The rule's gain first, then those that it is compared with."""
 MAIN = (PROPORTIONAL_GAIN, BOUNDARY, CONVERGENCE, OPENING)
 """What sets how fast a law is; a wider boundary layer is a slower one."""
-METRICS = ("gas", "torque_error", "command_reversals", "peak_torque", "safe_state_time")
+METRICS = ("gas", "torque_error", "command_reversals", "peak_torque")
 ALLOWED_ERROR = 1.25
 FAR = 2.0
 """Gas over tuned that is called far."""
@@ -62,17 +61,16 @@ class RandomValue:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A law on a device: gas and error over tuned, nan where no gain walked; whether it oscillates, or stopped."""
+    """A law on a device: gas and error over tuned, nan where no gain walked; whether it oscillates."""
 
     gas: float
     error: float
     oscillates: bool
-    stopped: bool
 
     @property
     def text(self) -> str:
         """The numbers with their marks."""
-        return f"{self.gas:.2f} {self.error:.2f}{'!' if self.oscillates else ''}{'x' if self.stopped else ''}"
+        return f"{self.gas:.2f} {self.error:.2f}{'!' if self.oscillates else ''}"
 
 
 def draw_device(draw: random.Random) -> RandomValue:
@@ -120,16 +118,15 @@ def walk_law(law: str, device: RandomValue, seconds: float) -> Cell:
     gas, error = found["gas"], found["torque_error"]
     # A law that only switches may turn: it is judged by gas and error alone.
     oscillates = found["command_reversals"] > most_reversals(scenario)
-    usable = np.isfinite(gas) & np.isfinite(error) & ~oscillates & np.isnan(found["safe_state_time"])
+    usable = np.isfinite(gas) & np.isfinite(error) & ~oscillates
     if not usable.any():
-        return Cell(np.nan, np.nan, bool(oscillates[0]), bool(np.isfinite(found["safe_state_time"][0])))
+        return Cell(np.nan, np.nan, bool(oscillates[0]))
     least = float(error[usable].min())
     tuned = float(gas[usable & (error <= ALLOWED_ERROR * least)].min())
     return Cell(
         gas=float(gas[0]) / tuned,
         error=float(error[0]) / least,
         oscillates=bool(oscillates[0]),
-        stopped=bool(np.isfinite(found["safe_state_time"][0])),
     )
 
 
@@ -155,7 +152,7 @@ def main(words: Sequence[str] | None = None) -> int:
     devices = [draw_device(draw) for _ in range(given.devices)]
     for number, device in enumerate(devices, start=1):
         print(f"{number:3} {device.words}")
-    print(f"\nsynthetic: gas and error over tuned, walks of {given.seconds:g} s; ! oscillates, x stopped\n")
+    print(f"\nsynthetic: gas and error over tuned, walks of {given.seconds:g} s; ! oscillates\n")
     print(f"{'law':30}" + "".join(f"{number:>14}" for number in range(1, given.devices + 1)) + "   worst")
     is_good = True
     for law in LAWS:

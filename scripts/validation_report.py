@@ -156,19 +156,6 @@ def intervals(long: Path) -> list[Line]:
     ]
 
 
-def alarms(long: Path) -> list[Line]:
-    """False stops of many wearers on task sequences."""
-    command = "python scripts/false_alarms.py --wearers 1000 --out out/false-alarms"
-    what = "False stops of 1,000 wearers on each task sequence, good sensors"
-    found = [json.loads(file.read_text()) for file in sorted((long / "false-alarms").glob("*-1000.json"))]
-    if not found:
-        return [Line(what, "wearers drawn at random", "", "", NOT_RUN, command)]
-    stops, wearers = sum(item["stops"] for item in found), sum(item["wearers"] for item in found)
-    sets = f"{len(found)} combinations of task sequence, sensors and valve"
-    result = f"{stops} stops in {wearers:,} task sequences walked ({sets})"
-    return [Line(what, "wearers drawn at random", result, "none", DIFFERS if stops else AGREES, command)]
-
-
 def tested(what: str, reference: str, *paths: str) -> Check:
     """Return a check that runs tests of the repository, which hold the package against something else."""
     command = f"python -m pytest -n 0 {' '.join(paths)}"
@@ -242,7 +229,6 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
         "audit": tested("The audit of the printed set", "arithmetic by hand", "tests/published"),
     },
     "Published studies": {"claims": claims},
-    "Walking": {"alarms": alarms},
 }
 
 NOT_JUDGED = (

@@ -31,7 +31,6 @@ export const PANELS: readonly Panel[] = [
   { title: "Gas taken from the supply", axis: "Gas", channels: ["supplied_mass"] },
   { title: "Angle of the ankle", axis: "Angle", channels: ["angle"], wanted: ["healthy_angle", "reference_angle"] },
   { title: "Torque on the wearer", axis: "Torque", channels: ["external_torque"] },
-  { title: "0 helps, 1 lifts only, 2 pauses, 3 stopped", axis: "Controller state", channels: ["safe_state"] },
 ];
 
 /** What a run is called, and what came of it. */
@@ -80,7 +79,6 @@ const NEAR = "100px";
 /** Milliseconds without a change after which the other plots are drawn too. */
 const UNHURRIED = 1500;
 /** Channels that keep a value until the next sample. */
-const HELD = new Set(["command", "safe_state"]);
 
 export class Panels {
   private drawn: Drawn[] = [];
@@ -254,7 +252,7 @@ export class Panels {
       width: line.isWanted ? 1.5 : 2,
       dash: line.isWanted ? [6, 4] : (DASHES[panel.channels.indexOf(line.channel)] ?? []),
       points: { show: false },
-      paths: pathsOf(HELD.has(line.channel)),
+      paths: pathsOf(line.channel === "command"),
     }));
     const options: uPlot.Options = {
       ...sizeOf(width, panel === this.first),

@@ -71,20 +71,8 @@ def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:
     path.write_text(blocks("toml")[0])
     configuration = load_walk(path)
     assert configuration.controller.push_off_start == pytest.approx(0.42)
-    assert gait_sensors_of(configuration).heel_fault.time == pytest.approx(3.0)
+    assert gait_sensors_of(configuration).force_noise == pytest.approx(5.0)
     assert not has_ideal_sensors(configuration)
-
-
-def test_the_walk_file_of_the_page_loses_its_help_as_the_page_says(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "stiff-ankle.toml"
-    path.write_text(blocks("toml")[0])
-    (said,) = re.findall(r"^With `--minutes 0.2` this file has (help in 2 of 10 strides)", PAGE, re.MULTILINE)
-    assert main(["walk", str(path), "--minutes", "0.2", "--out", str(tmp_path / "out")]) == 1
-    printed = capsys.readouterr().out
-    assert printed.splitlines()[1].startswith(f"the device does not help: {said}: fewer than half")
-    assert "less help" in printed.splitlines()[4]
 
 
 def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> None:

@@ -11,18 +11,14 @@ from ppafo.control.walking.timings import TIMINGS
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.controlled import CONTROLLED
-from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters.loading import load_device
 from ppafo.simulation.declaration import ACCURACY, RUN, SAMPLING, SEED, SENSORS, THERMAL_GAS, line_paths
 from ppafo.simulation.motion_kind import MOTIONS
-from ppafo.walking.declaration import FAULTS, WALK_SENSORS
+from ppafo.walking.declaration import WALK_SENSORS
 from tests.doors.table import CASES, SHORT
 
 TEXTS = frozenset(text for case in CASES for text in case.texts)
 PATHS = frozenset(text.partition("=")[0] for text in TEXTS)
-_NO_STATE = frozenset(
-    f"shut_off.{name}" for name in ("discharge_coefficient", "mass", "power")
-)  # plain numbers of a part that is there
 
 
 def own_names(kinds: Any) -> list[str]:
@@ -60,8 +56,7 @@ def texts_of_kinds() -> list[str]:
         "controller.kind": [*own_names(CONTROLLERS), *WALKING_CONTROLLERS],
         "reference.kind": own_names(PROFILES),
     }
-    faults = {f"faults.{part}.kind": list(kinds) for part, kinds in FAULTS.items()}
-    return [f"{path}={name}" for path, names in (wanted | faults).items() for name in names]
+    return [f"{path}={name}" for path, names in wanted.items() for name in names]
 
 
 def paths_of_keys() -> list[str]:
@@ -73,13 +68,7 @@ def paths_of_keys() -> list[str]:
     sensors = {f"sensors.{item.name}" for item in (*SENSORS, *WALK_SENSORS, SEED)}
     gas = {f"gas_model.{item.name}" for item in THERMAL_GAS}
     clocks = {f"run.{item.name}" for item in (*RUN, ACCURACY)} | {f"controller.{item.name}" for item in SAMPLING}
-    shut_off = {f"shut_off.{item.name}" for item in SHUT_OFF}
-    return sorted((valves | effects | sensors | gas | clocks | shut_off | set(line_paths())) - _NO_STATE)
-
-
-def numbers_of_faults() -> set[str]:
-    """Names of the numbers of all faults."""
-    return {item.name for kinds in FAULTS.values() for fault in kinds.values() for item in fault.quantities}
+    return sorted(valves | effects | sensors | gas | clocks | set(line_paths()))
 
 
 def test_every_kind_of_the_catalogues_stands_in_the_table() -> None:
@@ -95,5 +84,3 @@ def test_every_actuator_stands_in_the_table() -> None:
 
 def test_every_key_that_adds_a_state_a_history_or_a_clock_stands_in_the_table() -> None:
     assert [path for path in paths_of_keys() if path not in PATHS] == []
-    given = {path.rpartition(".")[2] for path in PATHS if path.startswith("faults.")}
-    assert numbers_of_faults() - given == set()

@@ -226,10 +226,6 @@ VANE_FEATURES: dict[str, Feature] = {
 """Each is added to ``VANE_BASE``."""
 
 
-def _fault(part: str, kind: str, *numbers: str, time: str = "0.55 s") -> Feature:
-    return _feature(*(f"faults.{part}.{text}" for text in (f"kind={kind}", f"time={time}", *numbers)))
-
-
 WALK_FEATURES: dict[str, Feature] = {
     "late command": _feature("valve.delay=5 ms", needs="valve"),
     "spool": _feature("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", needs="valve"),
@@ -259,10 +255,6 @@ WALK_FEATURES: dict[str, Feature] = {
     "fractional timing": _feature("timing.kind=fractional", needs="timing"),
     "estimated timing": _feature("timing.kind=estimated", needs="timing", seconds=TWO_STRIDES),
     "task sequence": _feature("task_sequence=first-steps"),
-    "shut-off": _feature(
-        *("shut_off.area=10 mm^2", "shut_off.delay=10 ms", "shut_off.silence=5 ms"),
-        *(f"faults.controller.{text}" for text in ("kind=brown_out", "time=0.55 s", "duration=0.1 s")),
-    ),
     "cylinder": _feature("device.set=cylinder-lever", needs="actuator"),
     "bladder": _feature(f"device.set={BLADDER}", needs="actuator area"),
     "muscle pair": _feature(f"device.set={MUSCLES}", needs="actuator"),
@@ -275,41 +267,6 @@ WALK_FEATURES: dict[str, Feature] = {
     "learning": _feature("controller.kind=event_damped_learning", needs="law", seconds=TWO_STRIDES),
     "feedback linearisation": _feature("controller.kind=event_feedback_linearisation", needs="law"),
     "damped": _feature("controller.kind=damped_proportional", needs="law"),
-    "heel frozen": _fault("heel", "frozen", "period=0.1 s", time="0.1 s"),
-    "heel stuck": _fault("heel", "stuck", "reading=300 N"),
-    "heel distorted": _fault(
-        "heel", "distorted", "lag=20 ms", "lost_share=0.2", "delay=7.3 ms", "crosstalk=0.3", "offset=20 N"
-    ),
-    "toe frozen": _fault("toe", "frozen"),
-    "toe stuck": _fault("toe", "stuck", "reading=300 N"),
-    "toe distorted": _fault("toe", "distorted", "gain=0.8", "drift=100 N/s", "delay=4 ms"),
-    "angle frozen": _fault("angle", "frozen"),
-    "angle stuck": _fault("angle", "stuck", "reading=95 deg"),
-    "angle distorted": _fault("angle", "distorted", "offset=2 deg", "drift=3 deg/s", "lag=10 ms", "lost_share=0.3"),
-    "pressure 1 frozen": _fault("pressure_1", "frozen"),
-    "pressure 1 stuck": _fault("pressure_1", "stuck", "reading=30 psi_g"),
-    "pressure 1 distorted": _fault("pressure_1", "distorted", "crosstalk=1", "delay=3 ms"),
-    "pressure 2 frozen": _fault("pressure_2", "frozen"),
-    "pressure 2 stuck": _fault("pressure_2", "stuck", "reading=3 psi_g"),
-    "pressure 2 distorted": _fault("pressure_2", "distorted", "gain=1.1", "offset=1 psi_d", "lag=5 ms"),
-    "valve 1 stuck": _fault("valve_1", "stuck", "opening=0.5"),
-    "valve 2 stuck": _fault("valve_2", "stuck"),
-    "valve swapped": _fault("valve", "swapped"),
-    "valve slow": _fault("valve", "slow", "delay=30 ms"),
-    "hose 1 off": _fault("hose_1", "off"),
-    "hose 2 off": _fault("hose_2", "off"),
-    "hose 1 kinked": _fault("hose_1", "kinked", "share=0.2"),
-    "hose 2 kinked": _fault("hose_2", "kinked"),
-    "regulator 1 high": _fault("regulator_1", "high", "pressure=90 psi_g"),
-    "regulator 2 high": _fault("regulator_2", "high"),
-    "regulator 1 creeping": _fault("regulator_1", "creeping", "rate=3e5 Pa/s"),
-    "regulator 2 creeping": _fault("regulator_2", "creeping"),
-    "regulator 1 frozen": _fault("regulator_1", "frozen", "share=0.05"),
-    "regulator 2 frozen": _fault("regulator_2", "frozen"),
-    "bottle empty": _fault("bottle", "empty", "lag=50 ms"),
-    "vane leaking": _fault("vane", "leaking", "factor=20"),
-    "controller late": _fault("controller", "late", "delay=15 ms"),
-    "controller jittering": _fault("controller", "jittering", "share=0.4"),
 }
 """Each is added to ``WALK_BASE``."""
 
@@ -403,7 +360,7 @@ SHORT = (
     _chosen(VANE_BASE, "bladder", "slew", "dead band", "damped", "smooth"),
     _chosen(VANE_BASE, "muscle pair", "hysteresis", "leak that opens", "laminar leak", "relieving regulators"),
     _chosen(WALK_BASE, "late command", "noise", "lost samples", "ice"),
-    _chosen(WALK_BASE, "spool", "heel distorted", "angle distorted", "hose 1 kinked", "thermal gas"),
+    _chosen(WALK_BASE, "spool", "bandwidth", "resolution", "thermal gas"),
 )
 """Twelve cases in which most of what has a state, a history or a clock meets something else."""
 
@@ -434,17 +391,6 @@ OBJECTS = (
     Case("vane: an object of Python", "long", VANE_BASE, BASES[VANE_BASE], has_object=True),
     Case("walk: an object of Python", "long", WALK_BASE, has_object=True),
 )
-STOPPED = Case(
-    "walk: a stop shuts the shut-off valve",
-    "long",
-    WALK_BASE,
-    (
-        *("shut_off.area=10 mm^2", "shut_off.delay=10 ms"),
-        *("faults.valve_1.kind=stuck", "faults.valve_1.time=0.55 s", "faults.valve_1.opening=0.5"),
-    ),
-)
-"""Its controller stops the device, which no command says, and the valve that is stuck lets gas on."""
-
 REFUSED: tuple[tuple[str, float, str], ...] = (
     ("valve.area", -1.0, "valve.area"),
     ("valve.delay", -1.0, "valve.delay"),
@@ -469,6 +415,6 @@ NOT_EXPORTED: dict[str, Case] = {
 
 _ALL = ((VANE_BASE, VANE_FEATURES), (WALK_BASE, WALK_FEATURES))
 GROUPS = tuple(case for base, features in _ALL for case in _groups(base, features))
-CASES = (*SHORT, *SHIPPED, *OBJECTS, STOPPED, *GROUPS)
+CASES = (*SHORT, *SHIPPED, *OBJECTS, *GROUPS)
 EXPORTED = tuple(case for case in CASES if case.leaves)
 """Cases that leave Python."""

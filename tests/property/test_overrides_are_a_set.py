@@ -77,9 +77,6 @@ OF_A_WALK = (
     "wearer.body_mass=70 kg",
     "motion.kind=walk",
     "wearer.stature=1.8 m",
-    "faults.heel.kind=frozen",
-    "faults.heel.time=1 s",
-    "faults.heel.gain=0.5",
     "gas_model.kind=isothermal",
     "gas_model.wall_area_per_volume=100 1/m",
 )

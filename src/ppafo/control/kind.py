@@ -12,9 +12,8 @@ from ppafo.model.declaration import Quantity
 OPEN_LOOP = "constant"
 """Name of the controller without a reference: its recordings have no reference, and so no tracking error."""
 
-VALVE_LAG, VALVE_DELAY = "lag of the valve", "dead time of the valve"
-PRESSURE_LAG, FORCE_LAG = "lag of the pressure sensors", "lag of the force sensors"
-"""Names, for ``Quantity.follows``, of the sensor lags from which a setting may take its default."""
+VALVE_DELAY, FORCE_LAG = "dead time of the valve", "lag of the force sensors"
+"""Names, for ``Quantity.follows``, of the delays from which a setting may take its default."""
 
 
 def nominal_term(name: str) -> str:

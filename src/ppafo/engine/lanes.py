@@ -53,8 +53,8 @@ _BETWEEN_COUNTS = 0.5
 QUICK_STEPS = 200_000
 """Total number of steps of all runs up to which quick compilation is faster overall: a second of either."""
 
-SIGNAL_ROWS = 5
-"""Number of readings that may be delayed: angle and pressures, and in a walk two forces."""
+SIGNAL_ROWS = 3
+"""Number of readings that may be delayed: angle and both pressures."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,7 +330,7 @@ class LaneBlock:
 
     def late_signals(self, step: int) -> Floats:
         """Angle [rad] and pressures [Pa] (3, runs) of delayed sensors at ``step``, the next step, except the first."""
-        return self._signals[:3, (step - self._clock.signal_delay) % self._signals.shape[1]]
+        return self._signals[:, (step - self._clock.signal_delay) % self._signals.shape[1]]
 
     def result(self) -> BatchResult:
         """Return the present states and records."""

@@ -23,12 +23,6 @@ def link_program(program: Program, replacements: Replacements) -> None:
     check_net_torque()
     if program.actuator.plant is not PlantParameters:
         replacements.constructed[PlantParameters] = program.actuator.plant
-    if program.walks and not program.has_vane:
-        from ppafo.engine.scheme.believed import chambers_of_observer  # most devices walk on no leg
-
-        volumes = chambers_of_observer(program.functions)
-        replacements.everywhere.update(volumes)
-        replacements.rows.update(dict.fromkeys(volumes.values(), ("plant",)))
     if not program.effects:
         return
     # Two effects that share a name are refused by the catalogue: here an effect and another component.

@@ -91,10 +91,8 @@ class Program:
         late_commands: True for a dead time before the valve
         gas: module of ``engine.step`` for the gas
         late_signals: True for delayed signals
-        late_readings: True for sensors of a walk that may be delayed by whole samples
         leg: module ``walk`` for a walking leg, whose foot is free or moved by ground and gait, with sensors
         takes_task_sequence: True for a leg that stands, starts, changes speed and stops; False for equal strides
-        faults: module ``failing`` for plant faults or a shut-off valve in a walk
         feed: module ``lines`` for supply lines; None for constant supply pressures
         is_adaptive: True for steps divided by error control
         rests_whole: True if steps with a prescribed joint at rest are undivided under the conditions for a locked joint
@@ -116,10 +114,8 @@ class Program:
     late_commands: bool
     gas: GasPhases
     late_signals: bool = False
-    late_readings: bool = False
     leg: ModuleType | None = None
     takes_task_sequence: bool = False
-    faults: ModuleType | None = None
     feed: ModuleType | None = None
     is_adaptive: bool = False
     rests_whole: bool = False
@@ -289,11 +285,6 @@ class Program:
         return None if self.controller is None else self.controller.initial
 
     @property
-    def has_level_of_help(self) -> bool:
-        """True if the controller of a walk has a level of assistance."""
-        return hasattr(getattr(self.initial_controller_state, "safety", None), "level")
-
-    @property
     def has_phase(self) -> bool:
         """True if the controller of a walk estimates the gait phase."""
         return hasattr(getattr(self.initial_controller_state, "phase", None), "phase")
@@ -343,7 +334,7 @@ class Program:
 @lru_cache(maxsize=256)
 def groups_of(program: Program) -> Groups:
     """Return all groups of numbers of a program by name, in the order of their rows."""
-    leg, feed, faults, shank = program.leg, program.feed, program.faults, program.shank
+    leg, feed, shank = program.leg, program.feed, program.shank
     is_alone = program.angle is None and leg is None
     controller = program.controller
     before = {
@@ -369,7 +360,7 @@ def groups_of(program: Program) -> Groups:
         "path": given(NoParameters if program.angle is None else program.angle.parameters),
         "sensors": given(SensorParameters),
     }
-    worn = [part.groups(program) for part in (leg, faults, feed) if part is not None]
+    worn = [part.groups(program) for part in (leg, feed) if part is not None]
     # By its place, for few vanes carry a leg.
     foot = {"load": given(kind_at("ppafo.model.leg:FootLoad")), "shank": given(shank.parameters)} if shank else {}
     last = {
@@ -390,7 +381,7 @@ def groups_of(program: Program) -> Groups:
 
 def place_of_group(program: Program, name: str) -> str:
     """Return file and line of the function that declares a group of a component; else the name of the group."""
-    for part in (program.gas, program.leg, program.faults, program.feed):
+    for part in (program.gas, program.leg, program.feed):
         if part is not None and name in part.groups(program):
             code = part.groups.__code__
             return place(code.co_filename, code.co_firstlineno)

@@ -16,21 +16,18 @@ from ppafo.engine.rows import of_each, row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
-from ppafo.kinds import kind_at
 from ppafo.model.columns import larger, truncated
 from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, ThermalParameters
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
-if TYPE_CHECKING:  # for most runs know no leg, no line, no walk and no fault
+if TYPE_CHECKING:  # for most runs know no leg, no line and no walk
     from ppafo.engine.led_leg import LedLeg
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
     from ppafo.model.gait import GaitSeries, GaitTiming, TimedSequence
     from ppafo.model.leg import LegParameters
-    from ppafo.model.plant_faults import PlantFaults
     from ppafo.model.regulator import LineState, SupplyLines
-    from ppafo.model.shut_off import ShutOff
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -50,8 +47,7 @@ WHOLE = 1.0e-9
 class Walk:
     """Leg that follows a gait.
 
-    ``task_sequence`` is None for equal strides. ``failing`` are the faults of the plant and its shut-off valve; None
-    without both.
+    ``task_sequence`` is None for equal strides.
     """
 
     leg: "LegParameters"
@@ -61,12 +57,10 @@ class Walk:
     sensors: GaitSensors
     initial: "WalkState"
     task_sequence: "TimedSequence | None" = None
-    failing: "tuple[PlantFaults, ShutOff] | None" = None
 
     @property
     def parameters(self) -> dict[str, Any]:
         """Groups of parameters of the leg and its gait, by name."""
-        failing = {} if self.failing is None else dict(zip(("plant_faults", "shut_off"), self.failing, strict=True))
         return {
             "leg": self.leg,
             "share": self.share,
@@ -74,14 +68,12 @@ class Walk:
             "gait_timing": self.timing,
             "gait_sensors": self.sensors,
             **({} if self.task_sequence is None else {"task_sequence": self.task_sequence}),
-            **failing,
         }
 
     @property
     def states(self) -> dict[str, Any]:
         """Groups of initial states, by name."""
-        powered = {} if self.failing is None else {"unpowered": kind_at("ppafo.model.shut_off:POWERED")}
-        return {"walk": self.initial, "gait_seen": NOTHING_SEEN, **powered}
+        return {"walk": self.initial, "gait_seen": NOTHING_SEEN}
 
 
 @dataclass(frozen=True, slots=True)

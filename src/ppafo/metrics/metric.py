@@ -113,13 +113,6 @@ def root_mean(squares: Floats, count: Floats) -> Floats:
     return found
 
 
-def time_if_any(time: Floats) -> Floats:
-    """Time of an event [s]; nan for a negative time, which means no event."""
-    # The state of a run is floats alone, and a column has no other word for None.
-    found: Floats = choose(time >= 0.0, time, math.nan)
-    return found
-
-
 @dataclass(frozen=True, slots=True)
 class MetricKind:
     """Metric in the catalogue: unit, required channels, and pure functions that compute the value.

@@ -7,14 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean, time_if_any
-from ppafo.model.helping import HELPS, PUSH_OFF
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean
+from ppafo.model.helping import PUSH_OFF
 from ppafo.signals.meter import REQUESTED, STEADY, WALK, MeterKind, ReferenceSummary, Sample, StrideSample
 
 SETTLING = 2
 """Number of initial strides excluded from averages, while the controller learns the stride time."""
-NOT_YET = -1.0
-"""Time of an event that has not occurred [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,14 +57,13 @@ class _CurrentStride(NamedTuple):
 
     ``is_whole`` is 1 for a stride that started with a heel strike; the first stride of a walk did not. ``on_toes`` is 1
     for a stride that started with a landing on the toes. ``at_strike`` are the totals since the start of the walk at
-    the heel strike, including such a landing. ``lacked_help`` is 1 after a sample with reduced assistance.
-    ``squared_errors`` [(N m)^2] is the sum of squared torque errors over ``push_off_samples`` samples in push-off.
+    the heel strike, including such a landing. ``squared_errors`` [(N m)^2] is the sum of squared torque errors over
+    ``push_off_samples`` samples in push-off.
     """
 
     is_whole: float
     on_toes: float
     at_strike: _StrideTotals
-    lacked_help: float
     squared_errors: float
     push_off_samples: float
 
@@ -74,14 +71,12 @@ class _CurrentStride(NamedTuple):
 class _EndedStrides(NamedTuple):
     """Sums over completed strides.
 
-    ``whole`` counts all but a partial first one, ``helped`` those with assistance throughout, and ``averaged`` the
-    helped ones without the first strides of the walk. ``sums`` are the increases of the totals, ``squared_errors`` the
-    sum of squared torque errors in push-off [(N m)^2], and ``push_off_samples`` the number of samples in push-off, all
-    over the averaged strides.
+    ``whole`` counts all but a partial first one, and ``averaged`` those without the first strides of the walk. ``sums``
+    are the increases of the totals, ``squared_errors`` the sum of squared torque errors in push-off [(N m)^2], and
+    ``push_off_samples`` the number of samples in push-off, all over the averaged strides.
     """
 
     whole: float
-    helped: float
     averaged: float
     sums: _StrideTotals
     squared_errors: float
@@ -89,17 +84,13 @@ class _EndedStrides(NamedTuple):
 
 
 class StrideMeter(NamedTuple):
-    """State of the stride meter: heel strikes, supplied gas at first and now [kg], current and ended strides.
-
-    ``safe_time`` [s] is the time of the first sample with reduced assistance, ``NOT_YET`` if there was none.
-    """
+    """State of the stride meter: heel strikes, supplied gas at first and now [kg], current and ended strides."""
 
     strikes: float
     first_gas: float
     gas: float
     current: _CurrentStride
     ended: _EndedStrides
-    safe_time: float
 
 
 def totals_at(sample: StrideSample) -> _StrideTotals:
@@ -138,7 +129,6 @@ def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> _Curr
         is_whole=is_whole,
         on_toes=on_toes,
         at_strike=totals_at(sample),
-        lacked_help=0.0,
         squared_errors=0.0,
         push_off_samples=0.0,
     )
@@ -153,10 +143,7 @@ def _start(_course: ReferenceSummary, sample: Sample) -> StrideMeter:
         first_gas=sample.stride.supplied_mass,
         gas=sample.stride.supplied_mass,
         current=begun_stride(sample.stride, 0.0, 0.0),
-        ended=_EndedStrides(
-            whole=0.0, helped=0.0, averaged=0.0, sums=no_sums, squared_errors=0.0, push_off_samples=0.0
-        ),
-        safe_time=sample.stride.time if sample.stride.level > HELPS else NOT_YET,
+        ended=_EndedStrides(whole=0.0, averaged=0.0, sums=no_sums, squared_errors=0.0, push_off_samples=0.0),
     )
 
 
@@ -165,14 +152,12 @@ def _update(strides: StrideMeter, _course: ReferenceSummary, sample: Sample) -> 
     is_strike = sample.stride.strides - strides.strikes > 0.5
     on_toes = sample.stride.toe_landings - strides.current.at_strike.toe_landing
     begun = begun_stride(sample.stride, 1.0, on_toes)
-    is_first_without_help = sample.stride.level > HELPS and strides.safe_time < 0.0
     return StrideMeter(
         strikes=sample.stride.strides,
         first_gas=strides.first_gas,
         gas=sample.stride.supplied_mass,
         current=stride_with_sample(begun if is_strike else strides.current, sample),
         ended=ended_with_stride(strides.ended, strides.current, sample) if is_strike else strides.ended,
-        safe_time=sample.stride.time if is_first_without_help else strides.safe_time,
     )
 
 
@@ -181,7 +166,6 @@ def stride_with_sample(stride: _CurrentStride, sample: Sample) -> _CurrentStride
     error = sample.reference - sample.torque
     pushes = sample.stride.phase == PUSH_OFF
     return stride._replace(
-        lacked_help=1.0 if sample.stride.level > HELPS else stride.lacked_help,
         squared_errors=stride.squared_errors + (error * error if pushes else 0.0),
         push_off_samples=stride.push_off_samples + (1.0 if pushes else 0.0),
     )
@@ -189,14 +173,12 @@ def stride_with_sample(stride: _CurrentStride, sample: Sample) -> _CurrentStride
 
 def ended_with_stride(ended: _EndedStrides, stride: _CurrentStride, sample: Sample) -> _EndedStrides:
     """Add a stride to the completed strides; ``sample`` is the first sample after its heel strike."""
-    # A stride with less help in a part of it is no example; in the first ones the controller still learns their time.
-    is_helped = stride.is_whole > 0.5 and stride.lacked_help < 0.5
-    is_averaged = is_helped and ended.whole >= float(SETTLING)
+    # In the first strides the controller still learns their time.
+    is_averaged = stride.is_whole > 0.5 and ended.whole >= float(SETTLING)
     at_end = totals_at(sample.stride)
     sums = sums_with_stride(ended.sums, stride.at_strike, at_end, stride.on_toes) if is_averaged else ended.sums
     return _EndedStrides(
         whole=ended.whole + stride.is_whole,
-        helped=ended.helped + (1.0 if is_helped else 0.0),
         averaged=ended.averaged + (1.0 if is_averaged else 0.0),
         sums=sums,
         squared_errors=ended.squared_errors + (stride.squared_errors if is_averaged else 0.0),
@@ -241,25 +223,10 @@ METRICS = (
     ),
     _kind("strides", "-", "whole strides of the walk", ReadAt(("meters.strides.ended.whole",))),
     _kind(
-        "helped_strides", "-", "whole strides with help from strike to strike", ReadAt(("meters.strides.ended.helped",))
-    ),
-    _kind(
-        "vented_strides",
-        "-",
-        "whole strides with less help (lift only, pause or stop) for at least a part",
-        ReadAt(("meters.strides.ended.whole", "meters.strides.ended.helped"), less),
-    ),
-    _kind(
         "total_gas",
         "kg",
         "gas taken from the supply in the whole walk",
         ReadAt(("meters.strides.gas", "meters.strides.first_gas"), less),
-    ),
-    _kind(
-        "safe_state_time",
-        "s",
-        "time at which the controller first lifted only, paused or stopped",
-        ReadAt(("meters.strides.safe_time",), time_if_any),
     ),
 )
 """Metrics of a walk computed without mean curve and healthy gait."""

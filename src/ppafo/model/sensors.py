@@ -1,9 +1,7 @@
 """Sensors of the controller: ideal, or with bandwidth, noise and quantisation; also the sensors of a walk.
 
 Noise is a pure function of seed, sample number and channel, so that a run has the same noise alone, in any block and on
-any number of threads. A walking controller has two additional force sensors under the foot, and sensors with faults.
-One random number per sample decides the loss of the sample for every faulty sensor: two faulty sensors lose the same
-samples.
+any number of threads. A walking controller has two additional force sensors under the foot.
 """
 
 from typing import NamedTuple
@@ -148,31 +146,8 @@ class GaitMeasurement(NamedTuple):
     toe_force: float
 
 
-class Fault(NamedTuple):
-    """Fault of a sensor from ``time`` [s] on: a frozen value (``holds`` 1) or the constant ``reading``.
-
-    With ``distorts`` 1 the reading is ``gain`` times the true value, plus an offset and a drift [1/s] in its own unit,
-    with a fraction of the other sensor of its kind (``crosstalk``), a first-order lag (``memory``, the remaining
-    fraction of the last value after a sample), a fraction of lost samples, and a delay of ``late_samples`` samples.
-    With a ``period`` [s] above 0 the fault is active in the first half of each period only.
-    """
-
-    time: float
-    holds: float
-    reading: float
-    distorts: float = 0.0
-    gain: float = 1.0
-    offset: float = 0.0
-    drift: float = 0.0
-    crosstalk: float = 0.0
-    memory: float = 0.0
-    lost_fraction: float = 0.0
-    period: float = 0.0
-    late_samples: float = 0.0
-
-
 class GaitSensors(NamedTuple):
-    """Sensors of a walk: response, noise and resolution of the forces [N], fractions of lost samples, and faults.
+    """Sensors of a walk: response, noise and resolution of the forces [N], and fractions of lost samples.
 
     ``follow_rate`` [1/s] of the force sensors; ``angle_memory`` and ``pressure_memory`` are the remaining fractions of
     a first-order sensor's last value after one sample, 0 for a sensor without lag.
@@ -186,11 +161,6 @@ class GaitSensors(NamedTuple):
     pressure_memory: float
     angle_lost_share: float
     pressure_lost_share: float
-    heel_fault: Fault
-    toe_fault: Fault
-    angle_fault: Fault
-    pressure_1_fault: Fault
-    pressure_2_fault: Fault
 
 
 class GaitSeen(NamedTuple):
@@ -209,33 +179,7 @@ class GaitSeen(NamedTuple):
     smooth_pressure_2: float
 
 
-HALF = 0.5
-"""Fraction of its period in which an intermittent fault is active."""
-
 NOTHING_SEEN = GaitSeen._make((0.0,) * len(GaitSeen._fields))
-
-
-def is_active(fault: Fault, time: float) -> bool:
-    """Return whether a fault acts at a time [s]; an intermittent fault acts in the first half of each period."""
-    length = fault.period if fault.period > 0.0 else 1.0
-    periods = max(0.0, time - fault.time) / length
-    away = (periods - float(int(periods)) >= HALF) & (fault.period > 0.0)
-    return (time >= fault.time) & (not away)
-
-
-def faulty_reading(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
-    """Reading of a faulty sensor at ``time`` [s], in its unit; ``other`` is the reading of the other sensor.
-
-    ``draw`` is a random number from 0 to 1 that decides whether the sample is lost.
-    """
-    mixed = reading + fault.crosstalk * (other - reading)
-    # The lag acts last, on what the distorted sensor tends to.
-    target = fault.gain * mixed + fault.offset + fault.drift * (time - fault.time)
-    wrong = target + fault.memory * (last - target)
-    wrong = last if draw < fault.lost_fraction else wrong
-    stuck = last if fault.holds > 0.5 else fault.reading
-    shown = wrong if fault.distorts > 0.5 else stuck
-    return shown if is_active(fault, time) else reading
 
 
 def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, channel: int) -> float:
@@ -260,12 +204,11 @@ def measure_gait(
     heel_force: float,
     toe_force: float,
     plant: PlantParameters,
-    time: float,
     sample: int,
     *,
     parts: ActuatorFunctions,
 ) -> tuple[GaitMeasurement, GaitSeen]:
-    """Measurement [SI] of a sample with bandwidth, noise, quantisation, loss and faults, and the last readings."""
+    """Measurement [SI] of a sample with bandwidth, noise, quantisation and loss, and the last readings."""
     seed = int(sensors.seed)
     # A sensor has settled before the walk begins: its reading before the first sample is the same.
     angle_memory = gait_sensors.angle_memory if sample > 0 else 0.0
@@ -274,8 +217,7 @@ def measure_gait(
     smooth_angle = angle + (last.smooth_angle - angle) * angle_memory
     smooth_1 = pressure_1 + (last.smooth_pressure_1 - pressure_1) * pressure_memory
     smooth_2 = pressure_2 + (last.smooth_pressure_2 - pressure_2) * pressure_memory
-    # Channels of the noise: 0 to 4 values, 5 to 9 lost samples, 10 faults; 11 is the controller's own
-    # (plant_faults.py).
+    # Channels of the noise: 0 to 4 values, 5 to 9 lost samples.
     seen = measure(sensors, smooth_angle, smooth_1, smooth_2, plant, sample, parts=parts)
     heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
     toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
@@ -284,56 +226,28 @@ def measure_gait(
     was_2 = last.pressure_2 if sample > 0 else seen.pressure_2
     was_heel = last.heel_force if sample > 0 else heel
     was_toe = last.toe_force if sample > 0 else toe
-    kept_angle = hold_if_lost(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
-    kept_1 = hold_if_lost(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
-    kept_2 = hold_if_lost(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
-    kept_heel = hold_if_lost(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
-    kept_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
-    # One draw for all: sensors with a common cause lose the same samples.
-    draw = unit_noise(seed, sample, 10)
-    shown_angle = faulty_reading(gait_sensors.angle_fault, kept_angle, kept_angle, was_angle, time, draw)
-    shown_1 = faulty_reading(gait_sensors.pressure_1_fault, kept_1, kept_2, was_1, time, draw)
-    shown_2 = faulty_reading(gait_sensors.pressure_2_fault, kept_2, kept_1, was_2, time, draw)
-    shown_heel = faulty_reading(gait_sensors.heel_fault, kept_heel, kept_toe, was_heel, time, draw)
-    shown_toe = faulty_reading(gait_sensors.toe_fault, kept_toe, kept_heel, was_toe, time, draw)
+    seen_angle = hold_if_lost(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
+    seen_1 = hold_if_lost(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
+    seen_2 = hold_if_lost(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
+    seen_heel = hold_if_lost(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
+    seen_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
     remembered = GaitSeen(
-        heel_force=shown_heel,
-        toe_force=shown_toe,
-        angle=shown_angle,
-        pressure_1=shown_1,
-        pressure_2=shown_2,
+        heel_force=seen_heel,
+        toe_force=seen_toe,
+        angle=seen_angle,
+        pressure_1=seen_1,
+        pressure_2=seen_2,
         smooth_angle=smooth_angle,
         smooth_pressure_1=smooth_1,
         smooth_pressure_2=smooth_2,
     )
     # The torque follows from the readings, right or wrong.
-    shown = late_measurement(shown_heel, shown_toe, shown_angle, shown_1, shown_2, plant, parts=parts)
-    return shown, remembered
-
-
-def samples_late(fault: Fault, time: float, sample: int) -> int:
-    """Delay, in samples, of the reading that arrives at ``time`` [s], the time of ``sample``."""
-    # No reading is older than the first one.
-    late = int(fault.late_samples) if is_active(fault, time) else 0
-    return min(late, sample)
-
-
-def late_measurement(
-    heel_force: float,
-    toe_force: float,
-    angle: float,
-    pressure_1: float,
-    pressure_2: float,
-    plant: PlantParameters,
-    *,
-    parts: ActuatorFunctions,
-) -> GaitMeasurement:
-    """Measurement of a walking controller from readings, possibly delayed: forces [N], angle [rad], pressures [Pa]."""
-    return GaitMeasurement(
-        angle=angle,
-        pressure_1=pressure_1,
-        pressure_2=pressure_2,
-        torque=parts.torque(plant, angle, pressure_1, pressure_2),
-        heel_force=heel_force,
-        toe_force=toe_force,
+    shown = GaitMeasurement(
+        angle=seen_angle,
+        pressure_1=seen_1,
+        pressure_2=seen_2,
+        torque=parts.torque(plant, seen_angle, seen_1, seen_2),
+        heel_force=seen_heel,
+        toe_force=seen_toe,
     )
+    return shown, remembered

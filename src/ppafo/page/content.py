@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.errors import ScenarioError, UnitError
-from ppafo.page.motions import declared_content, is_walk, relations_in_files, usual_changes
+from ppafo.page.motions import declared_content, is_walk, usual_changes
 from ppafo.page.setting import DIFFERENCE, LEVEL, Interval, bare_unit, gauge_texts, page_setting, typed_unit
 from ppafo.page.wasm import WasmModule
 from ppafo.page.words import stored_data
@@ -76,7 +76,7 @@ def program_content(simulated: PageSimulation, module: str, intervals: Mapping[s
             page_setting(entry, value_at(document, entry["key"]), gauges.get(entry["key"], ""), intervals, scenario)
             for entry in entries
         ],
-        "relations": [*map(_relation, described["relations"]), *relations_in_files(keys, scenario)],
+        "relations": [_relation(relation) for relation in described["relations"]],
         "channels": [_shown(entry, joint) for entry in described["channels"] if entry["name"] != "time"],
         "metrics": [_shown(entry, joint) for entry in described["metrics"]],
         # None for an actuator without these settings, whose static torque is not proportional to a pressure.

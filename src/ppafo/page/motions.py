@@ -1,7 +1,7 @@
 """Scenarios and walks on a page: tab title, initial changes, and limits declared only in files."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from ppafo.model.controlled import TORQUE
@@ -60,23 +60,3 @@ def with_limits(entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
             limits = {"minimum": SHORTEST_STRIDES * stride, "maximum": 60.0 * LONGEST_MINUTES}
             return {**entry, **limits, "is_minimum_allowed": True}
     return dict(entry)
-
-
-def relations_in_files(keys: Collection[str], scenario: Scenario) -> list[dict[str, Any]]:
-    """Return the relations between settings that a scenario file checks and a program does not."""
-    if not is_walk(scenario):
-        return []
-    from ppafo.walking.contradictions import COMPRESSION
-
-    above = (
-        ("controller.highest_pressure", "supply.pressure", COMPRESSION),
-        ("controller.highest_pressure", "supply.dorsiflexion_pressure", COMPRESSION),
-        ("controller.frozen_time", "controller.period", 2.0),
-        ("controller.fill_time", "valve.delay", 1.0),
-        ("controller.vent_time", "valve.delay", 1.0),
-    )
-    return [
-        {"key": key, "relation": "above", "other": other, "factor": factor, "slack": 0.0}
-        for key, other, factor in above
-        if {key, other} <= set(keys)
-    ]

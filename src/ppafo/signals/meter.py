@@ -28,7 +28,7 @@ class StrideSample(NamedTuple):
 
     ``supplied_mass`` [kg], ``strides``, ``positive_push_off_work`` and ``net_push_off_work`` [J], ``clearances`` [m]
     and ``toe_landings`` are totals since the start, as in the state of the leg. ``phase`` is the gait phase seen by the
-    controller, ``level`` its level of assistance, and ``time`` [s] is since the start.
+    controller.
     """
 
     supplied_mass: float
@@ -38,8 +38,6 @@ class StrideSample(NamedTuple):
     clearances: float
     toe_landings: float
     phase: float
-    level: float
-    time: float
 
 
 class GasSample(NamedTuple):

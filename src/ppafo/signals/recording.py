@@ -87,11 +87,6 @@ CHANNELS: dict[str, ChannelKind] = {
         "last gait event known to the controller: 0 heel strike, 1 toes on, 2 heel off, 3 toes off",
         is_held=True,
     ),
-    "safe_state": ChannelKind(
-        PLAIN_NUMBER,
-        "assistance level: 0 full, 1 foot lifting only, 2 paused, 3 stopped permanently",
-        is_held=True,
-    ),
     "heel_force": ChannelKind("N", "force under the heel, after the lag of the sensor"),
     "toe_force": ChannelKind("N", "force under the toes, after the lag of the sensor"),
     "dorsiflexor_moment": ChannelKind("N m", "moment of the dorsiflexor muscles, 0 or more"),

@@ -34,7 +34,7 @@ from ppafo.simulation.declaration import (
 )
 from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.document import REFERENCE_OF, DocumentReader, ScenarioRequest, controlled_in, kind_at, value_at
-from ppafo.simulation.following import numbers_of_lines, read_followers
+from ppafo.simulation.following import read_followers
 from ppafo.simulation.hardware import Hardware, device_error, read_device, read_hardware
 from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_scenario
 from ppafo.simulation.motion_kind import MOTIONS, RunTimes
@@ -92,7 +92,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         motion = section.read(reading, device, times.duration, times.step, request.folder)
         sensors = _sensors(reading, of_sensors, times)
         supply_line = read_supply_line(reading, device)
-        control, control_links = _control(reading, device, times.period, sensors, supply_line, motion, reference)
+        control, control_links = _control(reading, device, times.period, sensors, motion, reference)
         as_written = DocumentReader(request.file, request.content)
         assumptions = read_assumptions(as_written, reading, hardware, request.overrides)
         # The reason for a reference beyond reach holds for the numbers beside which it is given alone.
@@ -177,7 +177,6 @@ def _control(
     device: Device,
     period: float,
     sensors: Sensors,
-    supply_line: SupplyLine | None,
     motion: Motion,
     reference: ProfileChoice,
 ) -> tuple[Control, Graph]:
@@ -193,10 +192,9 @@ def _control(
     signals = seen_in_scenario(
         controlled, leg is not None, is_locked, reference.kind, "" if path is None else path.kind
     )
-    lines = None if supply_line is None else supply_line.row(device.supply)
-    terms = nominal_terms(device, lines) | default_gain_terms(device, CONTROLLERS[kind], signals, controlled)
+    terms = nominal_terms(device) | default_gain_terms(device, CONTROLLERS[kind], signals, controlled)
     sources = {f"sensors.{quantity.name}": getattr(sensors, quantity.name) for quantity in SENSORS}
-    sources |= numbers_of_lines(lines) | {PERIOD_PATH: period}
+    sources[PERIOD_PATH] = period
     sources |= {f"reference.{name}": number for name, number in reference.settings.items()}
     if is_locked:
         sources[LOCKED_ANGLE] = motion.locked_angle

@@ -1,18 +1,13 @@
-"""Default settings of a controller that follow numbers of the device, its supply lines and its sensors."""
+"""Default settings of a controller that follow numbers of the device and its sensors."""
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import number_under
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
-from ppafo.simulation.declaration import SUPPLY_LINES, line_paths
 from ppafo.simulation.document import DocumentReader, value_at
-
-if TYPE_CHECKING:
-    from ppafo.model.regulator import SupplyLines
 
 
 def read_followers(
@@ -45,14 +40,3 @@ def read_followers(
                 read = replace(quantity, default=float(link.number(number)))
             settings[path] = reading.number(path, read)
     return settings, links
-
-
-def numbers_of_lines(lines: "SupplyLines | None") -> dict[str, float]:
-    """Return the numbers of both supply lines, keyed by path; {} without supply lines."""
-    if lines is None:
-        return {}
-    numbered = {line: number for number, line in enumerate(SUPPLY_LINES, start=1)}
-    return {
-        path: getattr(lines, f"{name}_{numbered[line]}")
-        for path, (_, line, name) in ((path, path.split(".")) for path in line_paths())
-    }

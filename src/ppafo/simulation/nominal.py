@@ -1,26 +1,19 @@
-"""Nominal device of a model-based controller and of the chamber observer, from the numbers of the actual device."""
+"""Nominal device of a model-based controller, from the numbers of the actual device."""
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.kind import nominal_term
 from ppafo.model.actuators.kind import Range
 from ppafo.model.binding import made_of
-from ppafo.model.catalog import VALVES
-from ppafo.model.columns import first
 from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
-from ppafo.model.valves.proportional import spool_lag
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
 from ppafo.parameters.device import VANE, Device, SonicOrifice
 from ppafo.parameters.graph import LinkFunction
-from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
-
-if TYPE_CHECKING:
-    from ppafo.model.regulator import SupplyLines
 
 _GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 _GAS_PRODUCT_PATHS = ("gas.molar_mass", "gas.temperature")
@@ -44,13 +37,6 @@ USUAL_RANGE = 1.0e6
 """Range of the usual pressure transducers for supplies up to 7 bar [Pa absolute]."""
 COMPRESSED = 1.25
 """Smallest converter range divided by the supply pressure [-]; a full-scale reading means a broken wire."""
-_PAIRS = ("solenoid", "solenoid_recycling")
-_SPOOL = "proportional"
-
-
-def always_one(number: float) -> float:
-    """Return 1 for any finite number, elementwise for a column."""
-    return 1.0 + 0.0 * number
 
 
 def always_zero(number: float) -> float:
@@ -58,27 +44,9 @@ def always_zero(number: float) -> float:
     return 0.0 * number
 
 
-# Neither depends on a number: the source is there because a term needs one.
-_ONE, _ZERO = (LinkFunction(("supply.pressure",), constant) for constant in (always_one, always_zero))
-"""Terms whose value is always 1 or 0."""
-
-
-def flow_of_area(molar_mass: float, ratio: float, temperature: float, area: float, discharge: float) -> float:
-    """Flow coefficient of an area, R T times its conductance [m^3/s], from molar mass [kg/mol], k [-], temperature [K].
-
-    Equation (6).
-    """
-    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
-    return constant * temperature * area_conductance(area, discharge, ratio, constant, temperature)
-
-
-def flow_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
-    """Flow coefficient R T C [m^3/s] of a sonic conductance C [m^3/(s Pa)], from molar mass [kg/mol], temperature [K].
-
-    ISO 6358-1.
-    """
-    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
-    return constant * temperature * sonic_conductance_mass(sonic, constant, temperature)
+# The source is there because a term needs one.
+_ZERO = LinkFunction(("supply.pressure",), always_zero)
+"""Term whose value is always 0."""
 
 
 def product_of(molar_mass: float, temperature: float) -> float:
@@ -103,24 +71,9 @@ def conductance_of_sonic(molar_mass: float, temperature: float, sonic: float) ->
     return sonic_conductance_mass(sonic, specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass), temperature)
 
 
-def per_content(number: float, molar_mass: float, temperature: float) -> float:
-    """Convert a number per mass [1/kg] to a number per gas content p V [1/J]; molar mass [kg/mol], temperature [K]."""
-    return number / (specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature)
-
-
-def as_content(number: float, molar_mass: float, temperature: float) -> float:
-    """Convert a gas mass [kg] to a gas content p V [J]; molar mass [kg/mol], temperature [K]."""
-    return number * specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature
-
-
 def converter_range(supply: float, dorsiflexion: float) -> float:
     """Full-scale pressure of the converter [Pa]: 1 MPa, or 1.25 times the larger supply pressure if that is more."""
     return max(USUAL_RANGE, COMPRESSED * max(supply, dorsiflexion))
-
-
-def time_of_joint(joining: float, holding: float) -> float:
-    """Sum of two times [s]: chambers joined, then chamber 2 kept closed."""
-    return joining + holding
 
 
 class _NominalParts(NamedTuple):
@@ -151,52 +104,19 @@ def rest_of(volume: float, growth: float, stops: Range) -> float:
     return max(volume - 0.5 * growth * (stops.angle_max - stops.angle_min), LEAST_SHARE * volume)
 
 
-def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, LinkFunction]:
-    """Return the functions that determine each ``nominal_`` setting, by the names of ``nominal_term``.
-
-    A valve kind of another package is unknown: ``nominal_flow`` is then 0, and the observer off.
-    """
-    valve, kind = device.valve, VALVES[device.valve.kind]
-    names = tuple(quantity.name for quantity in kind.quantities)
-    is_pair, is_known = valve.kind in _PAIRS, valve.kind in (*_PAIRS, _SPOOL)
+def nominal_terms(device: Device) -> dict[str, LinkFunction]:
+    """Return the functions that determine each ``nominal_`` setting, by the names of ``nominal_term``."""
     terms = {name: LinkFunction((path,)) for name, path in _SAME_NUMBERS.items()} | _chamber_terms(device)
     terms |= {
         "gas_product": LinkFunction(_GAS_PRODUCT_PATHS, product_of),
         "valve_conductance": _conductance(device, VALVE),
         "leak_conductance": _conductance(device, LEAK),
-        "flow": in_its_form(
-            device,
-            VALVE,
-            LinkFunction((*_GAS_PATHS, *AREA_PATHS[VALVE]), flow_of_area),
-            LinkFunction((*_GAS_PRODUCT_PATHS, SONIC_PATHS[VALVE][0]), flow_of_sonic),
-        )
-        if is_known
-        else _ZERO,
         "critical_ratio": in_its_form(
             device, VALVE, LinkFunction(_GAS_PATHS[1:2], critical_pressure_ratio), LinkFunction(SONIC_PATHS[VALVE][1:])
         ),
-        "relieving": _ONE if device.supply.takes_back else _ZERO,
-        "pair": _ONE if is_pair else _ZERO,
-        "delay": LinkFunction(("valve.delay",)) if valve.kind == _SPOOL else _ZERO,
-        "lag": LinkFunction(tuple(f"valve.{name}" for name in names), spool_lag, (kind.settings,))
-        if valve.kind == _SPOOL
-        else _ZERO,
         "converter_range": LinkFunction(("supply.pressure", "supply.dorsiflexion_pressure"), converter_range),
-        "joining_time": LinkFunction(("valve.joining_time", "valve.holding_time"), time_of_joint)
-        if "joining_time" in names
-        else _ZERO,
+        "dead_band": LinkFunction(("valve.dead_band",)) if device.valve.kind == "proportional" else _ZERO,
     }
-    for name in ("opening_delay", "closing_delay", "switching_interval", "dead_band"):
-        terms[name] = LinkFunction((f"valve.{name}",)) if name in names and is_known else _ZERO
-    for number, line in enumerate(SUPPLY_LINES, start=1):
-        path = f"{SUPPLY_LINE}.{line}"
-        of_line = {
-            "line_droop": LinkFunction((f"{path}.droop", *_GAS_PRODUCT_PATHS), per_content),
-            "line_largest_flow": LinkFunction((f"{path}.largest_flow", *_GAS_PRODUCT_PATHS), as_content),
-            "line_volume": LinkFunction((f"{path}.volume",)),
-        }
-        terms |= {f"{name}_{number}": _ZERO if lines is None else term for name, term in of_line.items()}
-    terms["line_relieving"] = _ONE if lines is not None and first(lines.relieving) else _ZERO
     return {nominal_term(name): term for name, term in terms.items()}
 
 
@@ -221,19 +141,16 @@ def in_its_form(device: Device, section: str, of_area: LinkFunction, of_sonic: L
 
 def _chamber_terms(device: Device) -> dict[str, LinkFunction]:
     """Return the functions for torque constant, growth and dead volumes; for other actuators, of an equivalent vane."""
-    own = {f"chamber_rest_{number}": LinkFunction((f"actuator.dead_volume_{number}",)) for number in (1, 2)}
     if device.actuator.kind == VANE:
         names = ("torque_constant", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
-        growth = LinkFunction(("actuator.displacement_per_radian",))
-        return {name: LinkFunction((f"actuator.{name}",)) for name in names} | own | {"chamber_growth": growth}
+        return {name: LinkFunction((f"actuator.{name}",)) for name in names}
     chambers = chambers_of(device)
 
     def term(frame: Callable[..., float]) -> LinkFunction:
         made = made_of(frame, f"{frame.__name__}_of_device", _NominalParts(chambers.function))
         return LinkFunction(chambers.sources, made, chambers.rows)
 
-    return own | {
-        "chamber_growth": LinkFunction(chambers.sources, chambers.growth, chambers.rows),
+    return {
         "torque_constant": term(torque_per_pressure),
         # By virtual work a chamber grows with the angle as its torque does with the pressure.
         "displacement_per_radian": term(torque_per_pressure),

@@ -198,20 +198,17 @@ def _program(components: Components, grid: TimeGrid, walk: Walk | None, has_dela
     feed: ModuleType | None = None
     foot: ModuleType | None = None
     leg: ModuleType | None = None
-    faults: ModuleType | None = None
-    # Most runs have neither lines nor a leg, and most walks no fault.
+    # Most runs have neither lines nor a leg.
     if components.supply_lines is not None:
         from ppafo.engine.step import lines as feed
     if components.leg is not None:
         from ppafo.engine.step import foot
     if walk is not None:
         from ppafo.engine.step import walk as leg
-    if walk is not None and walk.failing is not None:
-        from ppafo.engine.step import failing as faults
     law, errors = components.controller, error_functions(components.controlled, components.device.supply.is_vacuum)
     if law is not None and law.controls != (TORQUE,) and errors != OF_TORQUE:
         law = replace(law, update=made_of(law.update, law.update.__name__, errors))
-    is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
+    effects = effects_of(components.device, components.sections)
     return Program(
         actuator=ACTUATORS[components.device.actuator.kind].model,
         valve=components.valve,
@@ -220,12 +217,10 @@ def _program(components: Components, grid: TimeGrid, walk: Walk | None, has_dela
         angle=None if components.path is None else PROFILES[components.path.kind],
         ideal_sensors=components.has_ideal_sensors,
         late_commands=has_delay,
-        late_signals=walk is None and is_late,
-        late_readings=walk is not None and is_late,
+        late_signals=first(components.signal_delay) > 0.0,
         gas=_gas(components, effects),
         leg=leg,
         takes_task_sequence=walk is not None and walk.task_sequence is not None,
-        faults=faults,
         feed=feed,
         is_adaptive=bool(first(grid.needs_parts)),
         # A broken number of steps to a sample puts samples inside steps.

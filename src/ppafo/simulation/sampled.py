@@ -32,11 +32,11 @@ class SampledRun:
         self._plant, self._sensors = (_parameter_group(batch, name) for name in ("plant", "sensors"))
         if program.walks:
             self._last_measurement = NOTHING_SEEN
-            # Delayed readings and gas temperatures of a walk are kept inside the compiled program alone.
-            if program.late_readings or program.is_thermal:
+            # Gas temperatures of a walk are kept inside the compiled program alone.
+            if program.is_thermal:
                 raise ScenarioError(
-                    "a Python controller cannot run a walk with delayed sensors or a thermal gas model; use a "
-                    "controller given by controller.kind, or omit the delays and the gas model"
+                    "a Python controller cannot run a walk with a thermal gas model; use a controller given by "
+                    "controller.kind, or omit the gas model"
                 )
             self._gait_sensors = _parameter_group(batch, "gait_sensors")
         else:
@@ -138,7 +138,6 @@ class SampledRun:
             heel_force,
             toe_force,
             self._plant,
-            self.time,
             self.sample,
             parts=program.functions,
         )

@@ -7,6 +7,7 @@ that one function of floats gives the number in a file, in a study and in an exp
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
+from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control import angle_loop
 from ppafo.control.angle_loop import Joint
 from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
@@ -14,11 +15,13 @@ from ppafo.model.actuators.kind import Range
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Number, PlainFunction
+from ppafo.model.gas import specific_gas_constant
+from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.parameters.device import Device
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
 from ppafo.simulation.motion_kind import LawSignals
-from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_area, flow_of_sonic
+from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE
 
 
 class FlowNumbers(NamedTuple):
@@ -71,15 +74,16 @@ class JointGainParts(NamedTuple):
 
 
 def area_flow(numbers: FlowNumbers) -> float:
-    """Flow coefficient of an orifice area: R T times its conductance [m^3/s]."""
-    return flow_of_area(
-        numbers.molar_mass, numbers.heat_capacity_ratio, numbers.temperature, numbers.orifice_1, numbers.orifice_2
-    )
+    """Flow coefficient of an orifice area: R T times its conductance [m^3/s]. Equation (6)."""
+    ratio, temperature = numbers.heat_capacity_ratio, numbers.temperature
+    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, numbers.molar_mass)
+    return constant * temperature * area_conductance(numbers.orifice_1, numbers.orifice_2, ratio, constant, temperature)
 
 
 def sonic_flow(numbers: FlowNumbers) -> float:
-    """Flow coefficient of a sonic orifice: R T times its conductance [m^3/s]."""
-    return flow_of_sonic(numbers.molar_mass, numbers.temperature, numbers.orifice_1)
+    """Flow coefficient of a sonic orifice: R T times its conductance [m^3/s]. ISO 6358-1."""
+    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, numbers.molar_mass)
+    return constant * numbers.temperature * sonic_conductance_mass(numbers.orifice_1, constant, numbers.temperature)
 
 
 def time_of_spool(valve: Any, period: float, *, parts: _SpoolParts) -> float:

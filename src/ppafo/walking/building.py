@@ -6,15 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ppafo.control.kind import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
+from ppafo.control.kind import FORCE_LAG, VALVE_DELAY
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
-from ppafo.model.fault_catalogue import PLANT_FAULTS
-from ppafo.model.regulator import SupplyLines
-from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph, LinkFunction
 from ppafo.parameters.plant import venting_valve
@@ -23,29 +20,26 @@ from ppafo.simulation.building import origin_of, read_gas_model, read_supply_lin
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
 from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.document import DocumentReader, ScenarioRequest, kind_at, value_at
-from ppafo.simulation.following import numbers_of_lines, read_followers
+from ppafo.simulation.following import read_followers
 from ppafo.simulation.hardware import read_device, read_hardware
 from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH, lag_of_sensor
 from ppafo.simulation.motion_kind import MOTIONS, WALK
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument
-from ppafo.simulation.scenario import Assumption, Control, Initial, RunSettings, Scenario, Sensors, SupplyLine
+from ppafo.simulation.scenario import Assumption, Control, Initial, RunSettings, Scenario, Sensors
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
     DURATION,
-    FAULTY,
     FORCES,
     PERSON,
     SEED,
     STEP,
     WALK_SENSORS,
-    fault_numbers,
     timing_of,
 )
 from ppafo.walking.motion import WalkMotion, duration_problems, record_interval, walk_of, with_duration
 from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
-from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import load_task_sequence
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
@@ -76,9 +70,9 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     if line is not None and bottle is not None:
         line = bottle.fed(line)
     sensors = reading.section("sensors", WALK_SENSORS)
-    motion = _motion(reading, request, line, bottle, sensors)
+    motion = _motion(reading, request, bottle, sensors)
     step = reading.number("run.step", STEP)
-    controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
+    controller, links = _control(reading, device, sensors)
     atmosphere = device.supply.atmospheric_pressure
     # The origin has absolute paths, which are valid in any folder.
     instead = tuple(
@@ -112,25 +106,16 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
 def _motion(
     reading: DocumentReader,
     request: ScenarioRequest,
-    line: SupplyLine | None,
     bottle: BottleSupply | None,
     sensors: Mapping[str, float],
 ) -> WalkMotion:
-    """Return the motion of a walk: wearer, gait, tasks, faults, bottle; ``sensors`` are the sensor settings [SI]."""
+    """Return the motion of a walk: wearer, gait, tasks, bottle; ``sensors`` are the sensor settings [SI]."""
     sequence_file = _named_file("task_sequence", request, reading.document)
     with _named_by("task_sequence", reading, request, ScenarioError):
         sequence = None if sequence_file is None else load_task_sequence(sequence_file)
     with _named_by("gait", reading, request, DataError):
         gait = load_gait(_named_file("gait", request, reading.document) or NORMATIVE)
     is_named = "gait" in request.instead or "gait" in reading.document
-    faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
-    shut_off = reading.section("shut_off", SHUT_OFF) if "shut_off" in reading.document else {}
-    broken = {part: fault for part in PLANT_FAULTS if (fault := _fault(reading, part)).kind}
-    for part in broken:
-        if line is not None and part.startswith(("regulator", "bottle")):
-            raise reading.refusal(
-                f"faults.{part}.kind", "not allowed with [supply_line], which has its own regulators: omit this fault"
-            )
     person = reading.number(f"wearer.{PERSON.name}", PERSON)
     if person != int(person):
         raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
@@ -140,13 +125,10 @@ def _motion(
         wearer=read_wearer(reading, gait, is_named),
         timing=timing_of(reading.document),
         forces={name: sensors[name] for name in FORCES},
-        faults=faults,
         task_sequence=sequence,
         bottle=bottle,
         wearer_origin=wearer_origin(reading, gait, is_named),
         person=person,
-        broken=broken,
-        shut_off=shut_off,
     )
 
 
@@ -171,12 +153,10 @@ def _named_by(
     return refused_as(kind, reading.quote(path), kind) if is_of_walk else nullcontext()
 
 
-def _control(
-    reading: DocumentReader, device: Device, lines: SupplyLines | None, sensors: Mapping[str, float]
-) -> tuple[Control, Graph]:
+def _control(reading: DocumentReader, device: Device, sensors: Mapping[str, float]) -> tuple[Control, Graph]:
     """Return the controller with its settings and those of the phase estimator [SI], and the links between the numbers.
 
-    Defaults may depend on valve, device, supply lines and sensors; each such dependence is a link.
+    Defaults may depend on valve, device and sensors; each such dependence is a link.
     """
     kind = kind_at(reading.document, "controller")
     law = walking_controllers()[kind]
@@ -191,26 +171,18 @@ def _control(
     valve, delay = VALVES[device.valve.kind], venting_valve(device.valve).command_delay
     paths = tuple(f"valve.{quantity.name}" for quantity in valve.quantities)
     terms = {
-        VALVE_LAG: LinkFunction(paths, valve.lag or delay, (valve.settings,)),
         VALVE_DELAY: LinkFunction(paths, delay, (valve.settings,)),
-        PRESSURE_LAG: LinkFunction(("sensors.pressure_bandwidth",), lag_of_sensor),
         FORCE_LAG: LinkFunction(("sensors.force_bandwidth",), lag_of_sensor),
-        **nominal_terms(device, lines),
+        **nominal_terms(device),
         **default_gain_terms(device, law, IN_WALK),
     }
     present = {f"sensors.{name}": number for name, number in sensors.items()}
-    present |= numbers_of_lines(lines) | {PERIOD_PATH: seconds}
+    present[PERIOD_PATH] = seconds
     sections = {"controller": law.quantities, "timing": timing.quantities}
     numbers, links = read_followers(reading, sections, terms, device, present)
     settings = {path.partition(".")[2]: number for path, number in numbers.items()}
     # A law that is named by its module keeps this name; a law of the catalogue has the name that it has in walking.
     return Control(kind if ":" in kind else law.name, settings, seconds), links
-
-
-def _fault(reading: DocumentReader, part: str) -> FaultSettings:
-    """Return the fault of a sensor or plant component; ``kind`` is empty for a sound component."""
-    kind = kind_at(reading.document, f"faults.{part}")
-    return FaultSettings(kind, reading.section(f"faults.{part}", fault_numbers(part, kind)))
 
 
 def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assumption, ...]:

@@ -14,8 +14,7 @@ import numpy as np
 from ppafo.control.catalog import switching_remedy
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
-from ppafo.model.columns import Problem, at, larger, smaller
-from ppafo.parameters.plant import valve_settings, venting_valve
+from ppafo.model.columns import Problem, at
 from ppafo.simulation.document import DocumentReader, value_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import split_quantity
@@ -25,9 +24,6 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import Wearer
 from ppafo.wording import override_text
-
-COMPRESSION = 1.6
-"""Limit of the chamber pressure relative to the supply pressure, with a margin: at most 1.38 in the shipped walks."""
 
 _IN_FILES = {"m": "m"}
 """Units of leg segments in walk files; other lengths are in millimetres."""
@@ -52,9 +48,6 @@ PAIRS = (
     _Pair("wearer.shank_mass_centre", "at most", "wearer.shank_length", "m", "lies beyond the ankle"),
     _Pair("wearer.foot_mass_centre", "at most", "wearer.toe_lever", "m", "lies beyond the toes"),
     _Pair("controller.unload_threshold", "below", "controller.load_threshold", "N"),
-    _Pair("controller.largest_force", "above", "controller.load_threshold", "N"),
-    _Pair("controller.flat_from", "below", "controller.flat_to", ""),
-    _Pair("controller.lowest_angle", "below", "controller.highest_angle", "rad"),
     _Pair("controller.push_off_end", "above", "controller.push_off_start", ""),
     _Pair(
         "controller.rise_time", "at most", "controller.peak_time", "", "the torque would rise before the heel strike"
@@ -169,7 +162,6 @@ def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:
     if "load_threshold" in settings:
         yield from _of_times(scenario)
         yield from _of_swing(scenario)
-        yield from _of_pressures(scenario)
     if "peak_time" in settings:
         peak, fall = settings["peak_time"], settings["fall_time"]
         yield _Contradiction(
@@ -199,41 +191,25 @@ def _of_stops(scenario: Scenario) -> Iterator[_Contradiction]:
 
 
 def _of_times(scenario: Scenario) -> Iterator[_Contradiction]:
-    """Yield the checks of a controller's times against gait, valve dead time and sample period."""
-    settings, period = scenario.controller.settings, scenario.controller.period
+    """Yield the checks of a controller's times against the gait."""
+    settings = scenario.controller.settings
     stride, first_stride = walk_of(scenario).gait.stride_time, settings["first_stride_time"]
     yield _Contradiction(
         "controller.first_stride_time",
         np.logical_or(first_stride <= 0.5 * stride, first_stride >= 2.0 * stride),
         lambda run: f"must be between half and twice the stride time of the gait, {_text(round(stride, 4), run, 's')}",
     )
-    # A valve that has not moved yet neither fills nor vents, and would be taken for one that fails.
-    dead_time = venting_valve(scenario.device.valve).command_delay(valve_settings(scenario.device.valve))
-    for name in ("fill_time", "vent_time"):
-        yield _Contradiction(
-            f"controller.{name}",
-            settings[name] <= dead_time,
-            lambda run: f"must be longer than the dead time of the valve, {_text(dead_time, run, 's')}",
-        )
-    yield _Contradiction(
-        "controller.frozen_time",
-        settings["frozen_time"] <= 2.0 * period,
-        lambda run: f"must be longer than two sample periods of the controller, each {_text(period, run, 's')}",
-    )
 
 
 def _of_swing(scenario: Scenario) -> Iterator[_Contradiction]:
-    """Yield the checks of the swing angle against sensor and device range, and of the presence of a vertical force."""
+    """Yield the checks of the swing angle against the range of the device, and of the presence of a vertical force."""
     settings, actuator = scenario.controller.settings, scenario.device.actuator
-    lowest = larger(settings["lowest_angle"], actuator.angle_min)
-    highest = smaller(settings["highest_angle"], actuator.angle_max)
+    lowest, highest = actuator.angle_min, actuator.angle_max
     swing, gait = settings["swing_angle"], walk_of(scenario).gait
     yield _Contradiction(
         "controller.swing_angle",
         np.logical_or(swing <= lowest, swing >= highest),
-        lambda run: (
-            f"must be in the range of sensor and device, {_text(lowest, run, 'rad')} to {_text(highest, run, 'rad')}"
-        ),
+        lambda run: f"must be in the range of the device, {_text(lowest, run, 'rad')} to {_text(highest, run, 'rad')}",
     )
     yield _Contradiction(
         "controller.kind",
@@ -242,33 +218,6 @@ def _of_swing(scenario: Scenario) -> Iterator[_Contradiction]:
             f"needs force sensors, and gait '{gait.name}' has no vertical_force; import the gait with ground "
             "reaction forces, or set controller.kind=off"
         ),
-    )
-
-
-def _of_pressures(scenario: Scenario) -> Iterator[_Contradiction]:
-    """Yield the checks of a controller's pressures against atmosphere, supply and compression by a moving foot."""
-    settings, supply = scenario.controller.settings, scenario.device.supply
-    atmosphere, filled = supply.atmospheric_pressure, settings["filled_pressure"]
-    has_one_chamber = scenario.device.actuator.has_one_chamber
-    lower_supply = supply.pressure if has_one_chamber else smaller(supply.pressure, supply.dorsiflexion_pressure)
-    compressed = larger(supply.pressure, supply.dorsiflexion_pressure) * COMPRESSION
-    yield _Contradiction(
-        "controller.lowest_pressure",
-        settings["lowest_pressure"] >= atmosphere,
-        lambda run: f"must be below atmospheric pressure, {_text(atmosphere, run, 'Pa_a')}",
-    )
-    yield _Contradiction(
-        "controller.filled_pressure",
-        np.logical_or(filled <= atmosphere, filled >= lower_supply),
-        lambda run: (
-            "must be between atmospheric and supply pressure, "
-            f"{_text(atmosphere, run, 'Pa_a')} and {_text(lower_supply, run, 'Pa_a')}"
-        ),
-    )
-    yield _Contradiction(
-        "controller.highest_pressure",
-        settings["highest_pressure"] <= compressed,
-        lambda run: f"must be above {_text(compressed, run, 'Pa_a')}: a moving foot compresses the gas in a chamber",
     )
 
 

@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field
@@ -14,8 +13,6 @@ from ppafo.documents.models import REFERENCE, make_schema, one_of, optional, tab
 from ppafo.documents.problems import quote
 from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
-from ppafo.model.fault_catalogue import PLANT_FAULTS, PlantFault
-from ppafo.model.shut_off import SHUT_OFF
 from ppafo.plugins import nearest_kind
 from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, TEXTS, THERMAL, THERMAL_GAS, DeclaredContent, line_paths
 from ppafo.simulation.document import kind_at
@@ -23,7 +20,6 @@ from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, MotionKind
 from ppafo.simulation.scenario import LARGEST_SEED
 from ppafo.simulation.schema import controller_table, file_model, kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
-from ppafo.walking.preparation import DISTORTED, FROZEN
 from ppafo.walking.wearer import WEARER
 
 SUMMARY = "the device on a leg that walks along a prescribed gait"
@@ -58,60 +54,6 @@ WALK_SENSORS = (
 )
 FORCES = tuple(quantity.name for quantity in WALK_SENSORS if quantity not in SENSORS)
 """Sensor settings that exist in a walk only: force sensors."""
-
-_FAULTY = {
-    "heel": ("N", "N", "N/s", 1.0e6),
-    "toe": ("N", "N", "N/s", 1.0e6),
-    "angle": ("rad", "rad", "rad/s", 100.0),
-    "pressure_1": ("Pa_a", "Pa_d", "Pa/s", 1.0e9),
-    "pressure_2": ("Pa_a", "Pa_d", "Pa/s", 1.0e9),
-}
-"""Values by sensor that can fail: units of reading, offset and drift, and the largest reading."""
-FAULTY = tuple(_FAULTY)
-
-
-@dataclass(frozen=True, slots=True)
-class _SensorFault:
-    """Declaration of a fault of a sensor or plant component: summary and parameters."""
-
-    summary: str
-    quantities: tuple[Quantity, ...]
-
-
-def _sensor_faults(sensor: str) -> dict[str, _SensorFault]:
-    unit, offset, drift, largest = _FAULTY[sensor]
-    period = "period of an intermittent fault, present in the first half of each period; 0: permanent"
-    times = (
-        Quantity("time", "s", "start time of the fault", None, 0.0, 1.0e6),
-        Quantity("period", "s", period, 0.0, 0.0, 1.0e6),
-    )
-    mixed = "fraction of the other sensor's reading mixed into this one; 1 on both swaps the sensors"
-    distortions = (
-        Quantity("gain", "1", "gain: reading over true value", 1.0, -10.0, 100.0),
-        Quantity("offset", offset, "offset added to the reading", 0.0, -1.0e9, 1.0e9),
-        Quantity("drift", drift, "drift of the reading per second", 0.0, -1.0e9, 1.0e9),
-        # There is no other angle that could be mixed with it.
-        *(() if sensor == "angle" else (Quantity("crosstalk", "1", mixed, 0.0, 0.0, 1.0),)),
-        Quantity("lag", "s", "time constant of a first-order lag of the reading", 0.0, 0.0, 100.0),
-        Quantity("lost_share", "1", "fraction of the samples of the sensor that are lost", 0.0, 0.0, 1.0),
-        Quantity("delay", "s", "delay of the reading, rounded to whole samples", 0.0, 0.0, 1.0),
-    )
-    reading = Quantity("reading", unit, "constant reading during the fault", 0.0, -largest, largest)
-    return {
-        FROZEN: _SensorFault("reading frozen at its last value", times),
-        "stuck": _SensorFault("reading stuck at a given value", (*times, reading)),
-        DISTORTED: _SensorFault("reading follows the true value with errors", (*times, *distortions)),
-    }
-
-
-FAULTS: dict[str, Mapping[str, _SensorFault | PlantFault]] = {sensor: _sensor_faults(sensor) for sensor in FAULTY}
-FAULTS |= PLANT_FAULTS
-"""Every fault of ``[faults]``, by the sensor or part of the plant that fails and by kind."""
-
-
-def fault_numbers(part: str, kind: str) -> tuple[Quantity, ...]:
-    """Return the parameters of a fault of a sensor or plant component; empty without a fault."""
-    return FAULTS[part][kind].quantities if kind else ()
 
 
 def sections(controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
@@ -166,7 +108,7 @@ def _check_motion(kind: object, place: str) -> None:
 
 def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of all text values that a document may contain."""
-    kinds = ("controller.kind", "timing.kind", "gas_model.kind", *(f"faults.{part}.kind" for part in FAULTS))
+    kinds = ("controller.kind", "timing.kind", "gas_model.kind")
     return (*TEXTS, "motion.kind", "gait", "task_sequence", BOTTLE_NAME, *kinds)
 
 
@@ -175,9 +117,7 @@ def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     find_kinds(document, "the file of a walk")
     controller, gas = kind_at(document, "controller"), kind_at(document, "gas_model")
     declared = by_path(sections(controller, timing_of(document), gas) | {BOTTLE: BOTTLE_NUMBERS})
-    for part, kinds in FAULTS.items():
-        declared |= by_path({f"faults.{part}": [quantity for fault in kinds.values() for quantity in fault.quantities]})
-    return declared | by_path({"shut_off": SHUT_OFF}) | line_paths()
+    return declared | line_paths()
 
 
 OF_A_WALK = DeclaredContent(
@@ -234,11 +174,6 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             "wearer; default: the subject of the named gait, else the paper's subject",
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
-        "faults": optional(_faults_table(), "sensors and parts of the plant that fail during the walk"),
-        "shut_off": optional(
-            table("ShutOffValve", quantity_fields(SHUT_OFF)),
-            "normally closed 3/2 valve in the supply line, part of the safe state; none unless given",
-        ),
         BOTTLE: optional(table("WalkBottle", bottle), "bottle that supplies the device; unlimited supply unless given"),
     }
     return file_model("WalkFile", sections)
@@ -247,22 +182,6 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
 def _optional_numbers(quantities: Iterable[Quantity]) -> dict[str, Any]:
     """Return optional Pydantic number fields for declared quantities."""
     return {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in quantities}
-
-
-def _faults_table() -> type[BaseModel]:
-    """Return the model of the section for faults of sensors and of parts of the plant."""
-    faults = {}
-    for part, kinds in FAULTS.items():
-        tables = [
-            table(
-                f"{model_name(part)}{model_name(kind)}",
-                kind_field(kind, fault.summary) | quantity_fields(fault.quantities),
-            )
-            for kind, fault in kinds.items()
-        ]
-        summary = f"fault of the {part} sensor" if part in FAULTY else f"fault of the plant: {part}"
-        faults[part] = optional(one_of(tables), summary)
-    return table("Faults", faults)
 
 
 def json_schema(reference: str = REFERENCE) -> dict[str, Any]:

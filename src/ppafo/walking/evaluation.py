@@ -22,16 +22,13 @@ from ppafo.walking.person import as_drawn
 from ppafo.walking.planning import requests_torque, task_sequence_of_walk
 from ppafo.walking.recording import recording_of_walk
 from ppafo.walking.result import WalkResult
-from ppafo.walking.safety_events import SAFE_ROW, safety_events
 from ppafo.walking.strides import (
     SegmentResult,
-    helped_strides,
     mean_curves,
     per_stride,
     segment_results,
     settled,
     steady_strides,
-    stride_metrics,
     stride_starts,
     task_sequence_metrics,
     walk_metrics,
@@ -80,18 +77,15 @@ def _evaluated(
     recording = recording_of_walk(of_person, run, time, record, supply)
     starts = stride_starts(record["walk.strides"])
     strides = per_stride(record, starts)
-    # A controller without a safe state assists every stride.
-    helped = helped_strides(record.get(SAFE_ROW, np.zeros(time.size)), starts)
     # The first strides do not count for averages, in which the controller adapts; in a sequence only steady ones do.
     every = np.ones(max(starts.size - 1, 0), dtype=np.bool_)
     counted = settled(every) if sequence is None else steady_strides(sequence, time[starts])
-    averages, vented_averages = (mean_curves(recording, starts, chosen & counted) for chosen in (helped, ~helped))
-    metrics = walk_metrics(of_person, recording, strides, averages, starts, helped, counted)
-    vented = ~helped & counted
+    averages = mean_curves(recording, starts, counted)
+    metrics = walk_metrics(of_person, recording, strides, averages, starts, counted)
     segments: tuple[SegmentResult, ...] = ()
     if sequence is not None:
         segments = segment_results(of_person, sequence, recording, strides["net_push_off_work"], starts)
-        metrics |= task_sequence_metrics(sequence, segments, recording, int((helped & counted).sum()))
+        metrics |= task_sequence_metrics(sequence, segments, recording, int(counted.sum()))
     return WalkResult(
         scenario=scenario,
         recording=recording,
@@ -100,10 +94,7 @@ def _evaluated(
         metrics=Metrics(metrics),
         status=status,
         starts=starts,
-        helped=helped,
         counted=counted,
-        vented_metrics=stride_metrics(of_person, strides, vented_averages, vented) if vented.any() else {},
-        events=safety_events(of_person, time, record),
         segments=segments,
         supply=supply,
     )
@@ -112,11 +103,11 @@ def _evaluated(
 def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
     """Return the integral of a channel over the ankle angle in one stride [channel unit times rad], mean over strides.
 
-    The mean uses the assisted strides that count for averages.
+    The mean uses the strides that count for averages.
     """
     turned = np.diff(result.recording["angle"])
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
-    return float(np.diff(integral[result.starts])[result.helped & result.counted].mean())
+    return float(np.diff(integral[result.starts])[result.counted].mean())
 
 
 def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]) -> Measured:

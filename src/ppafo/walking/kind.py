@@ -29,7 +29,7 @@ class WalkKind:
     contradictory_numbers = staticmethod(contradictions.contradictory_numbers)
     quantities = staticmethod(motion.numbers_of_scenario)
     clock = staticmethod(motion.clock_with)
-    switches = staticmethod(planning.switches)
+    switches = staticmethod(planning.flaws)
     noise = staticmethod(planning.noise)
     law = staticmethod(planning.law_of)
     lacks = staticmethod(evaluation.lacks)

@@ -1,4 +1,4 @@
-"""Motion of a walk: wearer, gait, sensors and faults as frozen values in SI units; it makes a scenario a walk.
+"""Motion of a walk: wearer, gait and sensors as frozen values in SI units; it makes a scenario a walk.
 
 The functions below declare the values that may vary: numbers by path, and times as scalars or as arrays of an ensemble.
 """
@@ -14,13 +14,11 @@ from ppafo.gait import Gait
 from ppafo.gait.plausible_angles import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
-from ppafo.model.shut_off import SHUT_OFF
 from ppafo.simulation.declaration import THERMAL, line_paths
 from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BottleSupply
-from ppafo.walking.declaration import FAULTS, FAULTY, FORCES, PERSON, by_path, fault_numbers, sections
-from ppafo.walking.preparation import FaultSettings
+from ppafo.walking.declaration import FORCES, PERSON, by_path, sections
 from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
@@ -29,20 +27,17 @@ from ppafo.walking.wearer import WEARER, Wearer, who_walks
 class WalkMotion:
     """Walk of a wearer with the device; the gait prescribes shank and loaded foot, the device moves the free foot.
 
-    ``person`` and the numbers of ``wearer``, ``forces`` and ``faults`` may be arrays (runs,).
+    ``person`` and the numbers of ``wearer`` and ``forces`` may be arrays (runs,).
 
     - ``motion_kind``: functions of this type of motion
     - ``gait``: prescribed gait
     - ``wearer``: leg of the wearer
     - ``timing``: name of the gait phase estimator
     - ``forces``: settings [SI] of the force sensors, by name
-    - ``faults``: sensor faults, by sensor
     - ``task_sequence``: task sequence, None for equal strides
     - ``bottle``: gas bottle, None for an unlimited supply
     - ``wearer_origin``: description of the origin of the body mass
     - ``person``: number of the person of the population, 0 for the wearer with the unchanged gait, or a ``Person``
-    - ``broken``: faults of the plant, by part
-    - ``shut_off``: settings of the shut-off valve, {} without one
     """
 
     motion_kind: MotionKind[Scenario] = field(compare=False)
@@ -50,13 +45,10 @@ class WalkMotion:
     wearer: Wearer
     timing: str
     forces: Mapping[str, Any]
-    faults: Mapping[str, FaultSettings]
     task_sequence: TaskSequence | None = None
     bottle: BottleSupply | None = None
     wearer_origin: str = "the paper's subject"
     person: Any = 0.0
-    broken: Mapping[str, FaultSettings] = field(default_factory=dict)
-    shut_off: Mapping[str, Any] = field(default_factory=dict)
     locked_angle: ClassVar[None] = None
 
     @property
@@ -101,19 +93,6 @@ PLACES: Mapping[str, tuple[str, ...]] = {
         for quantity in kind.quantities
     },
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
-    **{
-        f"faults.{part}.{quantity.name}": (
-            "motion",
-            "faults" if part in FAULTY else "broken",
-            part,
-            "numbers",
-            quantity.name,
-        )
-        for part, kinds in FAULTS.items()
-        for fault in kinds.values()
-        for quantity in fault.quantities
-    },
-    **{f"shut_off.{quantity.name}": ("motion", "shut_off", quantity.name) for quantity in SHUT_OFF},
 }
 """Attributes or keys that lead to the numbers of a walk that other scenarios do not have, by path."""
 
@@ -124,9 +103,6 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     declared = sections(control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
     # An object in charge has no settings, and a timing is one of a controller that has some.
     declared["timing"] = tuple(quantity for quantity in declared["timing"] if quantity.name in control.settings)
-    for part, fault in {**motion.faults, **motion.broken}.items():
-        declared[f"faults.{part}"] = fault_numbers(part, fault.kind)
-    declared["shut_off"] = SHUT_OFF if motion.shut_off else ()
     return by_path(declared) | ({} if scenario.supply_lines is None else line_paths())
 
 

@@ -12,23 +12,19 @@ from ppafo.control.walking.catalog import walking_controllers
 from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch
-from ppafo.engine.rows import leaf_paths, leaves, of_each, rebuilt
+from ppafo.engine.rows import of_each
 from ppafo.engine.run import Run, Walk, batches_of, states_at_start
 from ppafo.engine.scheme.actuators import filled_chambers
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.columns import Problem, at, first, larger, over_runs, smaller, truncated, whole
+from ppafo.model.columns import Problem, at, first, larger, over_runs, smaller, whole
 from ppafo.model.elementary import QUARTER_TURN
-from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.gait import gait_at
-from ppafo.model.orifice import area_conductance
 from ppafo.model.plant import PlantParameters
-from ppafo.model.plant_faults import SOUND, PlantFaults
 from ppafo.model.ports import load_torque
 from ppafo.model.sensors import GaitSensors
-from ppafo.model.shut_off import NOT_FITTED, ShutOff
 from ppafo.parameters.device import Device
 from ppafo.parameters.plant import plant_parameters, venting_valve
 from ppafo.simulation.plan import Components, TimeGrid, compose_run, sensor_parameters, too_many_steps
@@ -40,11 +36,8 @@ from ppafo.walking.person import Person, crowd_of, leg_of_person, person_of, set
 from ppafo.walking.preparation import (
     HIGHEST_ANGLE,
     LOWEST_ANGLE,
-    FaultSettings,
     device_share,
-    fault_of,
     gait_sensors,
-    longest_delay,
     smallest_chamber,
     vented_state,
     walk_from_standing,
@@ -80,7 +73,7 @@ def plan_walk(scenario: Scenario) -> Run:
 def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     """Return the run of a walk and the possible problems of the run; numbers of both may be arrays (runs,).
 
-    All runs of an ensemble must need the same program: each setting of ``switches`` is 0 for all runs or for none.
+    All runs of an ensemble must need the same program: each of ``flaws`` is 0 for all runs or for none.
     """
     motion, device = walk_of(scenario), fed_device(scenario)
     person = person_of(motion.gait, motion.person)
@@ -102,7 +95,6 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         sensors=sensors,
         initial=initial,
         task_sequence=None if planned is None else planned.timed,
-        failing=failing_of(scenario),
     )
     # Whoever fits the controller to a person sets its thresholds and the start of its push-off anew.
     settings = settings_of_person(dict(scenario.controller.settings), person)
@@ -119,7 +111,6 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         has_ideal_sensors=has_ideal_sensors(scenario),
         thermal=scenario.gas_model,
         supply_lines=scenario.supply_lines,
-        signal_delay=of_each(longest_delay, sensors) * scenario.controller.period,
     )
     now = walk.initial.now
     run = compose_run(
@@ -205,39 +196,13 @@ def vented_chambers(device: Device, plant: PlantParameters, angle: Any) -> Chamb
 
 
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:
-    """Return the sensors of a walk with their faults, at the sample period of the controller."""
-    numbers, faults = sensor_numbers(scenario), walk_of(scenario).faults
-    values = [*numbers.values(), *(value for fault in faults.values() for value in fault.numbers.values())]
+    """Return the sensors of a walk at the sample period of the controller."""
+    numbers = sensor_numbers(scenario)
 
     def made(period: float, *values: float) -> GaitSensors:
-        left = iter(values)
-        own = {name: next(left) for name in numbers}
-        failing = {
-            f"{sensor}_fault": fault_of(FaultSettings(fault.kind, {name: next(left) for name in fault.numbers}), period)
-            for sensor, fault in faults.items()
-        }
-        return gait_sensors(own, period, **failing)
+        return gait_sensors(dict(zip(numbers, values, strict=True)), period)
 
-    return over_runs(made, scenario.controller.period, *values)
-
-
-def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
-    """Return the plant faults of a walk and its shut-off valve, or None without either."""
-    motion, gas = walk_of(scenario), scenario.device.gas
-    if not motion.broken and not motion.shut_off:
-        return None
-    # Every fault is there in the engine; what is not broken never begins.
-    names = leaf_paths(PlantFaults, "")
-    numbers: dict[str, Any] = dict(zip((name.lstrip(".") for name in names), leaves(SOUND), strict=True))
-    for part, fault in motion.broken.items():
-        declared = PLANT_FAULTS[part][fault.kind]
-        numbers |= {declared.fields[name]: number for name, number in fault.numbers.items()}
-    shut_off, valve = NOT_FITTED, motion.shut_off
-    if valve:
-        warm = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
-        conductance = over_runs(area_conductance, valve["area"], valve["discharge_coefficient"], *warm)
-        shut_off = ShutOff(conductance, valve["delay"], valve["silence"])
-    return rebuilt(PlantFaults, list(numbers.values())), shut_off
+    return over_runs(made, scenario.controller.period, *numbers.values())
 
 
 def sensor_numbers(scenario: Scenario) -> dict[str, Any]:
@@ -247,44 +212,33 @@ def sensor_numbers(scenario: Scenario) -> dict[str, Any]:
 
 
 def flaws(scenario: Scenario) -> tuple[Any, ...]:
-    """Return the imperfections of the sensors of a walk, without faults; 0 for an ideal sensor.
+    """Return the imperfections of the sensors of a walk; 0 for an ideal sensor.
 
-    The bandwidth of the force sensors is not included, because every walk has it.
+    Each must be 0 for all runs of a program or for none. The bandwidth of the force sensors is not included, because
+    every walk has it.
     """
     return tuple(number for name, number in sensor_numbers(scenario).items() if name != "force_bandwidth")
 
 
 def has_ideal_sensors(scenario: Scenario) -> bool:
     """Return True if the sensors are ideal except for the bandwidth of the force sensors."""
-    fails = any(fault.kind for fault in walk_of(scenario).faults.values())
-    return not (fails or any(first(flaw) for flaw in flaws(scenario)))
-
-
-def switches(scenario: Scenario) -> tuple[Any, ...]:
-    """Return the settings that must be 0 for all runs of a program or for none: imperfections, delays [samples]."""
-    # Samples and not seconds: the engine keeps whole ones, and a delay below half of one keeps none.
-    delays = (fault.numbers.get("delay", 0.0) for fault in walk_of(scenario).faults.values())
-    return *flaws(scenario), *(truncated(delay / scenario.controller.period + 0.5) for delay in delays)
+    return not any(first(flaw) for flaw in flaws(scenario))
 
 
 def noise(scenario: Scenario) -> Any:
     """Return the sum of all random effects in the sensors of a walk: noise levels, and fractions of lost samples."""
-    sensors, motion = scenario.sensors, walk_of(scenario)
-    lost = [fault.numbers.get("lost_share", 0.0) for fault in motion.faults.values()]
-    lost += [fault.numbers["share"] for fault in motion.broken.values() if fault.kind == "jittering"]
-    own = [number for name, number in motion.forces.items() if name == "force_noise" or name.endswith("lost_share")]
-    return sum((*own, *lost), sensors.angle_noise + sensors.pressure_noise)
+    sensors, forces = scenario.sensors, walk_of(scenario).forces
+    own = [number for name, number in forces.items() if name == "force_noise" or name.endswith("lost_share")]
+    return sum(own, sensors.angle_noise + sensors.pressure_noise)
 
 
 def law_of(scenario: Scenario) -> ControllerKind:
     """Return the controller of a walk with its gait phase estimator, for scalar arithmetic.
 
-    The controllers with a constant and with an ordered command occur only in an exported plant, not in a walk file.
+    The controller with a constant command occurs only in an exported plant, not in a walk file.
     """
-    # The catalogue of walking has neither, whose command is handed in.
-    for law in (switching.CONSTANT, switching.ORDERED):
-        if scenario.controller.kind == law.name:
-            return law
+    if scenario.controller.kind == switching.CONSTANT.name:
+        return switching.CONSTANT
     return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
 
 

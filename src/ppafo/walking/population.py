@@ -1,6 +1,5 @@
 """Walks of many randomly drawn wearers, and the distribution of their outcomes."""
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,21 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.arguments import Count, Minutes, Seed, checked
-from ppafo.control.walking.fault_flags import FAULT_FLAGS
 from ppafo.engine.lane_rows import LANES
 from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.errors import ScenarioError
 from ppafo.metrics.strides import PER_STRIDE
-from ppafo.model.helping import STOPPED
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.evaluation import REMEDY
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_people
 from ppafo.walking.planning import plan_walks, task_sequence_of_walk, unrecorded
-from ppafo.walking.safety_events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.task_sequence_plan import turns_walked
 from ppafo.walking.walk import Progress, lasting, silent
 
@@ -64,9 +60,6 @@ class Population:
     - ``minutes``, ``seed``: duration of each walk [min], and random seed of the wearers
     - ``traits``, ``outcomes``: of the wearers whose simulation did not diverge
     - ``diverged``: number of wearers whose simulation diverged
-    - ``vented``: number of wearers whose controller stopped permanently
-    - ``paused``: number of other wearers with reduced assistance for a while
-    - ``fault_flags``: number of vented and paused wearers by their last fault flag, the most frequent first
     """
 
     scenario: Scenario
@@ -75,9 +68,6 @@ class Population:
     traits: Mapping[str, Floats]
     outcomes: Mapping[str, Floats]
     diverged: int
-    vented: int
-    paused: int
-    fault_flags: Mapping[str, int]
 
     @property
     def count(self) -> int:
@@ -156,7 +146,6 @@ def walk_population(
         "stride_time": np.asarray(people.stride_time),
         "stance_share": np.asarray(people.timing.toe_off),
     }
-    vented, paused, fault_flags = _reduced_assistance(final)
     # Totals over strides; those of the toes over heel strikes, at least 1.
     counts = dict.fromkeys(("toe_clearance", "toe_landing"), np.maximum(final["walk.strides"], 1.0))
     return Population(
@@ -168,9 +157,6 @@ def walk_population(
             name: final[each.total] / counts.get(name, strides[is_finished]) for name, each in PER_STRIDE.items()
         },
         diverged=int((~is_finished).sum()),
-        vented=vented,
-        paused=paused,
-        fault_flags=fault_flags,
     )
 
 
@@ -185,12 +171,3 @@ def _final_numbers(batch: Batch, progress: Progress) -> dict[str, Floats]:
         states[:, group] = run_batch(part).states
         progress(float(min(start + size, wearers)), float(wearers))
     return {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
-
-
-def _reduced_assistance(final: Mapping[str, Floats]) -> tuple[int, int, dict[str, int]]:
-    """Return the numbers of vented and paused wearers, and their fault flags, as in ``Population``."""
-    if SAFE_ROW not in final:
-        return 0, 0, {}
-    is_stopped, is_reduced = final[SAFE_ROW] == STOPPED, final[VENTINGS_ROW] > 0.0
-    flags = Counter(FAULT_FLAGS[flag].name for flag in final[f"{FINDING_ROW}.fault_flag"][is_reduced].tolist())
-    return int(is_stopped.sum()), int((is_reduced & ~is_stopped).sum()), dict(flags.most_common())

@@ -6,7 +6,6 @@ them in C. Results derived from the gait (series, events, heel rocker) are data 
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.engine.scheme.pneumatics import filling_time
@@ -18,8 +17,7 @@ from ppafo.model.elementary import exponential
 from ppafo.model.gait import GaitNow
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, foot_load, torque_of_shank
 from ppafo.model.plant import PlantParameters, PlantState
-from ppafo.model.sensors import Fault, GaitSensors
-from ppafo.model.shut_off import NEVER
+from ppafo.model.sensors import GaitSensors
 from ppafo.simulation.plan import WHOLE, StepCounts, state_with_volumes
 from ppafo.walking.wearer import HeelRocker
 
@@ -30,10 +28,6 @@ STEPS_PER_FILLING = 15.0
 """Steps per filling time of the smallest chamber: at 1 kHz metrics are accurate to 1 % (docs/decisions/0008)."""
 
 _TURN = 2.0 * math.pi
-
-DISTORTED, FROZEN = "distorted", "frozen"
-DISTORTING = ("time", "period", "gain", "offset", "drift", "crosstalk", "lag", "lost_share", "delay")
-"""Parameters of a distorted sensor, in the order of ``distorting_fault``; the angle sensor has no crosstalk."""
 
 
 def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> HeelRocker:
@@ -169,16 +163,8 @@ def memory_of(bandwidth: float, period: float) -> float:
     return exponential(-_TURN * bandwidth * period) if bandwidth > 0.0 else 0.0
 
 
-def gait_sensors(
-    settings: Mapping[str, float],
-    period: float,
-    heel_fault: Fault,
-    toe_fault: Fault,
-    angle_fault: Fault,
-    pressure_1_fault: Fault,
-    pressure_2_fault: Fault,
-) -> GaitSensors:
-    """Return the sensors with these settings [SI] and faults, at a sample period [s]."""
+def gait_sensors(settings: Mapping[str, float], period: float) -> GaitSensors:
+    """Return the sensors with these settings [SI], at a sample period [s]."""
     return GaitSensors(
         follow_rate=_TURN * settings["force_bandwidth"],
         force_noise=settings["force_noise"],
@@ -188,90 +174,4 @@ def gait_sensors(
         pressure_memory=memory_of(settings["pressure_bandwidth"], period),
         angle_lost_share=settings["angle_lost_share"],
         pressure_lost_share=settings["pressure_lost_share"],
-        heel_fault=heel_fault,
-        toe_fault=toe_fault,
-        angle_fault=angle_fault,
-        pressure_1_fault=pressure_1_fault,
-        pressure_2_fault=pressure_2_fault,
     )
-
-
-def fixed_fault(time: float, holds: float, reading: float, fault_period: float) -> Fault:
-    """Return a fault from ``time`` [s] on: the sensor keeps its last value (``holds`` = 1) or gives a fixed reading."""
-    return Fault(
-        time=time,
-        holds=holds,
-        reading=reading,
-        distorts=0.0,
-        gain=1.0,
-        offset=0.0,
-        drift=0.0,
-        crosstalk=0.0,
-        memory=0.0,
-        lost_fraction=0.0,
-        period=fault_period,
-        late_samples=0.0,
-    )
-
-
-def distorting_fault(
-    time: float,
-    fault_period: float,
-    gain: float,
-    offset: float,
-    drift: float,
-    crosstalk: float,
-    lag: float,
-    lost_share: float,
-    delay: float,
-    period: float,
-) -> Fault:
-    """Return a fault that distorts the reading of a sensor from ``time`` [s] on, at a controller sample period [s].
-
-    ``lag`` and ``delay`` are in [s], the delay is rounded to whole samples; the other arguments are fields of
-    ``Fault``.
-    """
-    return Fault(
-        time=time,
-        holds=0.0,
-        reading=0.0,
-        distorts=1.0,
-        gain=gain,
-        offset=offset,
-        drift=drift,
-        crosstalk=crosstalk,
-        # Without a lag it follows at once, and keeps nothing of the last sample.
-        memory=exponential(-period / lag) if lag > 0.0 else 0.0,
-        lost_fraction=lost_share,
-        period=fault_period,
-        # A delay is whole samples in the engine: the nearest number of them.
-        late_samples=truncated(delay / period + 0.5),
-    )
-
-
-def longest_delay(sensors: GaitSensors) -> float:
-    """Return the largest delay of a sensor by a fault [samples]."""
-    forces = max(sensors.heel_fault.late_samples, sensors.toe_fault.late_samples)
-    pressures = max(sensors.pressure_1_fault.late_samples, sensors.pressure_2_fault.late_samples)
-    return max(forces, pressures, sensors.angle_fault.late_samples)
-
-
-@dataclass(frozen=True, slots=True)
-class FaultSettings:
-    """Fault of a sensor or part: kind of ``declaration.FAULTS`` and parameters [SI]; no fault if the kind is empty."""
-
-    kind: str = ""
-    numbers: Mapping[str, float] = field(default_factory=dict)
-
-
-def fault_of(fault: FaultSettings, period: float) -> Fault:
-    """Return the fault of a sensor with its parameters [SI], at a controller sample period [s]."""
-    settings = fault.numbers
-    if not fault.kind:
-        # A sound sensor has a fault that never begins, so that one program serves both.
-        return fixed_fault(NEVER, 0.0, 0.0, 0.0)
-    if fault.kind != DISTORTED:
-        holds = 1.0 if fault.kind == FROZEN else 0.0
-        return fixed_fault(settings["time"], holds, settings.get("reading", 0.0), settings["period"])
-    numbers = [settings.get(name, 0.0) for name in DISTORTING]
-    return distorting_fault(*[*numbers, period])

@@ -19,7 +19,6 @@ from ppafo.walking.bottle.course import UNITS, SupplyCourse
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.inverse_dynamics import dorsiflexor_moment, swing_knee_torque
 from ppafo.walking.motion import walk_of
-from ppafo.walking.safety_events import SAFE_ROW
 from ppafo.walking.stride_events import EVENT_ROW, FRACTION_ROW, PHASE_ROW, clock_row
 from ppafo.walking.task_sequence_plan import pace_in_time
 
@@ -66,7 +65,7 @@ def recording_of_walk(
             channels[name] = (np.interp(time, supply.times, values), UNITS[name])
         channels["bottle_mass"] = (supply.first.mass - record["line_state.regulated_mass"], "kg")
     if PHASE_ROW in record:
-        channels |= {"controller_phase": (record[PHASE_ROW], "-"), "safe_state": (record[SAFE_ROW], "-")}
+        channels["controller_phase"] = (record[PHASE_ROW], "-")
     if _REQUEST_ROW in record:
         channels["reference"] = (record[_REQUEST_ROW], "N m")
     fraction, event = clock_row(record, FRACTION_ROW), clock_row(record, EVENT_ROW)

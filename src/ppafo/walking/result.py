@@ -1,4 +1,4 @@
-"""Result of a walk: recording, strides, averages, metrics, verdict and safety events."""
+"""Result of a walk: recording, strides, averages, metrics, and verdict."""
 
 import math
 from collections.abc import Mapping
@@ -28,7 +28,6 @@ from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.motion import walk_of
-from ppafo.walking.safety_events import SafetyEvent
 from ppafo.walking.strides import Curves, SegmentResult
 from ppafo.wording import changed_text, override_text
 
@@ -43,7 +42,7 @@ _in_own_units = in_units(lambda walked, *_, **__: walked.scenario.device.shown)
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
 class WalkResult:
-    """Result of a walk. Averages and metrics use assisted strides after the first ones, in which the controller adapts.
+    """Result of a walk. Averages and metrics use strides after the first ones, in which the controller adapts.
 
     For a task sequence, averages and metrics use steady strides on level ground only.
 
@@ -54,11 +53,7 @@ class WalkResult:
     - ``metrics``: numbers of the whole walk, by name
     - ``status``: completed, or diverged with the time [s]
     - ``starts``: samples directly after each heel strike
-    - ``helped``: True for each stride with full assistance (strides,)
     - ``counted``: True for each stride that counts for averages (strides,)
-    - ``vented_metrics``: metrics of the strides with reduced assistance (lifted only, paused or stopped), {} without
-      any
-    - ``events``: pauses, the stop and returns of assistance
     - ``segments``: results of the segments of a task sequence, () without one
     - ``supply``: gas bottle over the walk, None without a bottle
     """
@@ -70,17 +65,9 @@ class WalkResult:
     metrics: Mapping[str, Metric]
     status: Status
     starts: NDArray[np.intp]
-    helped: NDArray[np.bool_]
     counted: NDArray[np.bool_]
-    vented_metrics: Mapping[str, Metric]
-    events: tuple[SafetyEvent, ...]
     segments: tuple[SegmentResult, ...] = ()
     supply: SupplyCourse | None = None
-
-    @property
-    def is_helped(self) -> bool:
-        """True if at least half of the whole strides were assisted."""
-        return 2 * int(self.helped.sum()) >= self.helped.size
 
     @property
     def peak_torques(self) -> Floats:
@@ -103,13 +90,7 @@ class WalkResult:
         """
         if verdict is not None:
             return verdict.sentence
-        return following_text(self) if self.is_helped and "strides" in self.metrics else ""
-
-    @property
-    def help_text(self) -> str:
-        """Number of assisted strides as text, with a remark if fewer than half were assisted."""
-        enough = "" if self.is_helped else ": fewer than half"
-        return f"help in {int(self.helped.sum())} of {self.helped.size} strides{enough}"
+        return following_text(self) if "strides" in self.metrics else ""
 
     @_in_own_units
     def __repr__(self) -> str:
@@ -128,7 +109,6 @@ class WalkResult:
         head.append(changed_text(changes_in(self.scenario)))
         if self.status.is_completed:
             head += [self.torque_sentence(self.tracking), limited_request(self.scenario), unlimited_switching(self)]
-            head.append("" if self.is_helped else self.help_text)
             toes = self.metrics.get("lowest_toes")
             if toes is not None and toes.value < 0.0:
                 head.append("the toes would drag in mid-swing: the ankle is not lifted enough")

@@ -12,7 +12,7 @@ from ppafo.metrics import METRICS, Metric
 from ppafo.metrics.command import command_reversals, peak_torque, requested_samples
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.model.contact import FLAT, SWING
-from ppafo.model.helping import HELPS, PUSH_OFF
+from ppafo.model.helping import PUSH_OFF
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
@@ -46,13 +46,6 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
     # A landing on the toes is counted in the step of the strike, of which ``starts`` has the sample after it.
     firsts = {name: starts - 1 if name == "toe_landing" else starts for name in PER_STRIDE}
     return {name: np.diff(totals[quantity.total][firsts[name]]) for name, quantity in PER_STRIDE.items()}
-
-
-def helped_strides(level: Floats, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return True for each whole stride that was assisted from strike to strike, from the assistance level."""
-    # A running count of samples without help is the same at both strikes where there were none between.
-    vented = np.concatenate([[0], np.cumsum(level > HELPS)])
-    return np.asarray(vented[starts[1:]] == vented[starts[:-1]])
 
 
 def samples_of(chosen: NDArray[np.bool_], starts: NDArray[np.intp], samples: int) -> NDArray[np.bool_]:
@@ -92,21 +85,16 @@ def walk_metrics(
     strides: Mapping[str, Floats],
     averages: Mapping[str, Curves],
     starts: NDArray[np.intp],
-    helped: NDArray[np.bool_],
     counted: NDArray[np.bool_],
 ) -> dict[str, Metric]:
-    """Return the metrics of a walk by name, in SI units, over its assisted strides.
+    """Return the metrics of a walk by name, in SI units.
 
-    ``starts`` are the samples after each heel strike, ``helped`` (strides,) marks the assisted strides, and ``counted``
-    (strides,) the strides that count for means. ``averages`` are over the strides that are both assisted and counted.
+    ``starts`` are the samples after each heel strike, and ``counted`` (strides,) marks the strides that count for
+    means. ``averages`` are over these strides.
     """
-    chosen = helped & counted
     gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
-    less = "whole strides with less help (lift only, pause or stop) for at least a part"
-    metrics = stride_metrics(configuration, strides, averages, chosen) | {
-        "strides": Metric(float(helped.size), "-", "whole strides of the walk"),
-        "helped_strides": Metric(float(helped.sum()), "-", "whole strides with help from strike to strike"),
-        "vented_strides": Metric(float((~helped).sum()), "-", less),
+    metrics = stride_metrics(configuration, strides, averages, counted) | {
+        "strides": Metric(float(counted.size), "-", "whole strides of the walk"),
         "total_gas": Metric(gas, "kg", "gas taken from the supply in the whole walk"),
     }
     of_torque: dict[str, float] = {}
@@ -114,16 +102,12 @@ def walk_metrics(
         reference, requested = recording["reference"], requested_samples(recording)
         error = reference - recording["torque"]
         # A controller that requests a torque is judged by how well it gets it in push-off.
-        pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
+        pushes = samples_of(counted, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
         parts = {"push_off_error": error[pushes], "torque_error": error[requested]}
         parts["requested_torque"] = reference[requested]
         of_torque = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items() if part.size}
     of_torque |= {"peak_torque": peak_torque(recording), "command_reversals": command_reversals(recording)}
     metrics |= {name: Metric(value, METRICS[name].unit, METRICS[name].summary) for name, value in of_torque.items()}
-    if "safe_state" in recording and recording["safe_state"].any():
-        time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
-        summary = "time at which the controller first lifted only, paused or stopped"
-        metrics["safe_state_time"] = Metric(time, "s", summary)
     return metrics
 
 
@@ -205,12 +189,10 @@ class SegmentResult:
     - ``kind``, ``title``: kind of the segment, and its title for tables
     - ``start``, ``end``: time interval of the segment [s]
     - ``strides``: number of strides that start in the segment
-    - ``helped``: number of these strides that were fully assisted up to the next strike or the end
     - ``gas``: consumed gas [kg]
     - ``net_push_off_work``: net push-off work of the strides that start in the segment [J]
     - ``lowest_toes``: lowest toe clearance in mid-swing [m], None without a swing
     - ``flat_push``: largest plantarflexion torque with a loaded heel [N m]
-    - ``safe_time``: first time with reduced assistance (lifted only, paused or stopped) [s], None without any
     """
 
     kind: str
@@ -218,12 +200,10 @@ class SegmentResult:
     start: float
     end: float
     strides: int
-    helped: int
     gas: float
     net_push_off_work: float
     lowest_toes: float | None
     flat_push: float
-    safe_time: float | None
 
 
 def steady_strides(planned: PlannedSequence, strikes: Floats) -> NDArray[np.bool_]:
@@ -256,27 +236,16 @@ def segment_results(
         begun = np.flatnonzero((strikes >= start) & (strikes < last))
         gas = np.interp([start, last], time, recording["supplied_mass"])
         push = recording["torque"][own & heel & (contact <= FLAT) & (contact != SWING)]
-        helped, safe_time = 0, None
-        # Where no controller works there is no help, and no safe state either.
-        if "safe_state" in recording:
-            safe = recording["safe_state"] > 0.5
-            edges = np.append(starts, time.size)
-            helped = sum(not safe[edges[stride] : edges[stride + 1]].any() for stride in begun)
-            # Where less help begins within the segment: one that was in its safe state before has no time of its own.
-            begins = np.flatnonzero(own & safe & ~np.append(False, safe[:-1]))
-            safe_time = float(time[begins[0]]) if begins.size else None
         result = SegmentResult(
             kind=span.kind,
             title=span.title,
             start=start,
             end=last,
             strides=begun.size,
-            helped=helped,
             gas=float(gas[1] - gas[0]),
             net_push_off_work=float(works[begun[begun < works.size]].sum()),
             lowest_toes=_lowest_toes(configuration, recording, own),
             flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
-            safe_time=safe_time,
         )
         results.append(result)
     return tuple(results)

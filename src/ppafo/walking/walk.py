@@ -28,9 +28,8 @@ from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.evaluation import result_of_walk
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import SHORTEST_STRIDES, WalkMotion, duration_problems, walk_of, with_duration
+from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
 from ppafo.walking.planning import fed_device, plan_walk, task_sequence_of_walk
-from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 
@@ -123,14 +122,14 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
     """Walk on the scenario's bottle until the bottle is exhausted; return the time that it lasted.
 
     The simulation is as in ``walk``, with the rests and the longest duration of ``schedule``; a task sequence is
-    repeated. Faults are ignored: a stopped device uses no gas. Raises ScenarioError for a walk without a bottle.
+    repeated. Raises ScenarioError for a walk without a bottle.
     """
-    motion = _without_faults(walk_of(scenario))
+    motion = walk_of(scenario)
     if motion.bottle is None:
         raise ScenarioError(f"{scenario.name}: has no bottle; give a walk with [bottle]")
     if scenario.controller.custom is not None:
         check_no_bottle(scenario)
-    repeated = _repeated_walk(replace(scenario, motion=motion), schedule.longest)
+    repeated = _repeated_walk(scenario, schedule.longest)
     run, device = plan_walk(repeated), fed_device(repeated)
     return life_on_bottle(run, device, motion.bottle, motion.gait.stride_time, schedule, progress)
 
@@ -147,11 +146,6 @@ def _repeated_walk(scenario: Scenario, longest: float) -> Scenario:
     seconds_of_run = 60.0 * (MAXIMUM_STEPS * plan_walk(minute).step // 60.0)
     seconds = min(math.ceil(longest / stride_time) * stride_time, seconds_of_run)
     return replace(minute, run=replace(minute.run, duration=60.0 * max(1, round(seconds / 60.0))))
-
-
-def _without_faults(motion: WalkMotion) -> WalkMotion:
-    """Return the motion with intact sensors and an intact plant."""
-    return replace(motion, faults=dict.fromkeys(motion.faults, FaultSettings()), broken={})
 
 
 def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
@@ -224,8 +218,8 @@ def compare_walks(
 def without_device(configuration: Scenario) -> Scenario:
     """Return the walk of this wearer without a device: no foot plate, actuator torque or friction, and no gas flow.
 
-    The ankle has its own range of motion. The result does not depend on device or valve; bottle, supply lines and
-    faults are removed.
+    The ankle has its own range of motion. The result does not depend on device or valve; bottle and supply lines
+    are removed.
     """
     device, control = configuration.device, Control(event_on_off.OFF.name, {}, configuration.controller.period)
     # No torque and no displacement; the stops of the actuator become the range of the ankle.
@@ -236,7 +230,7 @@ def without_device(configuration: Scenario) -> Scenario:
         name=f"{configuration.name}-without",
         device=replace(device, actuator=stops, friction=free, foot_plate=massless, effects={}, links={}),
         controller=control,
-        motion=replace(_without_faults(walk_of(configuration)), bottle=None, timing=THRESHOLDS, shut_off={}),
+        motion=replace(walk_of(configuration), bottle=None, timing=THRESHOLDS),
         supply_line=None,
         # Links to numbers that are left out go too.
         links=outside(configuration.links, "controller", "timing", "supply_line"),

@@ -15,7 +15,6 @@ from ppafo.analyses.walk import command
 from ppafo.cli.main import main
 from ppafo.storage import read_csv
 from ppafo.storage.netcdf_reading import read_netcdf
-from ppafo.storage.reading import read_recording
 from ppafo.walking import loading
 
 SHORT = ["--minutes", "0.1"]
@@ -122,7 +121,7 @@ def test_a_task_sequence_writes_its_segments_and_its_figure(tmp_path: Path, caps
     assert document["task_sequence"] == "stairs"
     assert [item["kind"] for item in document["segments"]] == ["stand", "walk", "stairs"]
     lines = (folder / "segments.csv").read_text().splitlines()
-    assert lines[1].startswith("kind,start [s],end [s],strides [-],helped [-],gas [kg]")
+    assert lines[1].startswith("kind,start [s],end [s],strides [-],gas [kg]")
     assert len(lines) == 5
 
 
@@ -132,55 +131,6 @@ def test_a_bottle_repeats_a_task_sequence_as_a_whole(tmp_path: Path, capsys: pyt
     capsys.readouterr()
     assert main(["bottle", str(folder), "--longest", "5 s"]) == 0
     assert "walk 'solenoid' in task sequence 'stairs'" in capsys.readouterr().out
-
-
-def test_a_stop_is_told_with_its_sign_readings_settings_and_time(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    faulty = ["faults.toe.kind=stuck", "faults.toe.time=6.3 s", "faults.toe.reading=9 kN"]
-    words = [word for text in faulty for word in ("--set", text)]
-    assert main(["walk", "--minutes", "0.15", *words, "--out", str(tmp_path / "walk")]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    told = next(line for line in lines if line.startswith("stopped"))
-    assert told.startswith("stopped for good at 6.30 s: implausible foot force; heel ")
-    assert told.endswith(" N, toe 9000 N; lowest_force -40 N, largest_force 3000 N")
-    assert "help in 5 of 7 strides" in lines
-    assert "implausible foot force" in (tmp_path / "walk/report.html").read_text()
-    document = json.loads((tmp_path / "walk" / "walk.json").read_text())
-    (event,) = document["events"]
-    assert (event["kind"], event["fault_flag"], event["settings"]) == (
-        "stop",
-        "force_range",
-        {"lowest_force": -40.0, "largest_force": 3000.0},
-    )
-    assert event["readings"]["toe_force"] == 9000.0
-    assert event["time"] == pytest.approx(6.3)
-    assert event["message"] == told
-    assert document["metrics"]["safe_state_time"]["value"] == pytest.approx(6.3)
-    assert "safe_state_time" not in document["metrics_off"]
-    assert (tmp_path / "walk" / "over-time.png").is_file()
-
-
-def test_strides_with_help_and_vented_ones_stand_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    faulty = ["faults.toe.kind=stuck", "faults.toe.time=4 s", "faults.toe.reading=0 N"]
-    words = [word for text in faulty for word in ("--set", text)]
-    assert main(["walk", "--minutes", "0.2", *words, "--out", str(tmp_path / "walk")]) == 1
-    lines = capsys.readouterr().out.splitlines()
-    assert "help in 3 of 10 strides: fewer than half" in lines
-    assert any(line.split() == ["with", "less", "help", "without", "healthy"] for line in lines)
-    document = json.loads((tmp_path / "walk" / "walk.json").read_text())
-    helped, vented, bare = (document[name] for name in ("metrics", "metrics_vented", "metrics_off"))
-    assert helped["gas"]["value"] > 5.0e-4
-    assert vented["gas"]["value"] < 1.0e-4
-    assert vented["lowest_toes"]["value"] == pytest.approx(bare["lowest_toes"]["value"], abs=1.0e-3)
-    # With help the toes of this walk pass within a centimetre of the ground; without they would drag by eight.
-    assert helped["lowest_toes"]["value"] > vented["lowest_toes"]["value"] + 0.05
-    counts = [helped[name]["value"] for name in ("helped_strides", "vented_strides", "strides")]
-    assert counts == [3.0, 7.0, 10.0]
-    strides = (tmp_path / "walk" / "strides.csv").read_text().splitlines()
-    assert [line.split(",")[-1] for line in strides[1:]] == ["helped [-]", *["1.0"] * 3, *["0.0"] * 7]
-    supplied = read_recording(tmp_path / "walk")["supplied_mass"]
-    assert helped["total_gas"]["value"] == supplied[-1] - supplied[0]
 
 
 @pytest.fixture

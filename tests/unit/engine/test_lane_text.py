@@ -27,9 +27,9 @@ from tests.composed_programs import lane_source
 def test_blocks_are_as_large_as_the_first_cache_allows_and_never_less_than_a_vector() -> None:
     task = plan_run(load_scenario("torque-task-solenoid")).program
     walk = plan_walk(with_duration(load_walk("solenoid"), 6.0)).program
-    assert (lanes_of(task), lanes_of(walk)) == (LANES, VECTOR)
+    assert (lanes_of(task), lanes_of(walk)) == (LANES, 2 * VECTOR)
     rows = RowsOfLanes(StepText(walk, SourceCollector(""))).aside
-    assert 8 * VECTOR * rows <= FIRST_CACHE < 8 * 2 * VECTOR * rows
+    assert 8 * 2 * VECTOR * rows <= FIRST_CACHE < 8 * 4 * VECTOR * rows
 
 
 def test_a_phase_loads_the_groups_that_it_asks_for_and_stores_what_it_changes() -> None:

@@ -18,7 +18,6 @@ from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import batch_of
 from ppafo.engine.step import (
     energy_balance,
-    failing,
     foot,
     isothermal,
     lines,
@@ -37,7 +36,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.translation.c99 import program_source
 
 MODULES: list[ModuleType] = [
-    *(energy_balance, failing, foot, isothermal, lines, meters, not_ideal, phases, sample, stated, walk)
+    *(energy_balance, foot, isothermal, lines, meters, not_ideal, phases, sample, stated, walk)
 ]
 FIRST = Now(
     step=0,
@@ -47,8 +46,6 @@ FIRST = Now(
     late_command=0,
     late_signal=0,
     next_signal=0,
-    reading=0,
-    readings=0,
 )
 
 

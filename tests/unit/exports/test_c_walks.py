@@ -38,18 +38,12 @@ SPREAD = (0.9, 1.1)
 Values = dict[str, float]
 Samples = np.ndarray[Any, np.dtype[np.float64]]
 SEEN = ("sensors.force_noise=5 N", "sensors.angle_bandwidth=40 Hz", "sensors.pressure_noise=0.1 psi_d")
-FAULTY = (
-    *("faults.heel.kind=distorted", "faults.heel.time=2 s", "faults.heel.lag=30 ms", "faults.heel.delay=7.3 ms"),
-    *("faults.toe.kind=frozen", "faults.toe.time=4 s", "faults.toe.period=0.5 s"),
-    *("faults.angle.kind=distorted", "faults.angle.time=1 s", "faults.angle.offset=2 deg"),
-    *("faults.pressure_1.kind=stuck", "faults.pressure_1.time=3 s", "faults.pressure_1.reading=3 psi_g"),
-)
 THERMAL = (
     *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"),
     "gas_model.wall_area_per_volume=100 1/m",
 )
 SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
-EVERYTHING = (*SEEN, *FAULTY, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
+EVERYTHING = (*SEEN, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
 ACTUATORS = Path(__file__).parents[2] / "actuators"
 OF_ANOTHER_KIND = (
     ("device.set=cylinder-lever", *THERMAL),
@@ -62,7 +56,7 @@ VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("proportional", ("task_sequence=first-steps",)),
     *(("proportional", of_kind) for of_kind in OF_ANOTHER_KIND),
 )
-"""Every shipped walk, one with all further features (sensors with faults, thermal gas, slow valve), task sequences,
+"""Every shipped walk, one with all further features (noisy sensors, thermal gas, slow valve), task sequences,
 other actuators."""
 
 
@@ -271,11 +265,10 @@ def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_
 
 
 def test_what_is_written_out_in_the_source_is_no_setting() -> None:
-    """A setting that changes nothing would be worse than none: faults of the plant, its shut-off valve, the person."""
-    given = ("faults.valve_1.kind=stuck", "faults.valve_1.time=3 s", "shut_off.area=10 mm^2")
-    paths = [item.path for item in settings_of_walk(load_walk("solenoid", given))]
+    """A setting that changes nothing would be worse than none: persons are drawn in Python."""
+    paths = [item.path for item in settings_of_walk(load_walk("solenoid"))]
     assert "valve.area" in paths
-    assert not [path for path in paths if path.startswith(("faults.", "shut_off.", "wearer.person"))]
+    assert "wearer.person" not in paths
 
 
 def test_a_library_of_another_actuator_says_nothing_of_a_vane_or_of_a_supply_that_it_has_not() -> None:

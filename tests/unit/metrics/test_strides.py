@@ -34,8 +34,7 @@ def metered(columns: dict[str, np.ndarray], first: int = 0) -> StrideMeter:
     """The meter after all samples from one on."""
     blank = StrideSample(*[0.0] * len(StrideSample._fields))
     strides = [
-        blank._replace(time=0.01 * at, **{name: float(column[at]) for name, column in columns.items()})
-        for at in range(first, SAMPLES)
+        blank._replace(**{name: float(column[at]) for name, column in columns.items()}) for at in range(first, SAMPLES)
     ]
     nothing = GasSample(*[0.0] * 5), EnergySample(*[0.0] * 5), FootSample(0.0, 0.0, 0.0)
     rows = [Sample(*[0.0] * 11, *nothing, stride=stride) for stride in strides]

@@ -1,4 +1,4 @@
-"""A row of columns of a walk has the bits of the single walk: 12 walks, task sequences and faults by 12 rows."""
+"""A row of columns of a walk has the bits of the single walk: 11 walks by 12 rows."""
 
 from typing import Any
 
@@ -16,7 +16,6 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk, walk
 
 ROWS = 12
-LATE = ("faults.toe.kind=distorted", "faults.toe.time=2 s", "faults.toe.delay=20 ms", "faults.toe.gain=0.9")
 THERMAL = ("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)")
 WALKS: dict[str, tuple[str, tuple[str, ...]]] = {
     "solenoid": ("solenoid", ()),
@@ -27,7 +26,6 @@ WALKS: dict[str, tuple[str, tuple[str, ...]]] = {
     "lines, slow": ("solenoid-regulators", ("controller.rate=500 Hz",)),
     "timed": ("proportional", ("timing.kind=estimated", "sensors.pressure_bandwidth=40 Hz")),
     "task_sequence": ("proportional", ("task_sequence=first-steps",)),
-    "late toes": ("solenoid", LATE),
     "thermal": ("proportional", (*THERMAL, "gas_model.wall_area_per_volume=100 1/m", "sensors.force_noise=2 N")),
 }
 VARIED: dict[str, tuple[float, float, str]] = {
@@ -43,8 +41,6 @@ VARIED: dict[str, tuple[float, float, str]] = {
     "controller.period": (0.6, 1.4, "s"),
     "sensors.pressure_bandwidth": (0.5, 2.0, "Hz"),
     "sensors.force_bandwidth": (0.5, 2.0, "Hz"),
-    "faults.toe.delay": (0.2, 1.5, "s"),
-    "faults.toe.gain": (0.8, 1.2, ""),
     "run.duration": (0.95, 1.5, "s"),
     "run.step": (0.5, 1.5, "s"),
     "gas_model.heat_transfer_coefficient": (0.5, 2.0, "W/(m^2 K)"),

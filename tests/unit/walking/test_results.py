@@ -18,10 +18,8 @@ from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, 
 from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import (
     PHASES,
-    helped_strides,
     mean_curves,
     per_stride,
-    samples_of,
     stride_starts,
 )
 from ppafo.walking.walk import ANKLE_RANGE
@@ -170,17 +168,6 @@ def test_a_landing_on_the_toes_is_that_of_the_stride_that_it_begins() -> None:
     found = per_stride(totals, stride_starts(strides))
     assert found["toe_landing"].tolist() == [0.0, 1.0, 0.0]
     assert found["gas"].tolist() == [1.0, 1.0, 1.0]
-
-
-def test_a_stride_has_help_only_if_every_sample_of_it_has() -> None:
-    starts = np.array([3, 10, 20, 30])
-    level = np.zeros(40)
-    level[12:14] = 1.0
-    level[30:] = 2.0
-    helped = helped_strides(level, starts)
-    assert helped.tolist() == [True, False, True]
-    assert np.flatnonzero(samples_of(helped, starts, 40)).tolist() == [*range(3, 10), *range(20, 30)]
-    assert helped_strides(level, starts[:1]).size == 0
 
 
 def test_a_metric_of_a_module_is_one_of_a_walk_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -102,7 +102,7 @@ MISTAKES: dict[str, tuple[str, str]] = {
     ),
     "an angle": (
         'angle = "90 deg"\n',
-        r"unknown key 'motion\.angle', which is a key of \[faults\]; allowed here: kind",
+        r"unknown key 'motion\.angle'; allowed here: kind",
     ),
     "a gait that is a number": ("gait = 3\n", "gait = 3 must be a text"),
 }
@@ -275,7 +275,7 @@ def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others()
         for term in link.terms
     ]
     rules = {f"{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}" for term in terms}
-    assert "law_signals.lag_of_sensor" in rules
+    assert "default_gains.proportional_gain_of_device" in rules
     assert {rule for rule in rules if f'"{rule}":' not in page} == set()
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from ppafo.model import contact as ground
-from ppafo.model.sensors import Fault
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 
@@ -108,17 +107,6 @@ def test_a_dead_time_of_the_valve_delays_the_pressure(walk_plan: Callable[[str],
         loaded = record[:, rows["state.supplied_mass"]] > 1e-6
         seen[delay] = float(np.flatnonzero(loaded)[0]) * run.step * run.record_every
     assert 0.028 < seen[0.0304] - seen[0.0] < 0.036
-
-
-@pytest.mark.parametrize("name", ["event_on_off", "event_proportional"])
-def test_a_stride_that_begins_without_heel_strike_gets_no_push_before_its_time(
-    walked_with_fault: Callable[..., Any], name: str
-) -> None:
-    walk = walked_with_fault(name, "heel", Fault(3.3, 0.0, 0.0))
-    phase = walk["walk.now.phase"]
-    early = (walk.time > 3.3) & (phase > 0.1) & (phase < 0.35)
-    assert (walk["controller_state.phase.phase"][early] != 3.0).all(), "push-off begins at two fifths of the stride"
-    assert (walk["controller_state.phase.phase"][walk.time < 3.3] == 3.0).any()
 
 
 def test_a_foot_that_comes_first_with_its_toes_loads_them(

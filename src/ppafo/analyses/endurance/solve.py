@@ -146,7 +146,7 @@ def _endurance_of_recording(
 def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -> Endurance | None:
     """Return the duration of a bottle when the walk continues without rest, or None if the walk took no gas.
 
-    The same device, without faults, walks on the bottle until the bottle is exhausted, as with ``ppafo walk --bottle``.
+    The same device walks on the bottle until the bottle is exhausted, as with ``ppafo walk --bottle``.
     The default of ``bottle`` is the bottle of the walk, else the paper's bottle. A repetition is a stride of the leg
     with the device, or a whole task sequence.
 

@@ -22,7 +22,7 @@ from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import changes_in
-from ppafo.simulation.scenario import UNITS, Scenario
+from ppafo.simulation.scenario import UNITS
 from ppafo.simulation.tracking import Tracking
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -32,19 +32,13 @@ from ppafo.walking.bottle.course import duration_text, lasted
 from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.figures.whole_walk import whole_walk_figure
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WALK_FORMAT, WalkResult, limited_request
-from ppafo.walking.safety_events import event_lines, failure_times
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison
 from ppafo.wording import argument_text
 
-_OVER_TIME = (
-    "Gas, toe height and gait phase over the whole walk. The strip at the bottom shows when the controller helps, only "
-    "lifts the foot, pauses or has stopped. A solid line marks less help, a dashed line a fault."
-)
 _PRESSURE = Kind(quantity="pressure", form=".3g")
 _FAR_ABOVE = 2.0
 """Ratio of absolute chamber pressure to supply pressure for a remark; healthy wearers stay below."""
@@ -81,8 +75,7 @@ _EXPLAINED = (
     "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
     "'Healthy' is the gait itself. Ground contact in the swing is not simulated: toes below the ground would drag. "
     "The first two strides, in which the controller learns the stride time, and an unfinished last stride are left "
-    "out. The device is on one leg, so a stride is one step of that leg. Strides with less help (lifted only, paused "
-    "or stopped) are not counted under 'with' but under 'less help', if there are any."
+    "out. The device is on one leg, so a stride is one step of that leg."
 )
 _LEGS = (
     "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground in mid-swing: they "
@@ -131,7 +124,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
             Section("Assumptions" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
         found=_walk_data(comparison, verdict),
-        passed=comparison.is_completed and worn.is_helped,
+        passed=comparison.is_completed,
         files=_files(comparison),
         live=partial(live_part, [scenario]),
         overrides=changes_in(scenario),
@@ -159,7 +152,6 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking | None) -> dict[str
         "status_off": plain(bare.status),
         "metrics": plain(dict(worn.metrics)),
         "metrics_off": plain(dict(bare.metrics)),
-        "events": [event.to_dict() for event in worn.events],
         "versions": versions(),
         "configuration": walk_document(worn.scenario),
         "shown": dict(worn.scenario.device.shown),
@@ -168,7 +160,6 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking | None) -> dict[str
         "minutes": float(worn.recording.time[-1]) / 60.0,
         **segments,
         **bottle_data(worn),
-        "metrics_vented": plain(dict(worn.vented_metrics)),
         "healthy": plain(dict(comparison.healthy)),
     }
 
@@ -189,13 +180,13 @@ def _files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
 
 
 def _remarks(comparison: WalkComparison) -> list[str]:
-    """Return remarks on wearer, bottle, safety, the trusted range of speeds, and divergence."""
+    """Return remarks on wearer, bottle, pressures, the trusted range of speeds, and divergence."""
     worn = comparison.with_device
     diverged = [walked for walked in (worn, comparison.without_device) if not walked.status.is_completed]
     remarks = (
         *person_remarks(worn.scenario),
         _bottle_remark(worn),
-        *safety_remarks(worn),
+        *_pressure_remarks(worn),
         trust_remark(worn.scenario),
         *(f"{walked.scenario.name}: {walked.status.message}" for walked in diverged),
     )
@@ -219,25 +210,6 @@ def _bottle_remark(worn: WalkResult) -> str:
     return f"the supply pressure is constant here; give {with_bottle} to see how long a bottle lasts"
 
 
-@in_units(lambda worn: worn.scenario.device.shown)
-def safety_remarks(worn: WalkResult) -> list[str]:
-    """Return remarks on the shut-off valve, excessive pressures, and reductions of assistance."""
-    remarks = [_shut_off_remark(worn.scenario), *_pressure_remarks(worn)]
-    remarks += event_lines(worn.events)
-    if worn.events and worn.helped.size:
-        remarks.append(worn.help_text)
-    return [remark for remark in remarks if remark]
-
-
-def _shut_off_remark(scenario: Scenario) -> str:
-    """Return mass and power of a shut-off valve as text; "" without one."""
-    fitted = walk_of(scenario).shut_off
-    if not fitted:
-        return ""
-    grams, power = 1.0e3 * float(fitted["mass"]), float(fitted["power"])
-    return f"shut-off valve: {grams:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"
-
-
 def _pressure_remarks(worn: WalkResult) -> Iterator[str]:
     """Yield a remark on each chamber that the foot compresses far above its supply pressure."""
     supply = worn.scenario.device.supply
@@ -253,14 +225,11 @@ def _pressure_remarks(worn: WalkResult) -> Iterator[str]:
 
 
 def _pictures(comparison: WalkComparison) -> Sequence[Section]:
-    """Return the figures of a task sequence, or of equal strides: over time, and the mean stride if there is one."""
+    """Return the figures of a task sequence, or those of equal strides if there is a mean stride."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is not None:
         return task_sequence_pictures(comparison)
     figures: list[tuple[str, str, str, Callable[[], Any]]] = []
-    # A figure of an even walk over time shows nothing that the mean stride does not.
-    if worn.events or failure_times(worn.scenario):
-        figures.append(("The walk over time", "over-time", _OVER_TIME, partial(whole_walk_figure, worn)))
     if worn.averages and bare.averages:
         walks = {"with the device": worn, "without": bare}
         figures += [
@@ -274,13 +243,9 @@ def _pictures(comparison: WalkComparison) -> Sequence[Section]:
 
 
 def comparison_table(comparison: WalkComparison) -> list[Column]:
-    """Return the table of metrics by row, with columns for the device, without it, and a healthy ankle.
-
-    Strides with reduced assistance have a separate column if there are any.
-    """
+    """Return the table of metrics by row, with columns for the device, without it, and a healthy ankle."""
     worn, bare = comparison.with_device, comparison.without_device
-    walked = [("with", worn.metrics), ("less help", worn.vented_metrics), ("without", bare.metrics)]
-    walked = [(head, metrics) for head, metrics in walked if metrics or head != "less help"]
+    walked = [("with", worn.metrics), ("without", bare.metrics)]
     columns: list[tuple[str, dict[str, float | str | None]]] = []
     for head, metrics in (*walked, ("healthy", comparison.healthy)):
         values: dict[str, float | str | None] = {"body_mass": walk_of(worn.scenario).wearer.body_mass}
@@ -305,7 +270,6 @@ def strides_csv(result: WalkResult) -> bytes:
     count = result.strides["gas"].size
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
     columns |= {f"{name} [{quantity.unit}]": result.strides[name] for name, quantity in PER_STRIDE.items()}
-    columns["helped [-]"] = result.helped.astype(np.float64)
     return csv_of(columns)
 
 

@@ -1,13 +1,8 @@
 """Verdict on a walk: benefit of the device against the same walk without it, and a remedy if it does not help."""
 
-import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
-
-import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.walking.fault_flags import FAULT_FLAGS, NOT_FLAT
 from ppafo.errors import PpafoError
 from ppafo.loading import reloaded
 from ppafo.parameters.reach import torque_reach
@@ -18,7 +13,6 @@ from ppafo.simulation.tracking.remedies import remedy
 from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.result import WalkResult
-from ppafo.walking.safety_events import event_lines
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison, walk
 
@@ -37,8 +31,6 @@ _NEARLY = 0.95
 """Ratio of a torque to its limit from which the limit counts as reached [-]."""
 _FIRST_TRIAL = 9.0
 """Duration of the first walk with a remedy [s]; one that does not suffice in it is not tried for the whole duration."""
-_AFTER_TOE_LOAD = 0.02
-"""Time between toe load and the start of foot-flat that a remedy sets [strides]."""
 
 
 RemedyTrials = tuple[str, Sequence[tuple[str, ...]], str]
@@ -52,22 +44,21 @@ def benefit_sentence(comparison: WalkComparison) -> str:
     """
     worn, bare = comparison.with_device, comparison.without_device
     numbers, without = ({name: metric.value for name, metric in walked.metrics.items()} for walked in (worn, bare))
-    reasons = [] if worn.is_helped else [worn.help_text, *event_lines(worn.events)[:1], *_remedied(worn, drags=False)]
     if not comparison.is_completed or "net_push_off_work" not in numbers:
-        return f"the device does not help: {'; '.join(reasons)}" if reasons else ""
+        return ""
     has_work = numbers["net_push_off_work"] > 0.0
     drags, drags_without = (metrics.get("lowest_toes", 0.0) < 0.0 for metrics in (numbers, without))
     both = numbers.keys() & without.keys()
     is_closer = "angle_difference" in both and without["angle_difference"] > numbers["angle_difference"]
     lifts = not drags and (drags_without or is_closer)
-    if reasons or not (has_work or lifts):
+    if not (has_work or lifts):
         verdict = "the device does not help"
     elif drags:
         verdict = "the device helps in push-off but not in swing"
     else:
         verdict = "the device helps" if has_work else "the device helps in swing alone"
-    clauses = ", ".join([*_compared(numbers, without), *reasons])
-    remedied = _remedied(worn, drags) if worn.is_helped and (drags or not has_work) else []
+    clauses = ", ".join(_compared(numbers, without))
+    remedied = _remedied(worn, drags) if drags or not has_work else []
     return "; ".join([f"{verdict}, against the same walk without it: {clauses}", *remedied])
 
 
@@ -90,8 +81,8 @@ def _compared(numbers: Mapping[str, float], without: Mapping[str, float]) -> lis
 def _remedied(worn: WalkResult, drags: bool) -> list[str]:
     """Return a clause on the cause of missing help, with the first remedy that another walk confirms or advice.
 
-    The list is empty for a walk on a bottle, and for a cause without remedy and advice. A walk without help needs help
-    in at least half of the strides; a walk with help needs push-off work and, if its toes would drag, clear toes.
+    The list is empty for a walk on a bottle, and for a cause without remedy and advice. A remedy needs push-off work
+    and, if the toes would drag, clear toes.
     """
     if walk_of(worn.scenario).bottle is not None:
         return []
@@ -114,18 +105,16 @@ def _gain_with(worn: WalkResult, overrides: Sequence[str], drags: bool) -> str:
             again = walk(with_duration(reloaded(worn.scenario, overrides), seconds))
         except PpafoError:
             return ""
-        gain = _gain(again, drags, needs_work=worn.is_helped)
+        gain = _gain(again, drags)
         if not gain:
             break
     return gain
 
 
-def _gain(again: WalkResult, drags: bool, needs_work: bool) -> str:
-    """Return strides with help, or if ``needs_work`` height of the toes and work, as text; "" if not enough."""
-    if not (again.status.is_completed and again.is_helped):
+def _gain(again: WalkResult, drags: bool) -> str:
+    """Return height of the toes and work as text; "" if not enough."""
+    if not again.status.is_completed:
         return ""
-    if not needs_work:
-        return again.help_text
     toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
     is_enough = work > 0.0 and not (drags and toes < 0.0)
     return f"toes {_HEIGHT.text(toes)} over the ground and {_WORK.text(work)}" if is_enough else ""
@@ -134,8 +123,6 @@ def _gain(again: WalkResult, drags: bool, needs_work: bool) -> str:
 def _trials(worn: WalkResult, drags: bool) -> RemedyTrials:
     """Return the cause of missing help with its remedies; ``drags`` is True if the toes would drag."""
     scenario = worn.scenario
-    if not worn.is_helped:
-        return _later_flat_foot(worn)
     if scenario.controller.kind == "off":
         return "its controller is off", _LAWS, "another controller alone does not help"
     requested, available = _lifting_torques(worn) if drags else (0.0, 0.0)
@@ -147,23 +134,6 @@ def _trials(worn: WalkResult, drags: bool) -> RemedyTrials:
         [remedy(scenario, pressures).overrides for pressures in _raised_pressures(scenario)],
         f"more supply pressure alone does not suffice; {other} was not tried",
     )
-
-
-def _later_flat_foot(worn: WalkResult) -> RemedyTrials:
-    """Return a later start of foot-flat as remedy, if assistance ended because the toes load too late."""
-    settings, starts = worn.scenario.controller.settings, worn.starts
-    flags = [event.fault_flag for event in worn.events if event.fault_flag is not None]
-    if not flags or flags[0] is not FAULT_FLAGS[NOT_FLAT]:
-        return "", (), ""
-    is_loaded = worn.recording["toe_force"] > settings["load_threshold"]
-    loads = [np.argmax(is_loaded[start:end]) / (end - start) for start, end in pairwise(starts)]
-    latest = max(loads, default=0.0) + settings["debounce"] / walk_of(worn.scenario).gait.stride_time
-    begin = math.ceil(100.0 * (latest + _AFTER_TOE_LOAD)) / 100.0
-    overrides = [f"controller.flat_from={begin:.2f}"]
-    if begin >= settings["flat_to"]:
-        overrides.append(f"controller.flat_to={begin + settings['flat_to'] - settings['flat_from']:.2f}")
-    cause = f"the toes count as loaded up to {latest:.2g} strides after heel strike"
-    return cause, [tuple(overrides)] if begin > settings["flat_from"] else (), ""
 
 
 def _stiffer_holds(scenario: Scenario, requested: float, available: float) -> RemedyTrials:

@@ -34,7 +34,7 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "settings": plain(control.settings),
         "period": control.period,
         "step": scenario.run.step,
-        "sensors": {"numbers": plain(sensor_numbers(scenario)), "faults": plain(motion.faults), "seed": seed},
+        "sensors": {"numbers": plain(sensor_numbers(scenario)), "seed": seed},
         "supply_line": plain(scenario.supply_line),
         "gas_model": plain(scenario.gas_model),
         "bottle": None if motion.bottle is None else motion.bottle.to_dict(),

@@ -20,21 +20,18 @@ _NUMBERS = (
     ShownNumber(name="start", title="from", quantity="time", digits=1),
     ShownNumber(name="end", title="to", quantity="time", digits=1),
     ShownNumber(name="strides", title="strides", quantity="", digits=0),
-    ShownNumber(name="helped", title="helped", quantity="", digits=0),
     ShownNumber(name="gas", title="gas", quantity="gas mass", digits=2),
     ShownNumber(name="net_push_off_work", title="work", quantity="energy", digits=1),
     ShownNumber(name="lowest_toes", title="lowest toes", quantity="body length", digits=1),
     ShownNumber(name="without", title="... without", quantity="body length", digits=1),
     ShownNumber(name="flat_push", title="push, heel loaded", quantity="torque", digits=1),
-    ShownNumber(name="safe_time", title="less help at", quantity="time", digits=2),
 )
 """Columns of the table of segments: numbers of a segment, and lowest toes without the device."""
 _CAPTION = (
     "The task sequence over time. Grey: every other segment. 'Without' is the same task sequence without a device."
 )
 _EXPLAINED = (
-    "A stride belongs to the segment of its heel strike; it is helped if the controller does not pause, stop or only "
-    "lift the foot before the next strike. Work is net work on the wearer while the foot rolls over the "
+    "A stride belongs to the segment of its heel strike. Work is net work on the wearer while the foot rolls over the "
     "toes. Lowest toes are heights above ground in mid-swing. A push with the heel loaded is torque in "
     "plantarflexion while the heel carries more than a tenth of the body weight.",
     "Angles are scaled with the stride length, which grows with the square root of the speed like the strides per "
@@ -67,13 +64,11 @@ def task_sequence_parts(comparison: WalkComparison) -> tuple[Section, ...]:
             "start": 0.0,
             "end": numbers["task_sequence_time"],
             "strides": numbers["task_sequence_strides"],
-            "helped": sum(segment.helped for segment in worn.segments),
             "gas": numbers["task_sequence_gas"],
             "net_push_off_work": numbers["task_sequence_work"],
             "lowest_toes": numbers.get("task_sequence_lowest_toes"),
             "without": None if lowest_bare_toes is None else lowest_bare_toes.value,
             "flat_push": numbers["task_sequence_flat_push"],
-            "safe_time": numbers.get("safe_state_time"),
         }
     )
     for row in rows:

@@ -44,13 +44,6 @@ def wearers_finding(population: Population) -> Finding[dict[str, Any]]:
         values = np.quantile(tables[name], QUANTILES).tolist() if tables[name].size else [None] * len(QUANTILES)
         rows.append(number_texts(ShownNumber(name=name, title=title, quantity=quantity, digits=digits), values))
     remarks = [*person_remarks(configuration)]
-    if population.vented:
-        remarks.append(f"safe state: the controllers of {population.vented} wearers vented both chambers permanently")
-    if population.paused:
-        remarks.append(
-            f"less help: the controllers of {population.paused} wearers only lifted the foot, or paused, for some "
-            "strides"
-        )
     if population.diverged:
         remarks.append(population.message)
     # One line for each wearer, in SI units.
@@ -99,7 +92,7 @@ def wearers_data(population: Population) -> dict[str, Any]:
         "units": UNITS,
         "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
         "wearers": population.count,
-        **fields_of(population, "diverged", "vented", "paused", "minutes", "seed"),
+        **fields_of(population, "diverged", "minutes", "seed"),
         "varied": {
             "body_mass": MASS_VARIATION,
             "stature": STATURE_VARIATION,

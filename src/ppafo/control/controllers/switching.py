@@ -37,44 +37,6 @@ CONSTANT = ControllerKind(
 )
 
 
-class _OrderedParameters(NamedTuple):
-    """Externally set command [-] and assistance level from 0 to 3; level 3 closes a shut-off valve."""
-
-    command: Annotated[float, Number("", "command, above 0 feeds chamber 1", 1.0, -1.0, 2.0)]
-    safe_state: Annotated[float, Number("", "assistance level, 3 has stopped", 0.0, 0.0, 3.0)]
-
-
-class Help(NamedTuple):
-    """Assistance level [-]: same field as in the safety state of a walking controller."""
-
-    level: float
-
-
-class _OrderedState(NamedTuple):
-    """State of a controller whose assistance level is set from outside."""
-
-    safety: Help
-
-
-def ordered_update(
-    parameters: _OrderedParameters, state: _OrderedState, reference: float, measurement: Measurement, period: float
-) -> tuple[float, _OrderedState]:
-    """Externally set command [-] and assistance level, independent of the measurement."""
-    return parameters.command, _OrderedState(Help(parameters.safe_state))
-
-
-ORDERED = ControllerKind(
-    name="ordered",
-    summary="Command and assistance level from outside, for a plant whose shut-off valve follows the level.",
-    source="chosen here",
-    quantities=quantities_of(_OrderedParameters),
-    parameters=_OrderedParameters,
-    initial=_OrderedState(Help(0.0)),
-    update=ordered_update,
-    needs_reference=False,
-)
-
-
 ROUNDING = 1.0e-9
 """Error [N m] below which an error counts as zero, so that rounding does not decide the first command."""
 

@@ -10,10 +10,8 @@ smooth rise to the peak, a smooth fall, zero; cubic with zero slope at its ends.
 from typing import Any, NamedTuple
 
 from ppafo.control.torque_loop import REACH
-from ppafo.control.walking import phases, safety
-from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES
+from ppafo.control.walking import phases
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseState
-from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import GaitTime, TimingParts
 from ppafo.model.declaration import Quantity
 from ppafo.model.helping import MID_STANCE, PUSH_OFF
@@ -91,7 +89,7 @@ ASSISTANCE_QUANTITIES = (
 PEAKS = ("peak_torque", "landing_peak_torque", "swing_peak_torque")
 """Settings that ``largest_torque`` limits."""
 
-ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES)
+ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES)
 """Settings that every law with ``assistance`` declares after those of the law."""
 
 
@@ -129,7 +127,6 @@ class _Assessment(NamedTuple):
     """State of the gait phase estimator; its class depends on the estimator."""
     time: GaitTime
     """Gait phase as time since the heel strike."""
-    safety: SafetyState
     request: TorqueRequest
     continues: float
     """1 where the task of the previous sample continues, 0 where another task starts."""
@@ -193,12 +190,11 @@ def timed_phase(
 def assess(
     parameters: Any, state: Any, measurement: GaitMeasurement, period: float, *, parts: TimingParts
 ) -> _Assessment:
-    """Assess a sample taken every ``period`` [s]: gait phase, safety, requested torque [N m], and permission to act.
+    """Assess a sample taken every ``period`` [s]: gait phase, requested torque [N m], and permission to act.
 
     ``parameters`` and ``state`` are rows with the fields of ``LawParameters`` and ``LawState`` (``frame.py``).
     """
     phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period, parts=parts)
-    watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     rules: Assistance = parameters.assistance
     last: TorqueRequest = state.request
     # An angle of 0 marks that there was no sample before.
@@ -215,14 +211,12 @@ def assess(
         phase=phase,
         clock=clock,
         time=time,
-        safety=watch,
         request=TorqueRequest(measurement.angle, rate, torque),
         continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
-        acts=1.0 if has_task and safety.permits(watch, phase.phase) else 0.0,
+        acts=1.0 if has_task and not phases.lacks_event(phase) else 0.0,
     )
 
 
-def valve_command(assessment: _Assessment, command: float, period: float) -> tuple[float, SafetyState]:
-    """Valve command [-] and next safety state: the command of the law where the device acts, else ``VENT``."""
-    sent = command if assessment.acts > 0.5 else VENT
-    return safety.safe_command(assessment.safety, assessment.phase.phase, sent, period)
+def valve_command(assessment: _Assessment, command: float) -> float:
+    """Valve command [-]: the command of the law where the device acts, else ``VENT``."""
+    return command if assessment.acts > 0.5 else VENT

@@ -2,7 +2,7 @@
 
 A torque law of ``control.catalog`` walks under its own name without an entry here; an entry gives the law another name
 and a summary for walking. A law with its own gait phases is a module of this folder with a ``ControllerKind``, listed
-here: its ``update`` checks the sensors with ``safety.monitor`` and passes its command through ``safety.safe_command``.
+here; it vents where ``phases.lacks_event``.
 """
 
 from typing import Annotated, NamedTuple

@@ -9,12 +9,9 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import REACH
-from ppafo.control.walking import phases, safety
+from ppafo.control.walking import phases
 from ppafo.control.walking.assistance import timed_phase
-from ppafo.control.walking.fault_checks import SafetyRules
-from ppafo.control.walking.nominal_device import LINE_QUANTITIES
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts
 from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
@@ -25,7 +22,7 @@ from ppafo.model.valves.kind import VENT
 class _EventOnOffParameters(NamedTuple):
     """Angle of the lifted foot and band about it [rad], end of push-off [turns], largest torque [N m].
 
-    ``phases``, ``safety`` and ``timing`` are the rules of phases, safety and timing.
+    ``phases`` and ``timing`` are the rules of phases and timing.
     """
 
     swing_angle: Annotated[float, Number("rad", "ankle angle to which the foot is lifted in swing", 1.68, 0.5, 2.5)]
@@ -52,16 +49,14 @@ class _EventOnOffParameters(NamedTuple):
         ),
     ]
     phases: PhaseRules
-    safety: SafetyRules
     timing: EmptyRow
 
 
 class _EventOnOffState(NamedTuple):
-    """Phase, clock and safety; ``lifting`` is 1 for a lifted foot, ``resting`` is 1 while excess torque is vented."""
+    """Phase and clock; ``lifting`` is 1 for a lifted foot, ``resting`` is 1 while excess torque is vented."""
 
     phase: PhaseState = PhaseState()
     clock: EmptyRow = EmptyRow()
-    safety: SafetyState = SafetyState()
     lifting: float = 0.0
     resting: float = 0.0
 
@@ -81,7 +76,6 @@ def update(
 ) -> tuple[float, _EventOnOffState]:
     """Command [-]: 1 plantarflexion, -1 dorsiflexion, ``VENT`` for free motion; the reference is not used."""
     phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period, parts=parts.timing)
-    watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     above = measurement.angle > parameters.swing_angle + parameters.band
     below = measurement.angle < parameters.swing_angle - parameters.band
     # Hysteresis: between both limits the valve stays as it is.
@@ -97,9 +91,9 @@ def update(
     largest = parameters.largest_torque
     rests = abs(measurement.torque) > (0.5 * largest if state.resting > 0.5 else largest)
     command = VENT if rests and command * measurement.torque > 0.0 else command
-    command, watch = safety.safe_command(watch, phase.phase, command, period)
+    command = VENT if phases.lacks_event(phase) else command
     following: _EventOnOffState = parts.state(
-        phase=phase, clock=clock, safety=watch, lifting=lifting if held else 0.0, resting=1.0 if rests else 0.0
+        phase=phase, clock=clock, lifting=lifting if held else 0.0, resting=1.0 if rests else 0.0
     )
     return command, following
 
@@ -108,7 +102,7 @@ EVENT_ON_OFF = ControllerKind(
     name="event_on_off",
     summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
-    quantities=(*quantities_of(_EventOnOffParameters), *LINE_QUANTITIES),
+    quantities=quantities_of(_EventOnOffParameters),
     parameters=_EventOnOffParameters,
     initial=_EventOnOffState(),
     update=update,

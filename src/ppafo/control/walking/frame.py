@@ -1,6 +1,6 @@
 """Common frame of all torque laws in walking.
 
-The gait phase determines the requested torque, safety checks supervise, and the law tracks the request. Walking torque
+The gait phase determines the requested torque, and the law tracks the request. Walking torque
 laws differ only in the law and in its state after a change of task.
 """
 
@@ -10,11 +10,9 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ppafo.control.kind import ControllerKind
-from ppafo.control.walking import assistance, phases, safety
+from ppafo.control.walking import assistance, phases
 from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest, assess
-from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import AT_THRESHOLDS, TimingParts
 from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
@@ -24,21 +22,19 @@ from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
 class LawParameters(NamedTuple):
-    """Parameters of law, assistance, phases, safety and timing; ``row_with`` makes a class for each law."""
+    """Parameters of law, assistance, phases and timing; ``row_with`` makes a class for each law."""
 
     law: Any
     assistance: Assistance
     phases: PhaseRules
-    safety: SafetyRules
     timing: Any
 
 
 class LawState(NamedTuple):
-    """Phase, clock, safety, torque request, and state of the law; ``row_with`` makes a class for each law."""
+    """Phase, clock, torque request, and state of the law; ``row_with`` makes a class for each law."""
 
     phase: PhaseState
     clock: Any
-    safety: SafetyState
     request: TorqueRequest
     law: Any
 
@@ -93,9 +89,9 @@ def law_that_walks_update(
         torque=measurement.torque,
     )
     command, law = parts.update(parameters.law, law, requested, sample, period)
-    command, watch = assistance.valve_command(assessment, command, period)
+    command = assistance.valve_command(assessment, command)
     following: LawState = parts.state(
-        phase=assessment.phase, clock=assessment.clock, safety=watch, request=assessment.request, law=law
+        phase=assessment.phase, clock=assessment.clock, request=assessment.request, law=law
     )
     return command, following
 
@@ -132,7 +128,7 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
         source=f"the paper, figure 1A (phases); {law.source}",
         quantities=(*law.quantities, *ASSISTING_QUANTITIES),
         parameters=parameters,
-        initial=state(phases.START, EmptyRow(), safety.START, assistance.START, law.initial),
+        initial=state(phases.START, EmptyRow(), assistance.START, law.initial),
         update=made_of(law_that_walks_update, f"update_{name}", parts),
         restart=None,
         controls=(TORQUE,),

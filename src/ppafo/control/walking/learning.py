@@ -18,9 +18,7 @@ from ppafo.control.kind import DEAD_BAND, BelievedBand, ControllerKind
 from ppafo.control.torque_loop import LEAD, LEARNING_GAIN, beyond_dead_band
 from ppafo.control.walking import assistance
 from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueProfile, TorqueRequest, assess
-from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts
 from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
@@ -121,23 +119,21 @@ def next_table(table: Knots, position: float, weight: float, step: float, forget
 
 
 class _EventDampedLearningParameters(NamedTuple):
-    """Gains of law and learning, assumed dead band [-], assistance, and rules of phases, safety and timing."""
+    """Gains of law and learning, assumed dead band [-], assistance, and rules of phases and timing."""
 
     law: DampedGains
     learning: LearningRules
     dead_band: BelievedBand
     assistance: Assistance
     phases: PhaseRules
-    safety: SafetyRules
     timing: EmptyRow
 
 
 class _EventDampedLearningState(NamedTuple):
-    """Phase, clock, safety, torque request, state of the torque law, and learnt table."""
+    """Phase, clock, torque request, state of the torque law, and learnt table."""
 
     phase: PhaseState = PhaseState()
     clock: EmptyRow = EmptyRow()
-    safety: SafetyState = SafetyState()
     request: TorqueRequest = TorqueRequest()
     law: TorqueSlope = TorqueSlope()
     table: Knots = EMPTY
@@ -177,9 +173,9 @@ def update(
     )
     opening, law = damped_command(parameters.law, law, assessment.request.torque, torque, feedforward, period)
     command = beyond_dead_band(opening, parameters.dead_band)
-    command, watch = assistance.valve_command(assessment, command, period)
+    command = assistance.valve_command(assessment, command)
     following: _EventDampedLearningState = parts.state(
-        phase=phase, clock=assessment.clock, safety=watch, request=assessment.request, law=law, table=table
+        phase=phase, clock=assessment.clock, request=assessment.request, law=law, table=table
     )
     return command, following
 

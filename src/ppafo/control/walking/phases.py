@@ -48,10 +48,18 @@ class PhaseState(NamedTuple):
 
 START = PhaseState()
 
+LONGEST_PHASE = 1.2
+"""Longest duration of a phase in which the device acts [strides]."""
+
 
 def lifts(phase: float) -> bool:
     """Return whether the foot is lifted in a phase: swing (0) or landing (1). Tasks 1 and 3 of the paper."""
     return phase < 1.5
+
+
+def lacks_event(phase: PhaseState) -> bool:
+    """Return whether an event is missing: no heel strike yet, or a phase that has lasted for more than 1.2 strides."""
+    return phase.strikes < 0.5 or phase.in_phase > LONGEST_PHASE * phase.stride_time
 
 
 def next_sensor(rules: PhaseRules, sensor: DebouncedSensor, force: float, period: float) -> DebouncedSensor:

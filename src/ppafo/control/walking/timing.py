@@ -23,8 +23,7 @@ class TimingKind:
 
     ``parameters`` is a NamedTuple class whose numbers are the quantities in order, ``initial`` the initial state.
     ``follow(rules, phase_rules, clock, before, phase, measurement, period)`` returns the state after a sample, with the
-    phases before and after it; ``gait_time(rules, clock, phase)`` returns the present gait time. The safety checks use
-    the detected phases with every method.
+    phases before and after it; ``gait_time(rules, clock, phase)`` returns the present gait time.
     """
 
     name: str

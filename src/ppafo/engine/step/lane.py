@@ -24,10 +24,8 @@ if TYPE_CHECKING:  # a lane is of these, and makes none of them
     from ppafo.model.gait import GaitMeasured, GaitNow, GaitPlace, GaitSeries, GaitTiming, Marks, TimedSequence
     from ppafo.model.leg import FootLoad, LegParameters
     from ppafo.model.plant import PlantState, ThermalParameters
-    from ppafo.model.plant_faults import PlantFaults
     from ppafo.model.regulator import LineState, SupplyLines
     from ppafo.model.sensors import GaitSeen, GaitSensors, SensorParameters
-    from ppafo.model.shut_off import ShutOff, Unpowered
     from ppafo.signals.meter import ReferenceSummary, Sample
 
 
@@ -87,10 +85,6 @@ class Now(NamedTuple):
     """Ring-buffer index of the delayed signals shown by the sensors now."""
     next_signal: int
     """Ring-buffer index for the signals at the end of the step."""
-    reading: int
-    """Ring-buffer index for the readings of a walk at this sample."""
-    readings: int
-    """Length of the ring buffer of readings."""
 
 
 class Lane:
@@ -116,8 +110,6 @@ class Lane:
     gait_timing: "GaitTiming"
     gait_sensors: "GaitSensors"
     task_sequence: "TimedSequence"
-    plant_faults: "PlantFaults"
-    shut_off: "ShutOff"
     lines: "SupplyLines"
     load: "FootLoad"  # of a foot on a prescribed shank
     shank: Any  # of the profile of that shank
@@ -131,7 +123,6 @@ class Lane:
     controller_state: Any
     walk: "WalkState"
     gait_seen: "GaitSeen"  # last readings of a walk
-    unpowered: "Unpowered"
     line_state: "LineState"
     course: "ReferenceSummary"  # of the reference over the whole run, for meters
     signal_history: NDArray[np.float64]  # rings of what comes late, and the traced samples

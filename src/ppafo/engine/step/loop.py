@@ -70,8 +70,6 @@ def advance(
             late_command=(step - command_delay) % lanes.command_history.shape[0] if parts.late_commands else 0,
             late_signal=(step - signal_delay) % lanes.signal_history.shape[1] if parts.late_signals else 0,
             next_signal=(step + 1) % lanes.signal_history.shape[1] if parts.late_signals else 0,
-            reading=step // steps_per_sample % lanes.signal_history.shape[1] if parts.late_readings else 0,
-            readings=lanes.signal_history.shape[1] if parts.late_readings else 0,
         )
         if step < beyond:
             begin_step(parts, lanes, now, steps_per_sample)
@@ -100,9 +98,6 @@ def begin_step(parts: Program, lanes: Lanes, now: Now, steps_per_sample: int) ->
             for lane in lanes:
                 sample.fill_signals(parts, lane, slot)
     if parts.controller is not None and now.step % steps_per_sample == 0:
-        if parts.late_readings:
-            for lane in lanes:
-                sample.remember_readings(parts, lane, now)
         for lane in lanes:
             sample.control(parts, lane, now)
     if parts.late_commands:

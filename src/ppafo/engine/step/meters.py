@@ -54,7 +54,7 @@ def make_sample(parts: Program, lane: Lane, elapsed: float, index: int, interval
         gas=gas_sample(parts, lane),
         energy=energy_sample(parts, lane),
         foot=parts.foot.sample(parts, lane, time) if parts.foot is not None and parts.is_on_gait else NO_FOOT,
-        stride=stride_sample(parts, lane, index, interval),
+        stride=stride_sample(parts, lane),
     )
 
 
@@ -105,7 +105,7 @@ def set_point_at(parts: Program, lane: Lane, time: float) -> float:
     return reference_at(parts, lane, time) if parts.has_reference else 0.0
 
 
-def stride_sample(parts: Program, lane: Lane, index: int, interval: float) -> StrideSample:
+def stride_sample(parts: Program, lane: Lane) -> StrideSample:
     """Stride data of a walk at a sample; zeros without a walk."""
     if parts.leg is None:
         return NO_STRIDE
@@ -117,8 +117,6 @@ def stride_sample(parts: Program, lane: Lane, index: int, interval: float) -> St
         clearances=lane.walk.clearances,
         toe_landings=lane.walk.toe_landings,
         phase=lane.controller_state.phase.phase if parts.has_phase else 0.0,
-        level=lane.controller_state.safety.level if parts.has_level_of_help else 0.0,
-        time=index * (lane.timing.step * interval),
     )
 
 

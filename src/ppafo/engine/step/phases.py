@@ -111,26 +111,15 @@ def open_valve(parts: Program, lane: Lane, now: Now) -> None:
     source = lane.plant if parts.feed is None else parts.feed.source(parts, lane)
     port_1, port_2 = ports_behind(parts, lane, now, source)
     pressure_1, pressure_2 = present_pressures(parts, lane)
-    leaky = with_leak(parts, lane, plant_now(parts, lane, now), pressure_1, pressure_2)
+    leaky = with_leak(parts, lane, lane.plant, pressure_1, pressure_2)
     slopes = parts.valve.port_flow_slopes
     lane.flowing = pneumatics.sloped_flows(leaky, pressure_1, pressure_2, port_1, port_2, slopes)
 
 
 def ports_behind(parts: Program, lane: Lane, now: Now, source: PlantParameters) -> tuple[Any, Any]:
-    """Return the ports of both chambers for a supply, with the present valve state and faults."""
+    """Return the ports of both chambers for a supply, with the present valve state."""
     port_1, port_2 = parts.valve.connect(source, lane.shown)
-    if parts.faults is not None:
-        time = time_of(parts, lane, now)
-        port_1, port_2 = parts.faults.failed_ports(parts, lane, source, port_1, port_2, time)
     return port_1, port_2
-
-
-def plant_now(parts: Program, lane: Lane, now: Now) -> PlantParameters:
-    """Return the plant parameters with the additional leakage due to active faults."""
-    plant: PlantParameters = lane.plant
-    if parts.faults is not None:
-        plant = parts.faults.failed_plant(parts, lane, time_of(parts, lane, now))
-    return plant
 
 
 def present_pressures(parts: Program, lane: Lane) -> tuple[float, float]:
@@ -181,7 +170,7 @@ def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
     source = lane.plant if parts.feed is None else parts.feed.source_ahead(parts, lane)
     port_1, port_2 = ports_behind(parts, lane, now, source)
     pressure_1, pressure_2 = parts.gas.ends(parts, lane)
-    leaky = with_leak(parts, lane, plant_now(parts, lane, now), pressure_1, pressure_2)
+    leaky = with_leak(parts, lane, lane.plant, pressure_1, pressure_2)
     flow = parts.valve.port_flow
     lane.passing = pneumatics.stage_flows(leaky, pressure_1, pressure_2, port_1, port_2, flow)
     if parts.stated_at_ports:
@@ -271,7 +260,7 @@ def finish(parts: Program, lane: Lane, now: Now) -> None:
     possible = waits or (is_possible(parts, lane) and follows)
     failed = lane.result.failure_time if possible else min(lane.result.failure_time, time + length)
     lane.result = lane.result._replace(failure_time=failed)
-    if parts.late_signals and parts.leg is None:
+    if parts.late_signals:
         sense_end(parts, lane, now, length, taken)
     if parts.is_parted:
         # Sums of part lengths miss the goal by rounding: the last part sets it.

@@ -4,15 +4,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.engine.step.phases import present_pressures
 from ppafo.model.ports import shown_signals
-from ppafo.model.sensors import (
-    Fault,
-    GaitMeasurement,
-    Measurement,
-    late_measurement,
-    measure,
-    measure_gait,
-    samples_late,
-)
+from ppafo.model.sensors import GaitMeasurement, Measurement, measure, measure_gait
 
 
 def control(parts: Program, lane: Lane, now: Now) -> None:
@@ -23,11 +15,8 @@ def control(parts: Program, lane: Lane, now: Now) -> None:
     command, after = parts.controller.update(
         lane.controller, lane.controller_state, wanted, lane.seen, lane.timing.period
     )
-    if parts.faults is not None:
-        parts.faults.decide(parts, lane, now, command, after)
-    else:
-        lane.controller_state = after
-        lane.result = lane.result._replace(command=command)
+    lane.controller_state = after
+    lane.result = lane.result._replace(command=command)
 
 
 def reference_at(parts: Program, lane: Lane, time: float) -> float:
@@ -38,9 +27,7 @@ def reference_at(parts: Program, lane: Lane, time: float) -> float:
 
 def sense(parts: Program, lane: Lane, now: Now) -> None:
     """Set the sensor readings."""
-    if parts.late_readings:
-        lane.seen = late_gait(parts, lane, now)
-    elif parts.leg is not None and not parts.ideal_sensors:
+    if parts.leg is not None and not parts.ideal_sensors:
         measure_walk(parts, lane, now)
     elif parts.leg is not None:
         lane.seen = gait(parts, lane)
@@ -86,7 +73,7 @@ def remember_command(parts: Program, lane: Lane, slot: int) -> None:
     lane.command_history[slot] = lane.result.command
 
 
-# Of a walk. Rows of the same history: force under heel and toes [N], angle [rad], pressure 1 and 2 [Pa].
+# Of a walk.
 
 
 def gait(parts: Program, lane: Lane) -> GaitMeasurement:
@@ -115,37 +102,6 @@ def measure_walk(parts: Program, lane: Lane, now: Now) -> None:
         lane.walk.heel_force,
         lane.walk.toe_force,
         lane.plant,
-        now.step * lane.timing.step,
         now.sample,
         parts=parts.functions,
     )
-
-
-def remember_readings(parts: Program, lane: Lane, now: Now) -> None:
-    """Store the present readings of a walk before delayed readings are looked up."""
-    measure_walk(parts, lane, now)
-    lane.signal_history[0, now.reading] = lane.seen.heel_force
-    lane.signal_history[1, now.reading] = lane.seen.toe_force
-    lane.signal_history[2, now.reading] = lane.seen.angle
-    lane.signal_history[3, now.reading] = lane.seen.pressure_1
-    lane.signal_history[4, now.reading] = lane.seen.pressure_2
-
-
-def late_gait(parts: Program, lane: Lane, now: Now) -> GaitMeasurement:
-    """Return the readings of a walk, each sensor with the delay of its fault."""
-    sensors = lane.gait_sensors
-    return late_measurement(
-        lane.signal_history[0, place_of_late(parts, lane, now, sensors.heel_fault)],
-        lane.signal_history[1, place_of_late(parts, lane, now, sensors.toe_fault)],
-        lane.signal_history[2, place_of_late(parts, lane, now, sensors.angle_fault)],
-        lane.signal_history[3, place_of_late(parts, lane, now, sensors.pressure_1_fault)],
-        lane.signal_history[4, place_of_late(parts, lane, now, sensors.pressure_2_fault)],
-        lane.plant,
-        parts=parts.functions,
-    )
-
-
-def place_of_late(parts: Program, lane: Lane, now: Now, fault: Fault) -> int:
-    """Return the ring-buffer index of the delayed reading that arrives now."""
-    place = now.reading - samples_late(fault, now.step * lane.timing.step, now.sample)
-    return place + now.readings if place < 0 else place

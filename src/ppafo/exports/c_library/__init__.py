@@ -96,7 +96,6 @@ def walk_library(configuration: Scenario) -> Library:
         relations_of_walk,
         settings_of_walk,
     )
-    from ppafo.walking.motion import walk_of
     from ppafo.walking.planning import plan_walk
 
     # Before anything is planned: what cannot be exported should be said at once.
@@ -104,10 +103,7 @@ def walk_library(configuration: Scenario) -> Library:
     program = exported(batch_of(plan_walk(configuration)).program)
     settings, absent = settings_of_walk(configuration), second_chamber(configuration)
     links = links_of_walk(configuration)
-    failing = {sensor: fault for sensor, fault in walk_of(configuration).faults.items() if fault.kind}
-    # A sensor that fails is never ideal, whatever the settings are.
-    of_readings = [] if failing else [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]
-    was_late = "true" if program.program.late_readings else "false"
+    of_readings = [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]
     return Library(
         title=configuration.name,
         description=" ".join(configuration.description.split()),
@@ -115,8 +111,8 @@ def walk_library(configuration: Scenario) -> Library:
         settings=settings,
         relations=relations_of_walk(configuration),
         switches=_switches(configuration.device, of_readings),
-        other_program=((f"(prepared->counts.signal_delay > 0.0) != {was_late}", "controller_period"),),
-        words=words_of_walk(configuration, links, failing),
+        other_program=(),
+        words=words_of_walk(configuration, links),
         further=partial(prepare_entry, Preparation(configuration, program.program), WALK_PREPARATION, settings),
         following=partial(follow_entry, settings, links, absent) if links else None,
         links=links,

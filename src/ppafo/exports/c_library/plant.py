@@ -19,7 +19,6 @@ from ppafo.simulation.plan import step_counts
 from ppafo.simulation.scenario import Control, FreeMotion, Motion, PrescribedMotion, ProfileChoice, Scenario, Sensors
 from ppafo.walking.declaration import FORCES
 from ppafo.walking.motion import WalkMotion
-from ppafo.walking.preparation import FaultSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +36,6 @@ class Input:
 COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0, -1.0, 1.0)
 _WALKING = "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both"
 WALKING_COMMAND = Input("command", "-", _WALKING, VENT, -1.0, VENT)
-_STOPS = "assistance level, 0 to 3; at 3 the controller has stopped and the shut-off valve closes"
-SAFE_STATE = Input("safe_state", "-", _STOPS, 0.0, 0.0, 3.0)
 
 
 Assignment = tuple[str, str]
@@ -65,15 +62,13 @@ class _Drive:
 class _PlantAlone:
     """Plant with external inputs: its library, its inputs and motion, and the input interval ``step`` [s].
 
-    ``clock`` is the path of the setting for this interval: the engine step, or the controller period if parts of the
-    plant act at controller samples. ``hidden`` are the paths of settings without effect, since inputs replace them.
+    ``hidden`` are the paths of settings without effect, since inputs replace them.
     """
 
     library: Library
     drive: _Drive
     hidden: frozenset[str]
     step: float
-    clock: str
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -81,9 +76,11 @@ class _PlantAlone:
         return (self.drive.command, *self.drive.inputs)
 
 
-STEPS, SAMPLES = "run.step", "controller.period"
-"""Settings that may be the interval of the inputs."""
-_WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.command", "controller.safe_state")
+STEPS = "run.step"
+"""Path of the setting for the input interval."""
+_AS_STEPS = ("controller_period", "run_output_interval")
+"""Other time settings, which must equal the input interval."""
+_WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.command", "controller.period")
 """Settings without effect on a plant that is stepped from outside."""
 _REPLACED = ("sensors.", "motion.external_torque", "motion.ankle_torque")
 _PATH = "motion.profile."
@@ -114,24 +111,18 @@ def plant_of(scenario: Scenario) -> _PlantAlone:
     program = replace(program, rests_whole=rests_whole)
     beginnings = (*_REPLACED, _PATH) if is_turned else _REPLACED
     replaced = {setting.path for setting in library.settings if setting.path.startswith(beginnings)}
-    clock = SAMPLES if plant.controller.period > plant.run.step else STEPS
     return _PlantAlone(
         library=replace(library, program=ExportedProgram(program, ()), rules=()),
         drive=drive,
-        hidden=frozenset(replaced.union(_WITHOUT_EFFECT, {SAMPLES} - {clock})),
+        hidden=frozenset(replaced.union(_WITHOUT_EFFECT)),
         step=plant.controller.period,
-        clock=clock,
     )
 
 
 @singledispatch
-def _drive_of(motion: Motion, _settings: Mapping[str, ExportParameter]) -> _Drive:
+def _drive_of(_motion: Motion, _settings: Mapping[str, ExportParameter]) -> _Drive:
     """Return the external drive of a plant with this motion, within the ranges of its settings: here a walk."""
-    walks = _Drive(motion="The leg follows its gait.", command=WALKING_COMMAND)
-    if not (isinstance(motion, WalkMotion) and motion.shut_off):
-        return walks
-    safe_state = ("controller.safe_state", "{safe_state}")
-    return replace(walks, inputs=(SAFE_STATE,), parameters=(safe_state,))
+    return _Drive(motion="The leg follows its gait.", command=WALKING_COMMAND)
 
 
 _FIRST_RAMP = 0.0078125
@@ -244,16 +235,11 @@ def with_api(alone: _PlantAlone) -> _PlantAlone:
         "follow_inputs": follow_lines(alone, "first", by_name),
         "hidden": ", ".join(f"`{c_identifier(path)}`" for path in sorted(alone.hidden)),
         "step": f"{alone.step:g}",
-        "clock": c_identifier(alone.clock),
     }
-    clock = c_identifier(alone.clock)
-    api = LibraryApi("plant.h", "plant_main.c", "plant_README.md", "plant.c", words, clock, _as_clock(alone))
+    api = LibraryApi(
+        "plant.h", "plant_main.c", "plant_README.md", "plant.c", words, step=c_identifier(STEPS), as_step=_AS_STEPS
+    )
     return replace(alone, library=replace(alone.library, api=api))
-
-
-def _as_clock(alone: _PlantAlone) -> tuple[str, ...]:
-    """Names of the other time settings that must equal the input interval: controller period and output interval."""
-    return tuple(c_identifier(path) for path in (SAMPLES, "run.output_interval") if path != alone.clock)
 
 
 def follow_lines(alone: _PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
@@ -261,7 +247,7 @@ def follow_lines(alone: _PlantAlone, settings: str, inputs: Mapping[str, str]) -
     return "\n".join(
         f"    {settings}->{field} = {expression.format(settings=settings, **inputs)};"
         for field, expression in (
-            *((name, f"{{settings}}->{c_identifier(alone.clock)}") for name in _as_clock(alone)),
+            *((name, f"{{settings}}->{c_identifier(STEPS)}") for name in _AS_STEPS),
             *alone.drive.settings,
         )
     )
@@ -295,13 +281,7 @@ def _commanded_walk(motion: WalkMotion, walk: Scenario) -> Scenario:
     # Sensors are there that nothing reads.
     check_can_be_exported(walk)
     step = step_counts(1.0, walk.run.step, 1.0, walk.controller.period).step
-    # What fails with the controller, a shut-off valve and a slow valve go by its samples, and so do commands then.
-    goes_by_samples = bool(motion.shut_off) or not {"controller", "valve"}.isdisjoint(motion.broken)
-    period = walk.controller.period if goes_by_samples else step
-    control = Control(switching.CONSTANT.name, {"command": 0.0}, period)
-    if motion.shut_off:
-        # Such a valve shuts where the controller has stopped, which a command does not say.
-        control = Control(switching.ORDERED.name, {"command": 0.0, "safe_state": 0.0}, period)
+    control = Control(switching.CONSTANT.name, {"command": 0.0}, step)
     # The forces under the foot are among the outputs.
     forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
     return replace(
@@ -309,8 +289,7 @@ def _commanded_walk(motion: WalkMotion, walk: Scenario) -> Scenario:
         name=f"{walk.name}-plant",
         description=f"Plant without controller of this walk, on its leg: {walk.description}",
         controller=control,
-        run=replace(walk.run, step=step, output_interval=period),
-        # Which samples a controller misses is drawn by the same seed.
-        sensors=Sensors(seed=walk.sensors.seed),
-        motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
+        run=replace(walk.run, step=step, output_interval=step),
+        sensors=Sensors(),
+        motion=replace(motion, forces=forces),
     )

@@ -145,9 +145,7 @@ def set_timing(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     lane.step = lane.counts_of_steps.step
     command_delay = parts.program.valve.command_delay(lane["valve_settings"])
     lane.command_steps, command_lag = whole_and_rest(command_delay, lane.step)
-    lane.signal_steps, signal_lag = whole_and_rest(
-        lane.signal_delay if parts.program.walks else settings.sensors_delay, lane.step
-    )
+    lane.signal_steps, signal_lag = whole_and_rest(0.0 if parts.program.walks else settings.sensors_delay, lane.step)
     lane.timing = LaneTiming(
         step=lane.step,
         period=lane.step * lane.counts_of_steps.steps_per_sample,

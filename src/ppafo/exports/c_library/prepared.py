@@ -34,7 +34,6 @@ class PreparedLane(Lane):
     tolerance: float  # error that a step may have, over the default [-]
     needs_parts: bool  # True where the error decides about the parts of a step
     step: float  # length of a step [s]
-    signal_delay: float  # of the slowest sensor of a walk [s]
     signal_steps: float  # whole steps in the delay of the sensors [-]
     command_steps: float  # whole steps in the dead time of the valve [-]
     gas: Any

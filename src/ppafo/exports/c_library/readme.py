@@ -1,7 +1,6 @@
 """README paragraphs of an exported library on its scenario or walk."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from ppafo.exports.c_library.conditions import choosing
 from ppafo.exports.c_library.library import c_identifier
@@ -12,18 +11,15 @@ from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.scenario import Scenario, vane_motion
 
-if TYPE_CHECKING:
-    from ppafo.walking.preparation import FaultSettings
-
 _METRICS_OF_SCENARIO = """\
 They equal the metrics of a study (`ppafo sweep`) to the bit. In `ppafo simulate` the same are computed from the
 recording, whose sums are rounded in another order: they agree to about 15 digits. Not here, since they need all samples
 of a channel: {left_out}."""
 _METRICS_OF_WALK = """\
-They are means over the strides with help, from the third on, and counts; of a task sequence counts alone. In
+They are means over the strides from the third on, and counts; of a task sequence counts alone. In
 `ppafo walk` the same are computed from the recording, whose sums are rounded in another order: they agree to about 15
 digits. Not here, since they need the mean stride or the healthy one: `healthy_positive_work`, `push_off_share`,
-`lowest_toes`, `angle_difference`, `dorsiflexor_moment`; nor safety events and the segments of a task sequence."""
+`lowest_toes`, `angle_difference`, `dorsiflexor_moment`; nor the segments of a task sequence."""
 _FOLLOWS = """\
 - As in ppafo, these settings depend on others while they equal their default, even if it is given: {followers}."""
 _TRAPS_OF_WALK = """\
@@ -51,12 +47,11 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     }
 
 
-def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSettings]") -> dict[str, str]:
-    """Return README texts on this walk; ``links`` has parameters that follow others, ``failing`` faulty sensors."""
+def words_of_walk(walk: Scenario, links: Graph) -> dict[str, str]:
+    """Return README texts on this walk; ``links`` has the parameters that follow others."""
     from ppafo.walking.motion import walk_of
     from ppafo.walking.planning import has_ideal_sensors
 
-    faults = [f"{sensor} `{fault.kind}`" for sensor, fault in failing.items()]
     gait, sequence = walk_of(walk).gait, walk_of(walk).task_sequence
     strides = "equal strides"
     if sequence is not None:
@@ -67,7 +62,6 @@ def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSett
         f"the walk: {strides}",
         f"the valve, `{walk.device.valve.kind}`, and the controller, `{walk.controller.kind}`",
         *_fixed_of_device(walk),
-        f"the sensor faults, {', '.join(faults) or 'none'}, and whether a sensor is delayed",
         _at_zero(walk.device, () if has_ideal_sensors(walk) else (1.0,)),
     ]
     return {

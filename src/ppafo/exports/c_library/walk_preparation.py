@@ -16,7 +16,6 @@ from ppafo.exports.c_library.settings import declared_settings, export_parameter
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.sensors import NOTHING_SEEN
-from ppafo.model.shut_off import NEVER, POWERED
 from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction, holding
 from ppafo.simulation.declaration import RUN, SUPPLY_LINE, SUPPLY_LINES
@@ -24,21 +23,15 @@ from ppafo.simulation.numbers import device_numbers
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.contradictions import PAIRS
-from ppafo.walking.declaration import PERSON, STEP, fault_numbers
+from ppafo.walking.declaration import PERSON, STEP
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import record_interval, walk_of
-from ppafo.walking.planning import NO_REFERENCE, failing_of, law_of, task_sequence_of_walk
+from ppafo.walking.planning import NO_REFERENCE, law_of, task_sequence_of_walk
 from ppafo.walking.preparation import (
-    DISTORTED,
-    DISTORTING,
-    FROZEN,
     HIGHEST_ANGLE,
     LOWEST_ANGLE,
     device_share,
-    distorting_fault,
-    fixed_fault,
     gait_sensors,
-    longest_delay,
     rocker_on_heel,
     smallest_chamber,
     standing_on,
@@ -55,14 +48,8 @@ _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
 _OTHERS = ("angle_bandwidth", "pressure_bandwidth", "angle_lost_share", "pressure_lost_share")
 _RELATIONS = (
     *((pair.path, pair.relation, pair.other) for pair in PAIRS),
-    ("controller.swing_angle", "above", "controller.lowest_angle"),
-    ("controller.swing_angle", "below", "controller.highest_angle"),
     ("controller.swing_angle", "above", "actuator.angle_min"),
     ("controller.swing_angle", "below", "actuator.angle_max"),
-    ("controller.lowest_pressure", "below", "supply.atmospheric_pressure"),
-    ("controller.filled_pressure", "above", "supply.atmospheric_pressure"),
-    ("controller.filled_pressure", "below", "supply.pressure"),
-    ("controller.filled_pressure", "below", "supply.dorsiflexion_pressure"),
 )
 """Relations between two numbers of a walk file; relations with a third number or the gait are left to the caller."""
 
@@ -100,9 +87,8 @@ def settings_of_walk(configuration: Scenario) -> tuple[ExportParameter, ...]:
     ordered = dict.fromkeys(
         (*device_numbers(configuration.device), *run_times, *wearer, "controller.period", *control, *declared)
     )
-    # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
-    constant = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
-    settings = {path: declared[path] for path in ordered if path in declared and not path.startswith(constant)}
+    # Persons are drawn in Python.
+    settings = {path: declared[path] for path in ordered if path in declared and path != f"wearer.{PERSON.name}"}
     return export_parameters(configuration, settings, times)
 
 
@@ -157,42 +143,13 @@ def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) ->
 
 
 def set_walk_sensors(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set the sensors with their faults, and the faults of the plant as constants."""
-    for sensor, fault in walk_of(parts.scenario).faults.items():
-        numbers = {quantity.name: f"faults.{sensor}.{quantity.name}" for quantity in fault_numbers(sensor, fault.kind)}
-        if not fault.kind:
-            # A sensor without a fault has one that never begins, so that one program serves both.
-            lane[f"{sensor}_fault"] = fixed_fault(NEVER, 0.0, 0.0, 0.0)
-        elif fault.kind != DISTORTED:
-            # A frozen sensor keeps its last value; the other kinds show a reading of their own.
-            lane[f"{sensor}_fault"] = fixed_fault(
-                getattr(settings, c_identifier(numbers["time"])),
-                1.0 if fault.kind == FROZEN else 0.0,
-                getattr(settings, c_identifier(numbers["reading"])) if "reading" in numbers else 0.0,
-                getattr(settings, c_identifier(numbers["period"])),
-            )
-        else:
-            lane[f"{sensor}_fault"] = distorting_fault(
-                *(
-                    settings.controller_period
-                    if name == "controller.period"
-                    else (getattr(settings, c_identifier(numbers[name])) if name in numbers else 0.0)
-                    for name in (*DISTORTING, "controller.period")
-                )
-            )
+    """Set the sensors."""
     lane.gait_sensors = gait_sensors(
         parts.row("SensorNumbers", (*_FORCES, *_OTHERS))(
             *(getattr(settings, name) for name in parts.setting_names("sensors", (*_FORCES, *_OTHERS)))
         ),
         settings.controller_period,
-        *(lane[f"{sensor}_fault"] for sensor in walk_of(parts.scenario).faults),
     )
-    lane.signal_delay = longest_delay(lane.gait_sensors) * settings.controller_period
-    failing = failing_of(parts.scenario)
-    if failing is not None:
-        lane.plant_faults = parts.constant(failing[0])
-        lane.shut_off = parts.constant(failing[1])
-        lane.unpowered = parts.constant(POWERED)
 
 
 def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> None:

@@ -19,7 +19,7 @@ _LOOP_TUNING = (
 )
 """Statement on when a changed parameter takes effect in the closed loop, for the page of the unit."""
 _PLANT_TIME = (
-    "Inputs are read at the beginning of a communication step. It is a multiple of <code>{clock}</code>; the engine "
+    "Inputs are read at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
     "divides it further where its error asks for that. {motion} There is no stop time."
 )
 """Time stepping of the plant, for the page of the unit; ``motion`` is the motion of its vane."""
@@ -85,7 +85,7 @@ def plant_alone(scenario: Scenario) -> Interface:
     return Interface(
         library=library,
         templates=("stepped.c", "plant_inputs.c", "plant.c"),
-        time=_PLANT_TIME.format(motion=alone.drive.motion, clock=alone.clock),
+        time=_PLANT_TIME.format(motion=alone.drive.motion),
         tuning=_PLANT_TUNING,
         step=alone.step,
         duration=scenario.run.duration,
@@ -96,7 +96,6 @@ def plant_alone(scenario: Scenario) -> Interface:
         words={
             "inputs": inputs,
             "follow": follow_lines(alone, "settings", numbers),
-            "clock": alone.clock,
             "checked": "the limits of the inputs, inertia, volumes and areas",
         },
         run=half_open(scenario),

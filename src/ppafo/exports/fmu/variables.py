@@ -25,7 +25,6 @@ STEPPED = (
     "strides",
     "contact",
     "controller_phase",
-    "safe_state",
 )
 """Outputs that change only at samples."""
 _LARGEST_LIMIT = 1.0e308

@@ -276,18 +276,13 @@ def dead_time(settings: ProportionalSettings) -> float:
     return settings.delay
 
 
-def spool_lag(settings: ProportionalSettings) -> float:
-    """Time [s] until the opening has followed a command at the spool, including the travel at the slew limit."""
+def lag(settings: ProportionalSettings) -> float:
+    """Time [s] until the opening has followed a command: dead time, spool, and travel at the slew limit."""
     # Mean delay of a second-order system: 2 d / w.
     frequency, slew_limit = settings.spool_frequency, settings.slew_limit
     spool = 2.0 * settings.spool_damping_ratio / (2.0 * math.pi * frequency) if frequency > 0.0 else 0.0
     slew = 1.0 / slew_limit if slew_limit > 0.0 else 0.0
-    return spool + slew
-
-
-def lag(settings: ProportionalSettings) -> float:
-    """Time [s] until the opening has followed a command: dead time, spool, and travel at the slew limit."""
-    return settings.delay + spool_lag(settings)
+    return settings.delay + (spool + slew)
 
 
 IDEAL = ValveModel(

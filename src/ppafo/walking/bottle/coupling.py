@@ -20,14 +20,12 @@ from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.model.cold_gas import SupplyNow, SupplyState, advance_supply, open_share
 from ppafo.model.effects.kind import Effect
-from ppafo.model.helping import STOPPED
 from ppafo.model.plant import PlantParameters
 from ppafo.model.source import bottle_content, has_liquid
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effect_row
 from ppafo.walking.bottle.course import DIVERGED, UNITS, WALKED, SupplyCourse, SupplyEnding
 from ppafo.walking.bottle.supply import BottleSupply
-from ppafo.walking.safety_events import SAFE_ROW
 
 REGULATED, _LINE = "line_state.regulated_mass", "line_state.mass_1"
 """Paths of the rows for the gas through a line's regulator, and for the gas in the line [kg]."""
@@ -182,8 +180,6 @@ def _use_bottle(
     block = begin_block(batch, effort_for(batch))
     states = row_numbers(batch.program.state_rows())
     regulated, lines = ([row for path, row in states.items() if path.endswith(end)] for end in (REGULATED, _LINE))
-    # A repeated task sequence starts a device that has stopped for good again.
-    level, stopped = None if batch.program.takes_task_sequence else states.get(SAFE_ROW), 0
     every, walked_before = max(1, round(supply.coupling / run.step)), use.walked
     lanes = _Lanes.of(run, device, use.met[0].offered.gas_temperature)
     # The line falls for a moment at each draw: its best over some strides counts, of two meetings at least.
@@ -223,13 +219,6 @@ def _use_bottle(
         use.ending = _ending(supply, use.met[-1], max(gauge for _, gauge in gauges))
         if schedule is not None and use.ending is None:
             if time >= schedule.longest:
-                break
-            # It takes no more gas; a bottle that was too weak leaves the line low, and ends the walk first.
-            stopped += steps * (level is not None and block.states[level, 0] == STOPPED)
-            if stopped > window:
-                use.walked -= stopped * run.step
-                message = f"the device stops for good, and {_grams(use.met[-1].state.mass)} are left in the bottle"
-                use.ending = SupplyEnding("stopped", message, use.walked + use.rested)
                 break
             if until_rest <= 0 and schedule.rest > 0.0:
                 rest = min(schedule.rest, schedule.longest - time)

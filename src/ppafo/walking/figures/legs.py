@@ -62,13 +62,10 @@ def legs_of(result: WalkResult, turns: Floats) -> LegPostures:
 
 
 def phases_of_last_stride(result: WalkResult, count: int) -> Floats:
-    """Return ``count`` evenly spaced running phases [strides] in the last assisted stride, or else in the last one."""
+    """Return ``count`` evenly spaced running phases [strides] in the last whole stride."""
     # 1e-6: a last stride that is short by rounding counts.
     last = int(result.recording.time[-1] / walk_of(result.scenario).gait.stride_time + 1.0e-6)
-    # The first heel strike of a walk begins stride 1 and is not counted.
-    assisted = 2 + np.flatnonzero(result.helped[: max(last - 1, 0)])
-    end = int(assisted[-1]) if assisted.size else last
-    return np.asarray(end - 1 + np.arange(count) / count)
+    return np.asarray(last - 1 + np.arange(count) / count)
 
 
 def _draw_leg(

@@ -15,7 +15,6 @@ from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES
 from ppafo.walking.figures.mean_stride import ANGLE, OPACITY, WITH, WITHOUT
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
-from ppafo.walking.safety_events import acting_phase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +27,7 @@ _PHASES = {
     SWING: ("swing", "#cf8146"),
 }
 """Name and colour of each phase in the strip below the torque; the colours also differ in greyscale."""
-_SHADED, _LESS_HELP = "#f3f3f3", "#cc3311"
+_SHADED = "#f3f3f3"
 _WIDTH, _LETTER = 5.7, 0.0145
 """Width of the figure [inches], and of a letter as a fraction of it; a name that does not fit is written vertically."""
 _ROOM = 2.2
@@ -68,8 +67,7 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     }
     behind: dict[str, Any] = {"alpha": 1.0, "zorder": 0}
     shaded = [Mark("span", (part.start, part.end), colour=_SHADED, style=behind) for part in worn.segments[1::2]]
-    losses = [part.safe_time for part in worn.segments if part.safe_time is not None]
-    segments = [*shaded, *(Mark("at", loss, colour=_LESS_HELP, style={"linewidth": 1.2}) for loss in losses)]
+    segments = shaded
     set_limits = partial(_set_limits, float(time[-1]))
     # The walking speed, or strides per second where there is none, under the names of the segments.
     has_speed = "walking_speed" in recording
@@ -85,7 +83,6 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
         panels,
         size=(5.4, 1.45),
         title=f"{worn.scenario.name}, task sequence {'' if sequence is None else sequence.name}",
-        note="vertical line: less help" if losses else "",
         kind=recording.kind,
     )
 
@@ -124,7 +121,7 @@ def _phase_strip(recording: Recording) -> list[Mark]:
     """Return the phase in which the device acts as a coloured strip below the torque curve."""
     if "controller_phase" not in recording:
         return []
-    acting, torque = acting_phase(recording), recording["torque"]
+    acting, torque = recording["controller_phase"], recording["torque"]
     height = max(float(np.ptp(torque)), _LEAST_RANGE)
     top = np.full(acting.size, float(torque.min()) - _STRIP_GAP * height)
     return [

@@ -203,12 +203,10 @@ def test_the_regulator_of_a_bottle_is_set_to_the_supply_pressure_of_a_run_unless
 
 
 def test_a_walk_on_another_gas_than_the_bottle_holds_is_told_the_command_that_feeds_it_so() -> None:
-    walked = ppafo.walk("proportional", minutes=0.1, overrides=["controller.vent_time=0.1 s"])
+    walked = ppafo.walk("proportional", minutes=0.1, overrides=["controller.peak_time=0.52"])
     with pytest.raises(DataError, match="the device uses CO2, but bottle 'air-48ci-3000psi' contains air") as caught:
         endurance(walked, bottle="air-48ci-3000psi")
-    told = (
-        "'ppafo walk proportional --set 'controller.vent_time=0.1 s' --set gas.species=air --minutes 0.1 --out FOLDER'"
-    )
+    told = "'ppafo walk proportional --set controller.peak_time=0.52 --set gas.species=air --minutes 0.1 --out FOLDER'"
     assert told in str(caught.value)
     again = ppafo.walk("proportional", minutes=0.1, overrides=["gas.species=air"])
     lasting_on_air = endurance(again, bottle="air-48ci-3000psi", longest=20.0).found

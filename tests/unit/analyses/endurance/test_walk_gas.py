@@ -219,14 +219,6 @@ def test_rests_warm_the_bottle_that_is_walked_on() -> None:
     assert mass[0] - mass[-1] == pytest.approx(rested.draw.mass_per_stride * rested.discharge.strides)
 
 
-def test_a_device_that_a_fault_stops_is_asked_about_without_the_fault() -> None:
-    stopped = walk("solenoid", minutes=0.2, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
-    made, sound = (endurance(one, overrides=SMALL).found for one in (stopped, walk("solenoid", minutes=0.2)))
-    assert isinstance(made, Endurance)
-    assert isinstance(sound, Endurance)
-    assert made.discharge.walking_time == sound.discharge.walking_time
-
-
 def test_a_walk_whose_numbers_were_changed_in_python_is_not_taken_for_that_of_its_file() -> None:
     changed = walk(with_numbers(load_walk("solenoid"), {"valve.area": 1.0e-6}), minutes=0.1)
     with pytest.raises(ScenarioError, match="when loading the walk"):

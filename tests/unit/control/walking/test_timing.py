@@ -16,7 +16,6 @@ from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
-from ppafo.model.valves.kind import VENT
 from tests.settings_of_laws import settings_of_law
 
 Floats = NDArray[np.float64]
@@ -255,11 +254,9 @@ def test_a_timing_changes_no_controller_without_a_time_in_the_stride() -> None:
 
 @pytest.mark.parametrize("timing", list(TIMINGS.values())[1:], ids=lambda timing: timing.name)
 @pytest.mark.parametrize("name", ["event_on_off", "event_pid"])
-def test_nothing_pushes_on_a_loaded_heel_and_a_stop_is_for_good_whatever_is_predicted(
-    timing: TimingKind, name: str
-) -> None:
+def test_nothing_pushes_on_a_loaded_heel_whatever_is_predicted(timing: TimingKind, name: str) -> None:
     kind = with_timing(WALKING_CONTROLLERS[name], timing)
-    values = settings_of_law(kind) | GIVEN | {"fill_time": 10.0, "vent_time": 10.0}
+    values = settings_of_law(kind) | GIVEN
     parameters, state = rebuilt(kind.parameters, list(values.values())), kind.initial
     phase = np.concatenate([np.arange(0.5, 5.2, PERIOD), np.full(600, 5.2), np.arange(5.2, 7.3, 1.3 * PERIOD)])
     heel, toe = forces(phase % 1.0, 1.0)
@@ -271,8 +268,3 @@ def test_nothing_pushes_on_a_loaded_heel_and_a_stop_is_for_good_whatever_is_pred
         pushed += command > 0.0 and command <= 1.0 and state.phase.phase == PUSH_OFF
         assert state.phase.heel.loaded < 0.5 or not 0.0 < command <= 1.0
     assert pushed > 100
-    broken = GaitMeasurement(1.6, 1.4e5, 1.4e5, 0.0, 9.0e3, 0.0)
-    for on_heel, on_toe in zip(heel[:3000].tolist(), toe[:3000].tolist(), strict=True):
-        command, state = kind.update(parameters, state, 0.0, broken._replace(toe_force=on_toe), PERIOD)
-        assert command == VENT
-        broken = broken._replace(heel_force=on_heel)

@@ -39,7 +39,7 @@ _READING = (
     "first, until a bottle lasts; that walk is shown. Dead volumes, friction and sensors come from the walk file; the "
     "dorsiflexion chamber is supplied with 90 % of the gauge pressure.",
     "Valve power is the mean power of the coils, or of the spool in proportion to its stroke; driver losses are "
-    "neglected. A shut-off valve is open as long as the device helps.",
+    "neglected.",
 )
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from ppafo.analyses.design.wearer.available_parts import AvailableParts
 from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
 from ppafo.errors import ScenarioError
-from ppafo.model.helping import STOPPED
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report
 from ppafo.walking.bottle.course import WALKED
@@ -17,9 +16,6 @@ from ppafo.walking.walk import walk
 
 _ALLOWANCE = 1.15
 """Allowance factor on the gas flow of a pair, relative to the gas that another pair drew from the same bottle."""
-
-_AT_THE_END = 3.0
-"""Time before the end of a walk [s] within which a stop of the device belongs to the end of its bottle."""
 
 
 def lightest_on_bottle(
@@ -61,12 +57,9 @@ def walk_on_bottle(pair: WalkedDevice, bottle: str, seconds: float, report: Repo
 
 
 def walking_time(walked: WalkResult | None) -> float:
-    """Return the time that a device walks on a bottle [s], infinite if it helps until the end; 0 without a walk."""
+    """Return the time that a device walks on a bottle [s], infinite if it lasts until the end; 0 without a walk."""
     if walked is None or walked.supply is None or not walked.status.is_completed:
         return 0.0
-    last = [event.time for event in walked.events[-1:] if event.level == STOPPED]
-    if last and last[0] < walked.recording.time[-1] - _AT_THE_END:
-        return last[0]
     return math.inf if walked.supply.ending.kind == WALKED else float(walked.recording.time[-1])
 
 

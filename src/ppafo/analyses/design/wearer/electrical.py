@@ -1,4 +1,4 @@
-"""Electrical energy of coils, spool, shut-off valve and processor over a walk, and the battery that supplies it."""
+"""Electrical energy of coils, spool and processor over a walk, and the battery that supplies it."""
 
 import math
 from dataclasses import dataclass
@@ -58,9 +58,7 @@ def valve_power(valve: Part, command: Floats) -> Floats:
     return np.where(stroke > 0.0, full, idle) if valve.kind == "solenoid" else idle + (full - idle) * stroke
 
 
-def electrical_of(
-    recording: Recording, valve: Part, shut_off_power: float, processor: Part, cell: Part, seconds: float
-) -> Electrical:
+def electrical_of(recording: Recording, valve: Part, processor: Part, cell: Part, seconds: float) -> Electrical:
     """Return the electrical energy of a walk as means over the recording.
 
     The battery has as many cells as a walk of ``seconds`` [s] needs.
@@ -69,12 +67,9 @@ def electrical_of(
     # Each sample holds until the next one, as the controller's outputs do.
     length = float(time[-1] - time[0])
     mean = float(np.sum(power[:-1] * np.diff(time)) / length)
-    # A controller without a safe state helps all the time.
-    helps = recording["safe_state"] < 0.5 if "safe_state" in recording else np.ones(time.size)
-    share = float(np.sum(helps[:-1] * np.diff(time)) / length)
     is_whole = "power" in valve.values
     powers = {"valve": mean} if is_whole else {}
-    powers |= {"shut-off valve": shut_off_power * share, "processor": processor.values["power"]}
+    powers["processor"] = processor.values["power"]
     needed = sum(powers.values()) * seconds / (USABLE * cell.values["energy"])
     return Electrical(powers, cell, max(1, math.ceil(needed)), is_whole)
 

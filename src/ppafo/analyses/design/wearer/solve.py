@@ -26,7 +26,7 @@ from ppafo.analyses.design.wearer.requirements import (
     check_requirements,
     shown_clearance,
 )
-from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of_wearer
+from ppafo.analyses.design.wearer.strides import few_strides, of_wearer
 from ppafo.analyses.endurance.solve import WITHOUT_REST, endurance_of_walk_gas
 from ppafo.analyses.endurance.walk_gas import walk_gas
 from ppafo.errors import StudyError
@@ -122,15 +122,13 @@ def _device(
     shelf: AvailableParts,
     report: Report,
 ) -> SizedDevice:
-    """Assemble the device of a pair and a bottle, with regulators, shut-off valve, processor and battery."""
+    """Assemble the device of a pair and a bottle, with regulators, processor and battery."""
     until = f"walking until {bottle.name} is exhausted"
     life = endurance_of_walk_gas(
         walk_gas(walked), None, WITHOUT_REST, progress=lambda done, _: report(Progress(f"{until}, {int(done)} min"))
     )
     processor, cell = shelf.part("processors", _PROCESSOR), shelf.part("batteries", _CELL)
-    electrical = electrical_of(
-        walked.recording, pair.valve, SHUT_OFF_PARTS["power"], processor, cell, requirements.seconds
-    )
+    electrical = electrical_of(walked.recording, pair.valve, processor, cell, requirements.seconds)
     # Both regulators may be of one part.
     regulators = [shelf.part("regulators", name) for name in _REGULATORS]
     regulator_masses = {f"regulator {part.name}": part.full_mass for part in regulators}
@@ -141,7 +139,6 @@ def _device(
         f"valve {pair.valve.name}": pair.valve.full_mass,
         f"bottle {bottle.name}, full": bottle.full_mass,
         **regulator_masses,
-        "shut-off valve": SHUT_OFF_PARTS["mass"],
         f"processor {processor.name}": processor.full_mass,
         f"battery, {electrical.cells} x {cell.name}": electrical.mass,
     }

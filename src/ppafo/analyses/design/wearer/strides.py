@@ -7,11 +7,9 @@ not clear the ground, the foot is lifted earlier and with more torque.
 from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.model.catalog import VALVES
-from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE, SPECIES_PATH
 from ppafo.parameters.parts import Part
 from ppafo.units.shown import written_text
-from ppafo.walking.contradictions import COMPRESSION
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import walk
@@ -28,12 +26,8 @@ _EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.
 """Overrides for an earlier foot lift from toe-off, used if toes do not clear the ground with the walk's own lift."""
 _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 """Catalogue figures of an actuator that a walk adopts."""
-_SENSOR_MARGIN = 1.1
-"""Range of larger chamber pressure sensors divided by the highest pressure [-]."""
 _PROPORTIONAL = "proportional"
 """Valve type that a torque controller needs; solenoid valves only limit the torque."""
-SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
-"""Numbers of the shut-off valve of every device [SI]: usual values, and an area that does not throttle the supply."""
 
 
 def of_wearer(requirements: DesignRequirements) -> tuple[str, ...]:
@@ -49,7 +43,7 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
     results, none if no walk provides help.
     """
     settings = load_walk(WALKS[valve.kind]).controller.settings
-    common = _common_overrides(requirements, valve, actuator, float(settings["highest_pressure"]))
+    common = _common_overrides(requirements, valve, actuator)
     strides: list[WalkedDevice] = []
     is_followed = valve.kind == _PROPORTIONAL
     own_limit = float(settings["largest_torque"])
@@ -74,7 +68,7 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
             overrides = (*common, *peak, *limit, *lift)
             result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_MINUTES)
             # Strides without help say nothing, nor do those of a torque loop that oscillates.
-            if not (result.status.is_completed and result.is_helped and result.averages) or result.tracking:
+            if not (result.status.is_completed and result.averages) or result.tracking:
                 break
             flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
             mean_peak, toes = float(result.averages["torque"].mean.max()), result.metrics["lowest_toes"].value
@@ -93,18 +87,10 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
     return [strongest] if highest is strongest else [strongest, highest]
 
 
-def _common_overrides(
-    requirements: DesignRequirements, valve: Part, actuator: Part, sensor_range: float
-) -> tuple[str, ...]:
-    """Return the overrides common to all walks with a pair: wearer, supply, figures of the parts, shut-off valve.
-
-    Chamber pressure sensors whose range [Pa absolute] is too small for the supply are replaced.
-    """
+def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: Part) -> tuple[str, ...]:
+    """Return the overrides common to all walks with a pair: wearer, supply, figures of the parts."""
     dorsiflexion = STANDARD_ATMOSPHERE + _DORSIFLEXION * (requirements.pressure - STANDARD_ATMOSPHERE)
     units = {quantity.name: quantity.unit for quantity in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
-    # A foot that moves compresses the gas above the range that sensors have by default.
-    compressed = _SENSOR_MARGIN * COMPRESSION * requirements.pressure
-    sensor = (f"controller.highest_pressure={written_text(compressed, 'Pa_a')}",) if compressed > sensor_range else ()
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     return (
         *of_wearer(requirements),
@@ -112,6 +98,4 @@ def _common_overrides(
         f"supply.pressure={written_text(requirements.pressure, 'Pa_a')}",
         f"supply.dorsiflexion_pressure={written_text(dorsiflexion, 'Pa_a')}",
         *(f"{path}={written_text(number, units[path.partition('.')[2]])}" for path, number in numbers.items()),
-        f"shut_off.area={written_text(SHUT_OFF_PARTS['area'], 'm^2')}",
-        *sensor,
     )

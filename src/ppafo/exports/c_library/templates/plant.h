@@ -46,7 +46,7 @@ typedef struct {
 @said_inputs@ */
 @name@_status @name@_initialise(@name@_run *run, const @name@_settings *settings, @arguments@);
 
-/* Go on by one step, @clock@ [s], under inputs that are those of its beginning. @motion@ */
+/* Go on by one step, run_step [s], under inputs that are those of its beginning. @motion@ */
 @name@_status @name@_step(@name@_run *run, @arguments@);
 
 /* The plant after the last step. */

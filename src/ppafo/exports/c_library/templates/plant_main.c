@@ -25,7 +25,7 @@ int main(void)
     }
     status = @name@_initialise(run, &settings, @first_inputs@);
     printf("@csv_head@\n");
-    for (steps = (int)(0.1 / settings.@clock@ + 0.5); status == @NAME@_GOING_ON && steps >= 0; --steps) {
+    for (steps = (int)(0.1 / settings.run_step + 0.5); status == @NAME@_GOING_ON && steps >= 0; --steps) {
         @name@_read_outputs(run, &outputs);
         printf("@csv_form@\n",
 @csv_values@);

@@ -434,15 +434,14 @@ def test_a_battery_has_as_many_cells_as_the_minutes_take() -> None:
     catalogue = load_catalogue()
     time = np.linspace(0.0, 10.0, 101)
     half = np.where(time < 5.0, 1.0, 0.0)
-    channels = {"command": Channel(half, "-"), "safe_state": Channel(np.zeros(101), "-")}
-    recording = Recording("walk", time, channels)
+    recording = Recording("walk", time, {"command": Channel(half, "-")})
     parts = [catalogue.part("valves", "festo-vovg-5v-pair"), catalogue.part("processors", "msp430g2553")]
     cell = catalogue.part("batteries", "ncr18650b")
-    found = electrical_of(recording, parts[0], 0.5, parts[1], cell, 600.0)
-    assert found.powers == pytest.approx({"valve": 0.5, "shut-off valve": 0.5, "processor": 0.03})
+    found = electrical_of(recording, parts[0], parts[1], cell, 600.0)
+    assert found.powers == pytest.approx({"valve": 0.5, "processor": 0.03})
     assert found.cells == 1
-    assert found.lasts == pytest.approx(0.8 * 43.4e3 / 1.03)
-    long = electrical_of(recording, parts[0], 0.5, parts[1], cell, 100.0 * 3600.0)
+    assert found.lasts == pytest.approx(0.8 * 43.4e3 / 0.53)
+    long = electrical_of(recording, parts[0], parts[1], cell, 200.0 * 3600.0)
     assert long.cells == 11
     assert long.mass == pytest.approx(11 * 0.0485)
-    assert long.lasts >= 100.0 * 3600.0 > long.lasts * 10.0 / 11.0
+    assert long.lasts >= 200.0 * 3600.0 > long.lasts * 10.0 / 11.0
