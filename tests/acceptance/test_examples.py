@@ -1,10 +1,14 @@
 """Every example runs from beginning to end and writes what it says."""
 
+import contextlib
 import os
 import runpy
+import socket
+import struct
 import subprocess
 import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -82,3 +86,62 @@ def test_an_episode_of_gymnasium_is_the_run_that_its_result_names(env: Any) -> N
 def test_the_example_for_gymnasium_runs_as_its_page_says(tmp_path: Path) -> None:
     pytest.importorskip("gymnasium")
     assert "return -0." in run(FOLDER / "gymnasium" / "torque_task.py", tmp_path)
+
+
+def of_board(file: str) -> Path:
+    return FOLDER / "hardware-in-the-loop" / file
+
+
+@pytest.fixture
+def plant(tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", int]]:
+    """The plant of the example, which waits for its board at a port."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port: int = free.getsockname()[1]
+    words = [sys.executable, str(of_board("plant.py")), "--port", str(port), "--lock-step"]
+    with subprocess.Popen(words, cwd=tmp_path, stdout=-1, stderr=-1, text=True) as process:
+        yield process, port
+        process.kill()
+
+
+def test_a_board_at_a_socket_gives_the_recording_of_its_controller(
+    plant: tuple["subprocess.Popen[str]", int], tmp_path: Path
+) -> None:
+    process, port = plant
+    words = [sys.executable, str(of_board("board.py")), str(port)]
+    subprocess.run(words, check=True, timeout=120)
+    said, _ = process.communicate()
+    assert (process.returncode, said) == (0, "3000 samples, 0 without an answer in time; written: out/hil\n")
+    found = ppafo.read_recording(tmp_path / "out" / "hil" / "recording.nc")
+    law = runpy.run_path(str(of_board("board.py")))["Proportional"]()
+    alone = ppafo.simulate(ppafo.load_scenario("torque-task-proportional").controlled_by(law)).recording
+    assert found.names == alone.names
+    assert all(np.array_equal(found[name], alone[name]) for name in alone.names)
+
+
+def test_only_an_answer_to_the_present_sample_acts_and_a_silent_board_ends_the_run(
+    plant: tuple["subprocess.Popen[str]", int], tmp_path: Path
+) -> None:
+    process, port = plant
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+        board.bind(("127.0.0.1", 0))
+        board.settimeout(0.1)
+        message = b""
+        while not message:
+            board.sendto(b"", ("127.0.0.1", port))
+            with contextlib.suppress(TimeoutError):
+                message = board.recv(64)
+        board.settimeout(60.0)
+        for number in range(5):
+            assert len(message) == 52
+            assert struct.unpack("<I6d", message)[:2] == (number, pytest.approx(number * 1e-3))
+            for answer in (b"?", struct.pack("<Id", number + 1, 1.0), struct.pack("<Id", number, float("nan"))):
+                board.sendto(answer, ("127.0.0.1", port))
+            board.sendto(struct.pack("<Id", number, -0.25), ("127.0.0.1", port))
+            message = board.recv(64)
+        assert board.recv(64) == b""
+    said, complained = process.communicate()
+    assert (process.returncode, complained) == (1, "the board was silent from t = 0.006 s on\n")
+    assert said.startswith("6 samples, 1 without an answer in time")
+    commands = ppafo.read_recording(tmp_path / "out" / "hil" / "recording.nc")["command"]
+    assert set(commands) == {-0.25}

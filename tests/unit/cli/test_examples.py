@@ -13,7 +13,7 @@ from tests.page_code import code_blocks
 
 EXAMPLES = load_examples()
 PYPROJECT = PurePosixPath("pyproject.toml")
-SCRIPTS = ("first-steps", "gymnasium")
+SCRIPTS = ("first-steps", "gymnasium", "hardware-in-the-loop")
 """Examples that no page shows: tests/acceptance/test_examples.py runs them."""
 DATA = ("muscle-pair.toml", "step-response-muscles.toml", "lever.toml", "chamber.toml")
 """A set, its scenario, a column map and a second problem, which pages name."""

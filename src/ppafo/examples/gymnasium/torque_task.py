@@ -43,7 +43,7 @@ class TorqueTask(gymnasium.Env[np.ndarray, np.ndarray]):
         self.overrides = {"run.duration": duration, **SENSORS}
         self.error_weight, self.gas_weight = error_weight, gas_weight
 
-    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, dict[str, Any]]:  # noqa: ARG002
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, dict[str, Any]]:
         """Start an episode with numbers drawn by the generator of the environment."""
         super().reset(seed=seed)
         drawn: dict[str, Any] = {path: float(self.np_random.uniform(*ends)) for path, ends in DRAWN.items()}
