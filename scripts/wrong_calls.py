@@ -162,16 +162,13 @@ ARGUMENTS: Mapping[str, str] = {
         "baseline? draws? check"
     ),
     "compare_walks": "scenario minutes? progress",
-    "design": (
-        "problem:object? threads? mass? stature? gait? torque? pressure? minutes? toes? catalogue? bottle? progress?"
-    ),
+    "design": "problem:object profile? threads? progress?",
     "endurance_of_walk": "result bottle?",
     "evaluate": "recording columns?",
     "find": "scenario vary such_that highest grid overrides threads? progress?",
     "identify": "problem progress",
     "linearise": "scenario at overrides",
-    "load_catalogue": "catalogue",
-    "load_design": "problem",
+    "load_design": "problem profile?",
     "load_device": "parameter_set overrides valve?",
     "load_gait": "gait",
     "load_parameter_set": "parameter_set:name",
@@ -180,7 +177,6 @@ ARGUMENTS: Mapping[str, str] = {
     "load_study_results": "folder",
     "load_tuning": "tuning overrides",
     "load_walk": "scenario:name overrides gait? task_sequence? bottle? parameter_set?",
-    "parts": "part? catalogue",
     "read_recording": "path atmosphere columns?",
     "read_result": "folder",
     "reproduce": "study:name overrides progress?",

@@ -1,8 +1,8 @@
 # Written by scripts/public_api.py
 
 from ppafo.analyses.compare.question import compare as compare
+from ppafo.analyses.design.answer import Sizing as Sizing
 from ppafo.analyses.design.loading import load_design as load_design
-from ppafo.analyses.design.profile.answer import Sizing as Sizing
 from ppafo.analyses.design.question import design as design
 from ppafo.analyses.endurance.answer import Endurance as Endurance
 from ppafo.analyses.endurance.question import bottle as bottle
@@ -12,8 +12,6 @@ from ppafo.analyses.identify.answer import Identification as Identification
 from ppafo.analyses.identify.question import identify as identify
 from ppafo.analyses.linearise.model import LinearModel as LinearModel
 from ppafo.analyses.linearise.question import linearise as linearise
-from ppafo.analyses.parts.answer import Parts as Parts
-from ppafo.analyses.parts.question import parts as parts
 from ppafo.analyses.reproduce.question import reproduce as reproduce
 from ppafo.analyses.reproduce.result import Reproduction as Reproduction
 from ppafo.analyses.sensitivity.question import sensitivity as sensitivity
@@ -52,9 +50,6 @@ from ppafo.parameters import list_sets as list_sets
 from ppafo.parameters import load_device as load_device
 from ppafo.parameters import load_parameter_set as load_parameter_set
 from ppafo.parameters.device import Device as Device
-from ppafo.parameters.parts import Catalogue as Catalogue
-from ppafo.parameters.parts import Part as Part
-from ppafo.parameters.parts import load_catalogue as load_catalogue
 from ppafo.report.finding import Finding as Finding
 from ppafo.report.stored_figure import read_result as read_result
 from ppafo.running import SteppedRun as SteppedRun
@@ -79,7 +74,6 @@ from ppafo.walking.walk import walk as walk
 
 __all__ = [
     "ArgumentError",
-    "Catalogue",
     "Channel",
     "DataError",
     "Device",
@@ -94,8 +88,6 @@ __all__ = [
     "Metric",
     "ParameterError",
     "ParameterSet",
-    "Part",
-    "Parts",
     "PpafoError",
     "ProgramError",
     "Recording",
@@ -128,7 +120,6 @@ __all__ = [
     "list_studies",
     "list_tunings",
     "list_walks",
-    "load_catalogue",
     "load_design",
     "load_device",
     "load_gait",
@@ -138,7 +129,6 @@ __all__ = [
     "load_study_results",
     "load_tuning",
     "load_walk",
-    "parts",
     "read_recording",
     "read_result",
     "reproduce",

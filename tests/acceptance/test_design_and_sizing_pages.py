@@ -20,8 +20,8 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.parametrize(("place", "written"), [(0, "out/wearer/bottle.png"), (2, "out/profile/suggested.csv")])
-def test_the_sizing_of_the_page_prints_what_the_page_shows(
+@pytest.mark.parametrize(("place", "written"), [(0, "out/design/suggested.csv"), (1, "out/profile/suggested.csv")])
+def test_the_commands_of_the_page_print_what_the_page_shows(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -29,11 +29,14 @@ def test_the_sizing_of_the_page_prints_what_the_page_shows(
     written: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(shlex.split(blocks("size-a-device.md", "sh")[place])[1:]) == 0
-    printed = capsys.readouterr().out.splitlines()
-    shown = blocks("size-a-device.md", "text")[place].splitlines()
-    assert len(shown) > 6
-    assert [line for line in shown if line and line not in printed] == []
+    commands = blocks("size-a-device.md", "sh")[place].splitlines()
+    # The text blocks follow the commands in their order.
+    first = sum(len(block.splitlines()) for block in blocks("size-a-device.md", "sh")[:place])
+    for command, shown in zip(commands, blocks("size-a-device.md", "text")[first:], strict=False):
+        main(shlex.split(command)[1:])
+        printed = capsys.readouterr().out.splitlines()
+        assert len(shown.splitlines()) > 3
+        assert [line for line in shown.splitlines() if line and line not in printed] == []
     assert (tmp_path / written).exists()
 
 
@@ -44,10 +47,4 @@ def test_the_file_and_the_python_of_a_profile_run(
     (tmp_path / "my-profile.toml").write_text(blocks("size-a-device.md", "toml")[0])
     names: dict[str, Any] = {}
     exec(blocks("size-a-device.md", "python")[0], names)
-    assert capsys.readouterr().out.startswith("enfield-ls-v05s pipeline-jacpac-9oz ")
-
-
-def test_the_commands_about_parts_run(capsys: pytest.CaptureFixture[str]) -> None:
-    commands = blocks("size-a-device.md", "sh")[3].splitlines()[:2]
-    assert [main(shlex.split(command)[1:]) for command in commands] == [0, 0]
-    assert "festo-mpye-5-m5-010-b" in capsys.readouterr().out
+    assert capsys.readouterr().out.startswith("of-the-scenario paper-co2-9oz ")

@@ -25,7 +25,6 @@ FILES = {
     "scenario": "scenarios/torque-task-proportional.toml",
     "study": "studies/library/torque-task-uncertainty.toml",
     "tuning": "analyses/tune/library",
-    "parts": "parameters/parts/catalogues/parts.toml",
     "design": "analyses/design/library",
     "walk": "walking/configurations/solenoid.toml",
     "task-sequence": "walking/task_sequences",

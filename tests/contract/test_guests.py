@@ -21,7 +21,8 @@ gain_factors = [1.0]
 profile = { time = ["0 s", "0.3 s", "0.6 s", "1 s"], torque = ["0 N m", "3 N m", "3 N m", "0 N m"] }
 use.repetitions = 50
 limits.rms_error = "0.7 N m"
-parts = { valves = ["enfield-ls-v05s"], bottles = ["pipeline-jacpac-9oz"] }
+bottles = ["paper-co2-9oz"]
+valves.own = {}
 """
 DECAY = """
 schema_version = 1

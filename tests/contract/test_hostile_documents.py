@@ -18,7 +18,6 @@ from ppafo.gait.recorded.mapping import load_map
 from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.bottles.bottle import load_bottle
-from ppafo.parameters.parts import load_catalogue
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.storage.column_map import load_column_map
@@ -32,7 +31,6 @@ LOADERS: dict[str, Callable[[str], Any]] = {
     "scenario": load_scenario,
     "study": load_study,
     "tuning": load_tuning,
-    "parts": load_catalogue,
     "design": load_design,
     "walk": load_walk,
     "task-sequence": load_task_sequence,

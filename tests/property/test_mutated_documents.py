@@ -20,7 +20,6 @@ from ppafo.parameters import build_device, load_parameter_set
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.parameters.parts import load_catalogue
 from ppafo.rig.preset import load_preset
 from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk
@@ -56,7 +55,6 @@ FORMATS = {
     "design": Format(load_design, PACKAGE / "analyses" / "design" / "library"),
     "walk": Format(load_walk, PACKAGE / "walking" / "configurations"),
     "bottle": Format(load_bottle, PACKAGE / "parameters" / "bottles" / "files"),
-    "parts": Format(load_catalogue, PACKAGE / "parameters" / "parts" / "catalogues"),
     "rig": Format(load_preset, PACKAGE / "rig" / "presets"),
     "gait": Format(load_gait, PACKAGE / "gait" / "normative", use_gait),
 }

@@ -15,7 +15,6 @@ from ppafo.arguments.words import Count as Count
 from ppafo.arguments.words import Duration as Duration
 from ppafo.arguments.words import FigureWidth as FigureWidth
 from ppafo.arguments.words import File as File
-from ppafo.arguments.words import FileOrName as FileOrName
 from ppafo.arguments.words import Flow as Flow
 from ppafo.arguments.words import Folder as Folder
 from ppafo.arguments.words import Fraction as Fraction

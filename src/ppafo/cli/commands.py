@@ -35,12 +35,11 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "simulate": _of_scenario("ppafo.cli.simulate:simulate"),
         "workbench": _of_scenario("ppafo.page.commands:workbench"),
         "sets": CommandGroup(
-            "list, show and audit parameter sets; list real parts",
+            "list, show and audit parameter sets",
             {
                 "list": Command(f"{_DEVICE}:sets_list"),
                 "show": Command(f"{_DEVICE}:sets_show", listing=_SETS),
                 "audit": Command(f"{_DEVICE}:sets_audit", listing=_SETS),
-                "parts": Command(f"{_ANALYSES}.parts.question:parts"),
             },
         ),
     },
@@ -89,7 +88,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         ),
         "design": Command(
             f"{_ANALYSES}.design.question:design",
-            first_line="Find a device: for a wearer or for a torque profile.",
+            first_line="Find valve, supply pressure, gains and bottle for a torque profile.",
             library="ppafo.analyses.design.loading:FILE",
         ),
         "bottle": Command(

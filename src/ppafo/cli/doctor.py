@@ -16,7 +16,6 @@ FORMATS: dict[str, str] = {
     "scenario": "ppafo.loading",
     "study": "ppafo.studies.declaration",
     "tuning": "ppafo.analyses.tune.problem",
-    "parts": "ppafo.parameters.parts.catalogue",
     "design": "ppafo.analyses.design.loading",
     "walk": "ppafo.walking.declaration",
     "task-sequence": "ppafo.walking.task_sequence",

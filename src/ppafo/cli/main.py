@@ -81,7 +81,7 @@ the paper
   ppafo reproduce                           its experiments against its reported numbers
 your device
   ppafo new set mine                        a file to fill in; also for a scenario, a study, a walk
-  ppafo design push-off                     from a torque profile to valve, pressure and bottle; also from a wearer
+  ppafo design push-off                     from a torque profile to valve, pressure and bottle
   ppafo identify FILE                       from bench recordings to parameters with intervals
 learn
   ppafo new example                         the examples of the how-to pages, ready to run

@@ -71,16 +71,10 @@ KINDS: dict[str, _NewFile] = {
         "ppafo.parameters.bottles.bottle:load_bottle",
         "ppafo bottle --bottle FILE --gas-per-stride '0.3 g' --out out/NAME",
     ),
-    "parts": _NewFile(
-        "catalogue of parts",
-        "parameters/parts/catalogues",
-        "ppafo.parameters.parts:load_catalogue",
-        "ppafo sets parts --catalogue FILE",
-    ),
 }
 """Kinds of file written by ``ppafo new``, each with a template in ``templates``."""
 
-_WITH_SOURCES = ("set", "bottle", "parts")
+_WITH_SOURCES = ("set", "bottle")
 """Kinds of file whose values have a source each."""
 EXAMPLE = "example"
 
@@ -94,7 +88,7 @@ def new(
 ) -> CommandOutput:
     """Write an input file to start from: a template, or a copy of a shipped one; or the files of an example.
 
-    kind: scenario, set, study, walk, task-sequence, gait-map, bottle, parts, or example: the files of a how-to page
+    kind: scenario, set, study, walk, task-sequence, gait-map, bottle, or example: the files of a how-to page
     name: name of the file and of what it describes; of an example, its name; without it, the examples are listed
     source: copy this one: a shipped name, or a .toml file
     out: the .toml file to write, default NAME.toml; of an example, the new folder, default NAME
@@ -140,18 +134,6 @@ def new(
     return CommandOutput(f"written: {path}{copied}; next: {command}", document)
 
 
-def _bottle_text(part: str, name: str) -> str:
-    """Return the file text of a catalogue bottle under a new name."""
-    from ppafo.documents.toml_text import assignments, table_lines
-    from ppafo.parameters.bottles.bottle import load_bottle
-
-    bottle = load_bottle(part)
-    gas = {"value": bottle.fluid.name, "origin": "derived", "source": f"bottle {part} of the catalogue of parts"}
-    tables = {"gas": gas, **{path: entry.model_dump(exclude_defaults=True) for path, entry in bottle.entries.items()}}
-    head = assignments({"schema_version": 1, "name": name, "title": bottle.title})
-    return "\n".join([*head, *(line for item in tables.items() for line in table_lines(*item)), ""])
-
-
 def list_kinds() -> list[dict[str, str]]:
     """List the kinds of file with their meaning, and the bundled files for ``--from``."""
     from importlib import resources
@@ -169,10 +151,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     from importlib import resources
 
     from ppafo.documents.toml_text import TomlKind, value_text
-    from ppafo.parameters.bottles.bottle import bottle_parts
 
-    if kind == "bottle" and source is not None and source in bottle_parts():
-        return _bottle_text(source, name)
     templates = resources.files("ppafo.cli") / "templates"
     shipped = resources.files("ppafo").joinpath(*KINDS[kind].shipped.split("/"))
     files = TomlKind(KINDS[kind].noun, _SCHEMAS.get(kind, kind), shipped, DataError)

@@ -53,7 +53,6 @@ QUANTITIES: Mapping[str, Units] = MappingProxyType(
         "length": Units("m", "mm", 1.0e-9),
         "mass": Units("kg", "kg"),
         "mass flow": Units("kg/s", "g/s", 1.0e-12),
-        "part mass": Units("kg", "g"),
         "power": Units("W", "W", 1.0e-9),
         "pressure": Units("Pa_a", "psi_g", 1.0e-4),
         "pressure change": Units("Pa_d", "psi_d", 1.0e-4),
@@ -69,7 +68,7 @@ QUANTITIES: Mapping[str, Units] = MappingProxyType(
     }
 )
 """Display units by kind of quantity."""
-NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
+NAMED = ("gas mass", "body length", "duration", "fraction")
 """Kinds of quantity that share an SI unit with another kind, so that callers must name them."""
 _OF_UNIT = {
     **{units.si: quantity for quantity, units in QUANTITIES.items() if quantity not in NAMED},

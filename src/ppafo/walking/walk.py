@@ -118,7 +118,7 @@ def _simulated(run: Run, progress: Progress) -> BatchResult:
     return block.result()
 
 
-def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = silent) -> BottleLife:
+def bottle_life(scenario: Scenario, schedule: Schedule) -> BottleLife:
     """Walk on the scenario's bottle until the bottle is exhausted; return the time that it lasted.
 
     The simulation is as in ``walk``, with the rests and the longest duration of ``schedule``; a task sequence is
@@ -131,7 +131,7 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
         check_no_bottle(scenario)
     repeated = _repeated_walk(scenario, schedule.longest)
     run, device = plan_walk(repeated), fed_device(repeated)
-    return life_on_bottle(run, device, motion.bottle, motion.gait.stride_time, schedule, progress)
+    return life_on_bottle(run, device, motion.bottle, motion.gait.stride_time, schedule, silent)
 
 
 def _repeated_walk(scenario: Scenario, longest: float) -> Scenario:

@@ -1,1 +1,1 @@
-"""Design of a device for a wearer or for a torque profile."""
+"""Design of a device for a torque profile."""

@@ -1,7 +1,7 @@
 """Duration of a bottle for a gas demand from given numbers, from a recording, or from a walk."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -31,7 +31,7 @@ from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.bottle.supply import BOTTLE_NAME, SET_PRESSURE, is_of_bottle, other_pressure
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
-from ppafo.walking.walk import bottle_life, silent
+from ppafo.walking.walk import bottle_life
 from ppafo.wording import argument_text, override_text
 
 BETWEEN_RESTS = 600.0
@@ -165,12 +165,10 @@ def endurance_of_walk_gas(
     bottle: str | Path | None,
     schedule: Schedule,
     overrides: Iterable[str] = (),
-    progress: Callable[[float, float], None] = silent,
 ) -> Endurance:
     """Return the duration of a bottle for a walk that continues, from the gas demand of the walk.
 
-    ``progress`` is called with the minutes walked and the longest number of minutes. Raises DataError if the walk took
-    no gas or its scenario is unknown.
+    Raises DataError if the walk took no gas or its scenario is unknown.
     """
     at_set_pressure = demand_of_walk(gas)
     if gas.scenario is None:
@@ -185,7 +183,7 @@ def endurance_of_walk_gas(
     supply = walk_of(walking).bottle
     assert supply is not None, "a walk on a bottle"
     check_schedule(schedule)
-    life = bottle_life(walking, schedule, progress)
+    life = bottle_life(walking, schedule)
     # A bottle may end before the first stride does.
     strides = max(life.repeats, 1.0e-9)
     stride_time, mass = life.walked / strides, life.course.regulated / strides

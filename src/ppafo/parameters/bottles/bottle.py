@@ -1,11 +1,5 @@
-"""Gas bottles by name, from bottle files or the catalogue of parts.
+"""Gas bottles by name or file."""
 
-The catalogue of parts states only the gas of a bottle and its mass. All other values are scaled from the paper's bottle
-at the same filling density: volume in proportion to the gas, heat capacity of the wall to the mass, surfaces to the 2/3
-power of the volume.
-"""
-
-import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
@@ -31,46 +25,12 @@ from ppafo.parameters.bottles.declaration import FILLS, PATHS, REQUIRED, SECTION
 from ppafo.parameters.bottles.fluid import Fluid, check_temperature, filled_mass, filling_text, load_fluid
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.parameters.parameter_set import SOURCE, Entry, allowed_number
-from ppafo.parameters.parts import Part, load_catalogue
-from ppafo.parameters.parts.catalogue import Figure
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_text
 from ppafo.wording import changed_text, known_names, nearest_name, said_missing
 
 PAPER_BOTTLE = "paper-co2-9oz"
 FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") / "files", ParameterError)
-
-_SURFACES = ("bottle.content_heat_transfer", "bottle.room_heat_transfer")
-_WALL = 885.0
-"""Wall heat capacity of the paper's bottle per mass [J/(kg K)]: 400 J/K and 452 g."""
-
-
-@functools.cache
-def bottle_parts() -> Mapping[str, Part]:
-    """Return the bottles of the bundled catalogue of parts, by name."""
-    return load_catalogue().groups["bottles"]
-
-
-def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
-    """Return the paper's bottle values scaled to the gas mass [kg] and empty mass [kg] of a catalogue part."""
-    content, empty_mass = part.values["content"], part.values["empty_mass"]
-    # At the same filling density the volume is proportional to the content.
-    ratio = 1000.0 * content / paper["bottle.gas_mass"].value
-    volume, wall = paper["bottle.volume"].value * ratio, _WALL * empty_mass
-    derived = {
-        "bottle.gas_mass": (1000.0 * content, "g", f"catalogue of parts, {part.name}"),
-        "bottle.volume": (volume, "cm^3", "filled as densely as the paper's"),
-        "bottle.wall_heat_capacity": (wall, "J/K", "its empty mass, at 885 J/(kg K) as the paper's"),
-    }
-    # Heat conductances are proportional to the surface of similar bodies.
-    surface = ratio ** (2.0 / 3.0)
-    for path in _SURFACES:
-        value = paper[path].value * surface
-        derived[path] = (value, paper[path].unit, "the paper's bottle, with the surface of its fluid")
-    return dict(paper) | {
-        path: Entry(value=value, unit=unit, origin="derived", source=source)
-        for path, (value, unit, source) in derived.items()
-    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,52 +67,28 @@ class Bottle:
         return ColdSupply(**{name: getattr(self, name) for name in ColdSupply._fields})
 
 
-def is_of_catalogue(name_or_path: str | Path) -> bool:
-    """Return whether a name has the form ``CATALOGUE.toml/PART`` of a part in a catalogue file."""
-    return Path(name_or_path).parent.suffix == ".toml"
-
-
-def _part_of(name_or_path: str | Path) -> Part | None:
-    """Return the catalogue part of a bottle by name or ``CATALOGUE.toml/PART``; None for a bottle with a file."""
-    path = Path(name_or_path)
-    if is_of_catalogue(path):
-        return load_catalogue(path.parent).part("bottles", path.name)
-    # A bottle file has its own walls and regulator; a part of the same name has only a content and a mass.
-    return None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
-
-
 def list_bottles() -> tuple[str, ...]:
-    """Return the names of the bundled bottles: bottle files, and bottles of the catalogue."""
-    return tuple(dict.fromkeys((*FILE.names(), *bottle_parts())))
+    """Return the names of the bundled bottles."""
+    return tuple(FILE.names())
 
 
 def described_bottles() -> list[dict[str, Any]]:
     """Return name and title of each bundled bottle."""
-    titles = {
-        name: f"{part.title}, {1000.0 * part.values['content']:.0f} g, of the catalogue of parts"
-        for name, part in bottle_parts().items()
-    }
-    # A bottle file has its own walls and regulator, and comes before a part of its name.
-    titles |= {name: str(FILE.parse(FILE.read(name), name)["title"]) for name in FILE.names()}
-    return [{"name": name, "title": titles[name]} for name in list_bottles()]
+    return [{"name": name, "title": str(FILE.parse(FILE.read(name), name)["title"])} for name in FILE.names()]
 
 
 def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bottle:
-    """Return a bottle by name, part name or path of a TOML file, with overrides applied.
+    """Return a bottle by name or path of a TOML file, with overrides applied.
 
-    A part of your own catalogue is ``CATALOGUE.toml/PART``. ``overrides`` are texts such as ``bottle.gas_mass=567 g``
-    or ``room.temperature=5 degC``.
+    ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
-    name, bundled, part = label(str(name_or_path)), list_bottles(), _part_of(name_or_path)
+    name, bundled = label(str(name_or_path)), list_bottles()
     if not (name in bundled or Path(name_or_path).suffix == ".toml" or "/" in name):
         raise ParameterError(f"there is no bottle '{name}'{known_names(name, bundled)}, or give a .toml file")
-    # The catalogue does not state all values of a bottle: the others are those of the paper's bottle.
-    parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
+    parsed, file = read_model(FILE, bottle_file(), name_or_path)
+    # A file need not state how its regulator and hose warm the gas: they then do so as the paper's.
     paper = _entries_of(read_model(FILE, bottle_file(), PAPER_BOTTLE)[0])
     entries = {path: paper[path] for path in WARMING} | _entries_of(parsed)
-    if part is not None:
-        parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})
-        entries, file = scaled_entries(part, entries), part.name
     changes = override_set(read_overrides(overrides), forms=FILLS)
     for path, override in changes.items():
         if path not in PATHS:
@@ -243,29 +179,3 @@ def _check_content(bottle: Bottle, file: str) -> None:
             f"{temperature:g} K, but the regulator needs {shown_text(required, 'Pa_a', '.4g', unit=unit)}, the sum of "
             "regulator.set_pressure and regulator.pressure_margin; lower one of them"
         )
-
-
-def bottle_part(name_or_path: str | Path) -> tuple[Part, str]:
-    """Return a bottle as a part with gas mass and empty mass, and the name of its fluid.
-
-    A bottle file states no empty mass: it is computed from the heat capacity of the wall.
-    """
-    bottle, part = load_bottle(name_or_path), _part_of(name_or_path)
-    if part is not None:
-        return part, bottle.fluid.name
-    empty_mass = bottle.wall.wall_heat_capacity / _WALL
-    source = "heat capacity of its wall, at 885 J/(kg K)"
-    figure = Figure(value=1000.0 * empty_mass, unit="g", origin="assumed", source=source)
-    part = Part(
-        name=bottle.name,
-        group="bottles",
-        kind="",
-        maker="",
-        model=bottle.title,
-        document="",
-        note="",
-        figures={"empty_mass": figure},
-        values={"content": bottle.mass, "empty_mass": empty_mass},
-        unknown=(),
-    )
-    return part, bottle.fluid.name

@@ -11,7 +11,7 @@ from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, following_rates
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_density
-from ppafo.parameters.bottles.bottle import Bottle, is_of_catalogue, load_bottle
+from ppafo.parameters.bottles.bottle import Bottle, load_bottle
 from ppafo.parameters.bottles.declaration import PATHS
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
@@ -150,8 +150,8 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
     with refused_as(ParameterError, f"{reading.file}: [{BOTTLE}]", ParameterError):
         name = section["name"]
         path = Path(name)
-        is_file = path.suffix == ".toml" or is_of_catalogue(path)
-        bottle = load_bottle(folder / path if is_file and not path.is_absolute() else name, own)
+        is_file = path.suffix == ".toml" and not path.is_absolute()
+        bottle = load_bottle(folder / path if is_file else name, own)
     pressure, own_pressure = device.supply.pressure, other_pressure(path, bottle, device)
     wrong: list[PpafoError] = []
     if not is_of_bottle(device.gas.molar_mass, bottle):

@@ -1,14 +1,12 @@
 """Files of bottles: those of the package, overrides, and mistakes in one line."""
 
 import re
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
 import pytest
 
 import ppafo
-from ppafo.cli.new import new
 from ppafo.errors import ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
 from ppafo.parameters.bottles.declaration import json_schema
@@ -91,8 +89,8 @@ def test_mistakes_in_a_file_are_named(tmp_path: Path, old: str, new: str, words:
     assert str(caught.value).startswith(str(path))
 
 
-@pytest.mark.parametrize(("name", "near"), [("co2-20o", "co2-20oz"), ("paper-co2-9o", "paper-co2-9oz")])
-def test_the_nearest_name_is_that_of_a_bottle_or_of_a_part(name: str, near: str) -> None:
+@pytest.mark.parametrize(("name", "near"), [("co2-12", "co2-12g"), ("paper-co2-9o", "paper-co2-9oz")])
+def test_the_nearest_name_is_that_of_a_bottle(name: str, near: str) -> None:
     with pytest.raises(ParameterError, match=f"there is no bottle '{name}', did you mean '{near}'"):
         load_bottle(name)
 
@@ -175,15 +173,3 @@ def test_a_file_with_the_mass_or_the_volume_alone_is_told_the_other(tmp_path: Pa
     with pytest.raises(ParameterError) as caught:
         load_bottle(file)
     assert str(caught.value) == f"{file}: {words}"
-
-
-def test_a_bottle_of_the_catalogue_of_parts_is_copied_into_a_file_with_the_same_numbers(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    new("bottle", "mine", source="co2-3_5oz")
-    part, copy = load_bottle("co2-3_5oz"), load_bottle("mine.toml")
-    assert replace(part, name="mine", entries={}) == replace(copy, entries={})
-    assert {path: entry.source for path, entry in part.entries.items()} == {
-        path: entry.source for path, entry in copy.entries.items()
-    }

@@ -273,9 +273,7 @@ def test_a_gas_under_another_name_is_told_its_species(typed: str) -> None:
 
 def test_a_bottle_with_changed_values_says_so_and_one_without_does_not() -> None:
     changes = ["bottle.volume=500 cm^3", "bottle.gas_mass=300 g"]
-    shipped, changed = (
-        endurance(bottle="co2-3_5oz", gas_per_stride="0.4 g", overrides=given) for given in ([], changes)
-    )
+    shipped, changed = (endurance(bottle="co2-88g", gas_per_stride="0.4 g", overrides=given) for given in ([], changes))
     assert "changed" not in f"{shipped.said} {shipped.parts[1].title}"
     assert changed.said[0].endswith("(values changed: bottle.gas_mass=300 g, bottle.volume=500 cm^3)")
-    assert changed.parts[1].title.startswith("co2-3_5oz (values changed): 0.4 g per stride")
+    assert changed.parts[1].title.startswith("co2-88g (values changed): 0.4 g per stride")

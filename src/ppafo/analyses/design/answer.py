@@ -1,5 +1,6 @@
 """Report of a sizing study: valves with pressure and bottle, margins, suggestion, figures to check."""
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -7,13 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.design.profile.problem import SizingProblem
-from ppafo.analyses.design.profile.search import LAGS, LIMITS, Limit, ceiling
-from ppafo.analyses.design.wearer.requirements import REACHED
-from ppafo.analyses.parts.sections import doubts_data, part_titles, parts_to_check
+from ppafo.analyses.design.problem import CandidateValve, SizingProblem
+from ppafo.analyses.design.search import LIMITS, Limit, ceiling
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.documents.json_text import fields_of
-from ppafo.parameters.parts import Part, rated_pressure
+from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.report import finding
 from ppafo.report.finding import Cell, Finding, columns_of
 from ppafo.report.kind import TIME, Kind
@@ -35,7 +34,8 @@ _RING = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "no
 PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
 TORQUE = Kind("Torque", "N m", "torque", ".3g")
 _GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
-_MASS = Kind("Mass", "kg", "part mass")
+REACHED = 0.95
+"""Fraction of a peak torque from which it counts as reached [-]."""
 _MAXIMUM_OF_LIMIT = 4.0
 """Upper end of the error axis divided by the error limit; larger errors are not plotted."""
 _DOTTED = {"marker": ".", "markersize": 4}
@@ -47,15 +47,14 @@ _HEAD = (
     ("gas per repetition", _GAS),
     ("total gas", _GAS),
     "bottle",
-    ("mass", _MASS),
     "limited by",
-    "lag unknown",
 )
 _WHOLE_PEAK = 0.005
 """Largest fraction of the peak torque that may be cut off without a word [-]: half of the last digit of a pressure."""
 _MARGINS = ("error", "torque", "flow", "gas")
 _ORIGINS = {
     "typed": "typed, not measured",
+    "gait": "a share of the ankle moment of a gait",
     "measured": "recorded",
     "simulated": "simulated, not measured",
     "synthetic": "synthetic, not measured",
@@ -65,8 +64,8 @@ _CAPTION = (
     "the chosen pressures."
 )
 _READING = (
-    "The chosen pressure is the lowest with which the lightest bottle suffices; the table also has the lowest pressure "
-    "that keeps the error limit. Of a valve whose lag is unknown, that lag counts as 0: its error is a lower bound.",
+    "The chosen pressure is the lowest with which the smallest bottle suffices; the table also has the lowest pressure "
+    "that keeps the error limit.",
     "Error margin: RMS error below its limit. Torque margin: torque at this pressure above the largest torque of the "
     "profile; below 0 the peak is cut off, as far as the error limit allows. "
     "Flow margin: possible reduction of the opening at a gauge pressure 10 % higher. Gas margin: usable gas in the "
@@ -92,7 +91,7 @@ class SizingMargins:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SizedValve:
-    """Sizing result of a valve, at the supply pressure that keeps the error limit with the lightest bottle.
+    """Sizing result of a valve, at the supply pressure that keeps the error limit with the smallest bottle.
 
     ``works``: False if no pressure keeps the error limit
     ``pressure``: chosen supply pressure [Pa absolute]; if none works, the pressure with the smallest error
@@ -100,14 +99,13 @@ class SizedValve:
     ``gains``: gains of the controller [SI] by path
     ``error``: RMS torque error [N m]
     ``gas``, ``gas_in_all``: gas per repetition and total gas with the reserve [kg]
-    ``bottle``: lightest sufficient bottle; None if none is large enough
-    ``mass``: mass [kg] of valve, bottle, regulators, and actuator if specified
+    ``bottle``: smallest bottle that lasts; None if none does
     ``limit``: quantity that limits the lowest pressure
     ``remark``: note for the reader; empty if there is none
     ``curve``: pressures [Pa absolute], errors [N m] and gas per repetition [kg], with the best gains at each pressure
     """
 
-    valve: Part
+    valve: CandidateValve
     works: bool
     pressure: float
     lowest_pressure: float | None
@@ -115,8 +113,7 @@ class SizedValve:
     error: float
     gas: float
     gas_in_all: float
-    bottle: Part | None
-    mass: float | None
+    bottle: Bottle | None
     margins: SizingMargins | None
     limit: Limit
     remark: str
@@ -125,7 +122,7 @@ class SizedValve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sizing:
-    """Result of a sizing study: every valve, and the index of the lightest valve that works with a bottle.
+    """Result of a sizing study: every valve, and the index of the valve with the smallest bottle.
 
     ``suggested``: index of the suggested valve; None if there is none
     ``recording``: run of the suggested valve on the profile; None without a suggestion
@@ -147,18 +144,10 @@ class Sizing:
         """Sizing result of the suggested valve; None without a suggestion."""
         return None if self.suggested is None else self.valves[self.suggested]
 
-    @property
-    def doubtful(self) -> tuple[tuple[Part, str], ...]:
-        """Quoted or assumed figures of parts on which the sizing rests, as pairs of part and figure name."""
-        bottles = [sized.bottle for sized in self.valves if sized.bottle is not None]
-        parts = *(sized.valve for sized in self.valves), *bottles, *self.problem.carried
-        unique = {(part.group, part.name): part for part in parts}.values()
-        return tuple((part, name) for part in unique for name in part.doubtful)
-
     def json_document(self) -> dict[str, Any]:
         """Return the sized valves and the suggestion as plain data in SI."""
         problem = self.problem
-        found = ("works", "pressure", "lowest_pressure", "error", "gas_in_all", "mass", "remark")
+        found = ("works", "pressure", "lowest_pressure", "error", "gas_in_all", "remark")
         return {
             "format": "ppafo sizing",
             "schema_version": 1,
@@ -188,7 +177,6 @@ class Sizing:
             "noise_streams": self.streams,
             "runs": self.runs,
             "failures": [{"reason": reason, "runs": count} for reason, count in self.failures.items()],
-            "doubtful": doubts_data(self.doubtful),
             "versions": {"ppafo": __version__},
         }
 
@@ -200,7 +188,7 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
     for number, sized in enumerate(sizing.valves):
         pressure, error, gas = sized.curve
         keeps, colour = error <= limit, _COLOURS[number % len(_COLOURS)]
-        errors.append(Mark("line", pressure, error, (), sized.valve.title, colour, _DOTTED))
+        errors.append(Mark("line", pressure, error, (), sized.valve.name, colour, _DOTTED))
         gases.append(Mark("line", pressure[keeps], gas[keeps], colour=colour, style=_DOTTED))
         if sized.works:
             ring = "" if any(mark.label == "chosen pressure" for mark in errors) else "chosen pressure"
@@ -240,15 +228,14 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         f"({_ORIGINS[profile.kind]}{knots}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
         f"at most {TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
     )
-    carried = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
     method = (
-        f"The mass counts valve and full bottle{carried}.",
         f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
-        "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
-        "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
+        "error and gas cover all of them, including the first filling of the chambers. What the file does not say of a "
+        "valve, friction, leak, dead volumes and sensors are the scenario's.",
     )
     failed = sum(sizing.failures.values())
     most = f"; most often: {max(sizing.failures, key=sizing.failures.__getitem__)}" if failed else ""
+    asked = f" --profile {shlex.quote(problem.asked_profile)}" if problem.asked_profile else ""
     noisy = (
         f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; the error is the "
         "largest over the streams, the gas the mean"
@@ -257,7 +244,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         name="design",
         kicker="Sizing study",
         title=problem.name,
-        said=(*([problem.description] if problem.description else []), requirements),
+        said=(*([problem.description] if problem.description and not problem.asked_profile else []), requirements),
         parts=(
             *_tables(sizing),
             finding.Section(
@@ -266,7 +253,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                     *(f"{sized.valve.name}: {sized.remark}" for sized in sizing.valves if sized.remark),
                     *([noisy] if sizing.streams else []),
                     f"{sizing.runs:,} trial runs in {sizing.seconds:.0f} s, {failed:,} of them rejected{most}",
-                    f"made with: ppafo design {problem.file}",
+                    f"made with: ppafo design {problem.file}{asked}",
                 )
             ),
             finding.Section(
@@ -286,9 +273,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(5.8, 2.5),
                 is_detail=True,
             ),
-            *parts_to_check(sizing.doubtful, (*(sized.valve for sized in sizing.valves), *problem.carried)),
             finding.Section("How to read it", said=(*_READING, *method), is_detail=True),
-            part_titles([sized.valve for sized in sizing.valves]),
         ),
         found=sizing,
         passed=sizing.choice is not None,
@@ -303,7 +288,7 @@ def _torque_panels(sizing: Sizing) -> list[Panel]:
     marks = [Mark("line", times, profile, (), "prescribed", REFERENCE.colour, prescribed)]
     recording, choice = sizing.recording, sizing.choice
     if recording is not None and choice is not None:
-        label = f"{choice.valve.title} at {PRESSURE.number(choice.pressure, '.3g')} {PRESSURE.axis_unit}"
+        label = f"{choice.valve.name} at {PRESSURE.number(choice.pressure, '.3g')} {PRESSURE.axis_unit}"
         colour = _COLOURS[sizing.valves.index(choice) % len(_COLOURS)]
         marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
     return [Panel(TIME, TORQUE, marks, then=lambda axes: axes.margins(x=0.0))]
@@ -318,13 +303,12 @@ def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
     units = {f"controller.{quantity.name}": quantity.unit for quantity in quantities}
     for sized in sizing.valves:
         name = sized.valve.name
-        ideal = ", ".join(figure.replace("_", " ") for figure in sized.valve.ideal if figure in LAGS) or "none"
         if not sized.works:
-            rows.append((name, None, None, f"{TORQUE.number(sized.error)} at best", *(None,) * 4, sized.limit, ideal))
+            rows.append((name, None, None, f"{TORQUE.number(sized.error)} at best", *(None,) * 3, sized.limit))
             continue
         bottle, lowest = "none" if sized.bottle is None else sized.bottle.name, sized.lowest_pressure or sized.pressure
         gas = (sized.gas, sized.gas_in_all)
-        rows.append((name, sized.pressure, lowest, sized.error, *gas, bottle, sized.mass, sized.limit, ideal))
+        rows.append((name, sized.pressure, lowest, sized.error, *gas, bottle, sized.limit))
         gains = (
             f"{path.rpartition('.')[2].replace('_', ' ')} {value:.3g} {units[path]}"
             for path, value in sized.gains.items()
@@ -365,9 +349,9 @@ def suggestion_sentence(sizing: Sizing) -> str:
     more = f"for more, lower limits.rms_error below '{TORQUE.text(choice.error)}' (not tried)"
     reaches = f"; reaches {' and '.join(short)} in the simulated run: {more}" if short else ""
     return (
-        f"suggested: {choice.valve.name} at {PRESSURE.text(choice.pressure)}{bottle}, the lightest that lasts "
-        f"and keeps the error limit{_cut_peak(sizing, choice)}, {_MASS.text(choice.mass or 0.0, '.0f')}{reaches}; a "
-        f"lower pressure is prevented by {LIMITS[choice.limit]}"
+        f"suggested: {choice.valve.name} at {PRESSURE.text(choice.pressure)}{bottle}, the smallest that lasts "
+        f"and keeps the error limit{_cut_peak(sizing, choice)}{reaches}; a lower pressure is prevented by "
+        f"{LIMITS[choice.limit]}"
     )
 
 
@@ -377,10 +361,8 @@ def _cut_peak(sizing: Sizing, sized: SizedValve) -> str:
     most = ceiling(problem, sized.pressure)
     if (cut := 1.0 - most / largest) <= _WHOLE_PEAK or np.isnan(sized.error):
         return ""
-    whole, rated = problem.atmosphere + largest / problem.torque_constant, rated_pressure(sized.valve, *problem.carried)
+    whole = problem.atmosphere + largest / problem.torque_constant
     higher = " and a higher pressure.highest" * bool(whole >= problem.highest_pressure)
     needs = f"pressure.lowest = '{PRESSURE.text(whole)}'{higher}"
-    if whole > rated:
-        needs = f"{PRESSURE.text(whole)}, but its parts are rated for {PRESSURE.text(rated)}: name other parts"
     at_most = f"at most {TORQUE.text(most)} of {TORQUE.text(largest)}; the whole peak statically needs {needs}"
     return f", with {100.0 * cut:.0f} % of the peak cut off ({at_most})"

@@ -1,7 +1,8 @@
 """Design file with a torque profile: the profile as a table for a run, and the sizing problem in SI units."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,16 +16,34 @@ from ppafo.control.profiles import KNOTS
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import beside
-from ppafo.errors import DataError, PpafoError, StudyError, UnitError, noted_in, raise_noted, refused_as
+from ppafo.errors import (
+    DataError,
+    ParameterError,
+    PpafoError,
+    StudyError,
+    UnitError,
+    at_fault,
+    noted_in,
+    raise_noted,
+    refused_as,
+)
+from ppafo.gait import load_gait
 from ppafo.loading import reloaded
-from ppafo.parameters.parts import Part, load_catalogue
-from ppafo.parameters.parts.catalogue import DEFAULT, FOR_A_CYLINDER
+from ppafo.parameters.bottles.bottle import Bottle, load_bottle
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.reading import read_recording
 from ppafo.units import parse_quantity, split_quantity
+from ppafo.walking.bottle.supply import is_of_bottle
+from ppafo.wording import known_names
 
+FROM_GAIT = "gait:falisse2019-subject1,mass=72.6 kg,share=0.05"
+"""Example of a profile that is a share of the ankle moment of a wearer with a gait."""
+_GAIT = "gait:"
+_OF_WEARER = ("mass", "share")
+_STRIDE_SAMPLES = 201
+_FOR_A_CYLINDER = "; search supply.pressure by 'ppafo find' with controller.kind=damped_proportional"
 _TORQUE = "N m"
 _ROUNDING = 1.0e-9
 """Fraction of the range of a profile below which a difference counts as rounding."""
@@ -36,7 +55,8 @@ class ProfileSection(StrictTable):
     """Section of a sizing file: torque over one repetition, from a recording or as times and torques."""
 
     recording: Annotated[
-        str | None, Field(description="a .csv or .nc file or a result folder, relative to this file")
+        str | None,
+        Field(description=f"a .csv or .nc file or a result folder, relative to this file; or '{FROM_GAIT}'"),
     ] = None
     channel: Annotated[Text, Field(description="channel of the recording, in N m")] = "torque"
     time: Annotated[Texts, Field(description="times with unit, from 0 on; the profile repeats after the last")] = ()
@@ -49,7 +69,7 @@ class RequiredTorque:
     """Torque profile of one repetition: samples as given, and the table of knots that a run follows.
 
     ``time``, ``torque``: samples as given, times [s] from 0 and torques [N m]
-    ``kind``: origin of the samples: ``measured``, ``simulated``, ``synthetic`` or ``typed``
+    ``kind``: origin of the samples: ``measured``, ``simulated``, ``synthetic``, ``typed`` or ``gait``
     ``knot_times``, ``knot_values``: knots [s], [N m] of the table that a run follows
     """
 
@@ -92,13 +112,16 @@ class RequiredTorque:
 
 
 def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorque:
-    """Read the torque profile of a design file; the path of a recording is relative to ``folder``."""
+    """Read the torque profile of a design file; paths of recordings and gaits are relative to ``folder``."""
     where = f"{file}: profile"
     is_typed = bool(table.time or table.torque)
     if is_typed == (table.recording is not None):
         raise StudyError(f"{where}: give either a recording, or both time and torque")
     if is_typed:
         time, torque, kind = *_profile_of_table(table, where), "typed"
+    elif str(table.recording).startswith(_GAIT):
+        time, torque = torque_of_gait(str(table.recording), folder, where)
+        torque, kind = table.scale * torque, "gait"
     else:
         with refused_as(StudyError, f"{where}.recording", DataError):
             recording = read_recording(folder / str(table.recording))
@@ -120,6 +143,29 @@ def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorq
     if torque[-1] != torque[0]:
         samples = np.append(time[:-1], time[-1] - min(_MOMENT, 0.5 * (time[-1] - time[-2]))), torque
     return RequiredTorque(time, torque, kind, *choose_knots(*samples))
+
+
+def torque_of_gait(text: str, folder: Path, where: str) -> tuple[Floats, Floats]:
+    """Return times [s] and torques [N m] over a stride: the share of a wearer's ankle moment that a text asks for.
+
+    The text has the form of ``FROM_GAIT``: name or file of a gait, body mass of the wearer, share of the ankle moment.
+    Raises StudyError in one line, prefixed with ``where``, for another text.
+    """
+    name, *settings = (part.strip() for part in text.removeprefix(_GAIT).split(","))
+    given = {key.strip(): value.strip() for key, _, value in (setting.partition("=") for setting in settings)}
+    for key in given.keys() - _OF_WEARER:
+        raise StudyError(f"{where}: '{text}': there is no '{key}'{known_names(key, _OF_WEARER)}")
+    if missing := [key for key in _OF_WEARER if key not in given]:
+        raise StudyError(f"{where}: '{text}': {' and '.join(missing)} missing; write for example '{FROM_GAIT}'")
+    with refused_as(StudyError, f"{where}: '{text}'", DataError, UnitError):
+        gait = load_gait(beside(name, folder))
+        mass, share = parse_quantity(given["mass"], "kg"), parse_quantity(given["share"], "")
+        if gait.ankle_moment is None:
+            raise DataError("this gait has no ankle_moment")
+        if not (mass > 0.0 and 0.0 < share <= 1.0):
+            raise DataError("mass must be above 0 kg, share above 0 and at most 1")
+    phases = np.linspace(0.0, 1.0, _STRIDE_SAMPLES)
+    return gait.stride_time * phases, share * mass * gait.ankle_moment.values_at(phases)
 
 
 def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
@@ -157,7 +203,6 @@ def _profile_of_table(table: ProfileSection, where: str) -> tuple[Floats, Floats
     return time, table.scale * torque
 
 
-_Names = Annotated[tuple[Text, ...], Field(strict=False, min_length=1)]
 _Factor = Annotated[float, Field(ge=0.0, le=1000.0)]
 _SECONDS_PER_HOUR = 3600.0
 _LARGEST_DENOMINATOR = 10**6
@@ -181,15 +226,6 @@ class LimitsTable(StrictTable):
     rms_error: Annotated[Text, Field(description="largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")]
 
 
-class SizingPartsTable(StrictTable):
-    """Section of a sizing file: available parts, by their names in the catalogue."""
-
-    valves: Annotated[_Names, Field(description="valves to choose from, of the kind that the scenario has")]
-    bottles: Annotated[_Names, Field(description="bottles to choose from")]
-    actuator: Annotated[str | None, Field(description="actuator; default: the scenario's")] = None
-    regulators: Annotated[Texts, Field(description="regulators that are carried (all of those listed)")] = ()
-
-
 class PressureTable(StrictTable):
     """Section of a sizing file: range of supply pressures; both regulators have the same pressure."""
 
@@ -205,13 +241,16 @@ class SizingFile(StrictTable):
     description: str = ""
     scenario: Annotated[Text, Field(description="device, motion, controller and sensors: a name, or a path")]
     overrides: Annotated[Texts, Field(description="changes to the scenario")] = ()
-    catalogue: Annotated[str, Field(description="catalogue of parts: a name, or a path relative to this file")] = (
-        DEFAULT
-    )
+    bottles: Annotated[
+        Texts, Field(min_length=1, description="bottles to choose from: names, or paths relative to this file")
+    ]
     profile: ProfileSection
     use: UseTable
     limits: LimitsTable
-    parts: SizingPartsTable
+    valves: Annotated[
+        dict[str, dict[str, Text]],
+        Field(min_length=1, description="valves to choose from: by name, the values that the scenario's valve lacks"),
+    ]
     pressure: PressureTable = PressureTable()
     gain_factors: Annotated[
         tuple[_Factor, ...],
@@ -227,10 +266,19 @@ class SizingFile(StrictTable):
     ] = 3
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CandidateValve:
+    """Valve to choose from: its name, and its numbers by path [SI], such as ``valve.area``."""
+
+    name: str
+    numbers: Mapping[str, float]
+
+
 @dataclass(frozen=True, slots=True)
 class SizingProblem:
-    """Sizing problem in SI units: torque profile, scenario, available parts and limits.
+    """Sizing problem in SI units: torque profile, scenario, valves and bottles to choose from, and limits.
 
+    ``asked_profile``: profile given in place of the file's; empty for the file's own
     ``scenario``: scenario that follows the profile for ``simulated`` repetitions
     ``repetitions``: number of repetitions that one bottle must supply
     ``reserve``: fraction of the gas to be left in the bottle [-]
@@ -249,14 +297,13 @@ class SizingProblem:
     repetitions: float
     reserve: float
     largest_error: float
-    valves: tuple[Part, ...]
-    bottles: tuple[Part, ...]
-    actuator: Part | None
-    regulators: tuple[Part, ...]
+    valves: tuple[CandidateValve, ...]
+    bottles: tuple[Bottle, ...]
     lowest_pressure: float
     highest_pressure: float
     gains: tuple[str, ...]
     gain_factors: tuple[float, ...]
+    asked_profile: str = ""
 
     @property
     def atmosphere(self) -> float:
@@ -266,13 +313,7 @@ class SizingProblem:
     @property
     def torque_constant(self) -> float:
         """Torque constant of the actuator [m^3]."""
-        constant = self.scenario.device.actuator.torque_constant
-        return constant if self.actuator is None else self.actuator.values["torque_constant"]
-
-    @property
-    def carried(self) -> tuple[Part, ...]:
-        """Parts that a wearer carries in addition to valve and bottle."""
-        return self.regulators if self.actuator is None else (*self.regulators, self.actuator)
+        return self.scenario.device.actuator.torque_constant
 
     @property
     def hours(self) -> float:
@@ -280,45 +321,42 @@ class SizingProblem:
         return self.repetitions * self.profile.period / _SECONDS_PER_HOUR
 
 
-def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProblem:
+def sizing_problem(document: SizingFile, file: str, folder: Path, asked_profile: str = "") -> SizingProblem:
     """Return the sizing problem of a design file with a torque profile.
 
-    ``file`` is the name used in error messages; paths are relative to ``folder``.
+    ``file`` is the name used in error messages; paths are relative to ``folder``, those of ``asked_profile``, which
+    replaces the profile of the file, to the working directory.
     """
-    parts, wrong = document.parts, list[PpafoError]()
-    # A part that is named twice is one choice, but two regulators that are carried.
-    named = {"valves": tuple(dict.fromkeys(parts.valves)), "bottles": tuple(dict.fromkeys(parts.bottles))}
-    named |= {"regulators": parts.regulators, "actuators": () if parts.actuator is None else (parts.actuator,)}
-    chosen: dict[str, list[Part]] = {group: [] for group in named}
-    with noted_in(wrong):
-        catalogue = load_catalogue(beside(document.catalogue, folder))
-        for group, name in [(group, name) for group, names in named.items() for name in names]:
-            with noted_in(wrong):
-                # A catalogue that lacks a group is completed by that of the package.
-                source = catalogue if catalogue.groups[group] else load_catalogue()
-                chosen[group].append(source.part(group, name))
+    wrong, valves, bottles = list[PpafoError](), list[CandidateValve](), list[Bottle]()
     atmosphere, largest, pressures = STANDARD_ATMOSPHERE, 1.0, []
     with noted_in(wrong):
-        profile = read_profile(document.profile, folder, file)
+        if asked_profile:
+            with at_fault("profile"):
+                profile = read_profile(ProfileSection(recording=asked_profile), Path(), file)
+        else:
+            profile = read_profile(document.profile, folder, file)
         largest = profile.largest
     with noted_in(wrong):
         plain = load_scenario(beside(document.scenario, folder), document.overrides)
-        atmosphere, kind = plain.device.supply.atmospheric_pressure, plain.device.valve.kind
-        wrong += [
-            StudyError(
-                f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve, but scenario '{plain.name}' "
-                f"needs a {kind} valve; name it in a second file, with scenario = 'torque-task-"
-                f"{valve.kind.partition('_')[0]}' and overrides = ['device.valve={valve.kind}']"
-            )
-            for valve in chosen["valves"]
-            if valve.kind != kind
-        ]
-        plain.device.check_torque_constant("the size of a device", f"; {FOR_A_CYLINDER}")
+        atmosphere = plain.device.supply.atmospheric_pressure
+        plain.device.check_torque_constant("the size of a device", _FOR_A_CYLINDER)
         if plain.controller.is_open_loop:
             raise StudyError(
                 f"{file}: scenario '{plain.name}' has no reference (controller.kind = "
                 f"'{plain.controller.kind}'); choose a scenario with a reference"
             )
+        for name, values in document.valves.items():
+            with noted_in(wrong), refused_as(StudyError, f"{file}: valves.{name}", PpafoError):
+                valve = reloaded(plain, [f"valve.{key}={value}" for key, value in values.items()]).device.valve
+                numbers = {**asdict(valve.orifice), **valve.settings}
+                valves.append(CandidateValve(name, {f"valve.{key}": value for key, value in numbers.items()}))
+        for name in dict.fromkeys(document.bottles):
+            with noted_in(wrong), refused_as(StudyError, f"{file}: bottles", ParameterError):
+                bottle = load_bottle(beside(name, folder))
+                if not is_of_bottle(plain.device.gas.molar_mass, bottle):
+                    gas = f"contains {bottle.fluid.name}, but the device uses {plain.device.gas.species}"
+                    raise ParameterError(f"'{name}' {gas}: choose another, or set gas.species in overrides")
+                bottles.append(bottle)
     with noted_in(wrong):
         for key, text in (("lowest", document.pressure.lowest), ("highest", document.pressure.highest)):
             with refused_as(StudyError, f"{file}: pressure.{key} = '{text}'", UnitError):
@@ -359,12 +397,11 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
         repetitions=float(use.repetitions or _SECONDS_PER_HOUR * float(use.hours or 0.0) / profile.period),
         reserve=use.reserve,
         largest_error=largest_error,
-        valves=tuple(chosen["valves"]),
-        bottles=tuple(chosen["bottles"]),
-        actuator=next(iter(chosen["actuators"]), None),
-        regulators=tuple(chosen["regulators"]),
+        valves=tuple(valves),
+        bottles=tuple(sorted(bottles, key=lambda bottle: bottle.mass)),
         lowest_pressure=pressures[0],
         highest_pressure=pressures[1],
         gains=gains,
         gain_factors=tuple(sorted(set(document.gain_factors))) if gains else (1.0,),
+        asked_profile=asked_profile,
     )

@@ -2,18 +2,18 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ppafo.analyses.design.profile.answer import PRESSURE, TORQUE, SizedValve, Sizing, SizingMargins
-from ppafo.analyses.design.profile.problem import SizingProblem
-from ppafo.analyses.design.profile.search import (
+from ppafo.analyses.design.answer import PRESSURE, TORQUE, SizedValve, Sizing, SizingMargins
+from ppafo.analyses.design.problem import CandidateValve, SizingProblem
+from ppafo.analyses.design.search import (
     LAGS,
     Trials,
     ceiling,
     first_of,
     flow_margin,
-    highest_pressure,
     limit_of,
     try_pressures,
     works_in,
@@ -22,12 +22,12 @@ from ppafo.analyses.endurance.discharge import TIME_IS_UP
 from ppafo.analyses.endurance.gas_demand import demand_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.errors import ParameterError
-from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
-from ppafo.parameters.parts import Part
+from ppafo.model.catalog import VALVES
+from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
-from ppafo.units.shown import in_units
+from ppafo.units.shown import in_units, written_text
 from ppafo.walking.bottle.coupling import Schedule
 
 _LONG_PERIOD = 5.0
@@ -46,9 +46,9 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
         elapsed = time.perf_counter() - started
         report(Progress(f"trying {valve.name}", count, len(problem.valves), 0, 0, elapsed, "valves"))
         sized.append(_size_valve(trials, valve))
-    working = [row for row, valve in enumerate(sized) if valve.works and valve.mass is not None]
-    # Of valves with the same bottle and mass the one at the lowest pressure.
-    suggested = min(working, key=lambda row: (sized[row].mass, sized[row].pressure), default=None)
+    working = {row: valve.bottle.mass for row, valve in enumerate(sized) if valve.works and valve.bottle is not None}
+    # Of valves with the same bottle the one that uses least gas.
+    suggested = min(working, key=lambda row: (working[row], sized[row].gas), default=None)
     recording = None
     if suggested is not None:
         choice = sized[suggested]
@@ -59,15 +59,14 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
     return Sizing(problem, tuple(sized), suggested, recording, trials.runs, failures, seconds, trials.seeds.size)
 
 
-def smallest_bottle(bottles: Sequence[Part], gas: float) -> Part | None:
-    """Return the lightest full bottle that contains a mass of gas [kg]; None if there is none."""
-    enough = [bottle for bottle in bottles if bottle.values["content"] >= gas]
-    return min(enough, key=lambda bottle: bottle.full_mass, default=None)
+def smallest_bottle(bottles: Sequence[Bottle], gas: float) -> Bottle | None:
+    """Return the smallest bottle that contains a mass of gas [kg]; None if there is none."""
+    return min((bottle for bottle in bottles if bottle.mass >= gas), key=lambda bottle: bottle.mass, default=None)
 
 
 @in_units(lambda trials, _valve: trials.problem.scenario.device.shown)
-def _size_valve(trials: Trials, valve: Part) -> SizedValve:
-    """Return a valve sized at the pressure with the lightest bottle, or at the smallest error if no pressure works."""
+def _size_valve(trials: Trials, valve: CandidateValve) -> SizedValve:
+    """Return a valve sized at the pressure with the smallest bottle, or at the smallest error if no pressure works."""
     problem = trials.problem
     tried = try_pressures(trials, valve)
     works = works_in(problem, tried)
@@ -78,26 +77,23 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         # The smallest error; argmin would take a failed run, whose error is nan.
         chosen = int(np.argmin(np.where(np.isnan(tried["error"]), np.inf, tried["error"])))
     else:
-        # The lightest bottle at the lowest pressure; without any bottle, the lowest pressure that works.
-        full = [np.inf if bottle is None else bottle.full_mass for bottle in bottles]
+        # The smallest bottle at the lowest pressure; without any bottle, the lowest pressure that works.
+        full = [np.inf if bottle is None else bottle.mass for bottle in bottles]
         masses = np.where(works, full, np.inf)
         chosen = int(np.argmin(masses)) if np.isfinite(masses).any() else lowest
     pressure, error, gas, gains = tried[chosen].tolist()
     gas_in_all = float(in_all[chosen])
     bottle, is_cold, remarks = None, False, []
-    if lowest is None:
-        if (rated := highest_pressure(problem, valve)) < problem.highest_pressure:
-            remarks.append(f"not tried above {PRESSURE.text(rated)}, the rated pressure of its parts")
-    else:
+    if lowest is not None:
         bottle, is_cold = _lasting_bottle(problem, gas, gas_in_all, pressure)
         if (failing := np.flatnonzero(~works[lowest:])).size:
             text = PRESSURE.text(float(tried["pressure"][lowest + failing[0]]))
             remarks.append(f"at {text} the error limit is exceeded again")
     if is_cold:
-        remarks.append(f"a{' lighter' * (bottle is not None)} bottle has enough gas, but gets too cold before the end")
+        remarks.append(f"a{' smaller' * (bottle is not None)} bottle has enough gas, but gets too cold before the end")
     if lowest is not None and bottles[chosen] is None:
-        largest = max(problem.bottles, key=lambda part: part.values["content"])
-        share = largest.values["content"] / gas_in_all
+        largest = problem.bottles[-1]
+        share = largest.mass / gas_in_all
         duration = f"lasts for {100.0 * share:.0f} % of the use, {share * problem.repetitions:.0f} repetitions"
         remarks.append(f"no bottle is large enough: {largest.name} {duration}")
     gas_used = gas * problem.repetitions
@@ -107,15 +103,16 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
             error=1.0 - error / problem.largest_error,
             torque=ceiling(problem, pressure) / problem.profile.largest - 1.0,
             flow=flow_margin(trials, valve, pressure, gains),
-            gas=None if bottle is None or gas_used <= 0.0 else bottle.values["content"] / gas_used - 1.0,
+            gas=None if bottle is None or gas_used <= 0.0 else bottle.mass / gas_used - 1.0,
         )
     columns = trials.columns(valve, np.array([pressure]), np.array([gains]), np.ones(1))
     limit = limit_of(trials, valve, tried)
     if lowest is None and limit == "control":
+        quantities = {f"valve.{item.name}": item for item in VALVES[problem.scenario.device.valve.kind].quantities}
         lags = [
-            f"{name.replace('_', ' ')} {part.value:g} {part.unit}"
-            for name, part in valve.figures.items()
-            if name in LAGS
+            f"{quantities[path].name.replace('_', ' ')} {written_text(number, quantities[path].unit)}"
+            for path, number in valve.numbers.items()
+            if path in LAGS and number > 0.0
         ]
         period = 1.0e3 * problem.scenario.controller.period
         slow = [f"the valve has {', '.join(lags)}"] if lags else []
@@ -135,7 +132,6 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         gas=gas,
         gas_in_all=gas_in_all,
         bottle=bottle,
-        mass=None if bottle is None else sum(part.full_mass for part in (valve, bottle, *problem.carried)),
         margins=margins,
         limit=limit,
         remark="; ".join(remarks),
@@ -143,31 +139,26 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     )
 
 
-def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure: float) -> tuple[Part | None, bool]:
-    """Return the lightest bottle that lasts, and whether a lighter bottle with enough gas gets too cold.
+def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure: float) -> tuple[Bottle | None, bool]:
+    """Return the smallest bottle that lasts, and whether a smaller bottle with enough gas gets too cold.
 
     The profile is repeated without a pause and takes ``gas`` [kg] per repetition, ``in_all`` [kg] in total with the
     reserve, downstream of a regulator set to ``pressure`` [Pa absolute].
     """
     if gas <= 0.0:
         return smallest_bottle(problem.bottles, in_all), False
-    enough = [bottle for bottle in problem.bottles if bottle.values["content"] >= in_all]
-    period, paper = problem.profile.period, load_bottle(PAPER_BOTTLE)
+    enough = [bottle for bottle in problem.bottles if bottle.mass >= in_all]
+    period = problem.profile.period
     duration = problem.repetitions * period
     # A second more than the use, so that a bottle that lasts is one whose time is up.
     schedule = Schedule(duration + 1.0, 0.0, max(duration, 1.0))
-    for number, part in enumerate(sorted(enough, key=lambda bottle: bottle.full_mass)):
-        changes = [
-            f"{path}={entry.value} {entry.unit}"
-            for path, entry in scaled_entries(part, paper.entries).items()
-            if entry != paper.entries.get(path)
-        ]
-        full = load_bottle(PAPER_BOTTLE, [*changes, f"regulator.set_pressure={pressure} SI"])
+    for number, bottle in enumerate(enough):
+        full = replace(bottle, regulator=bottle.regulator._replace(set_pressure=pressure))
         try:
             ended = follow_bottle(full, demand_of_numbers(gas, period, None), schedule).discharge.ending.kind
         except ParameterError:
             # Its regulator does not pass the flow even when it is full.
             continue
         if ended == TIME_IS_UP:
-            return part, number > 0
+            return bottle, number > 0
     return None, bool(enough)

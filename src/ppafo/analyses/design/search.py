@@ -13,12 +13,11 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.analyses.design.profile.problem import SizingProblem
+from ppafo.analyses.design.problem import CandidateValve, SizingProblem
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.torque_loop import PROPORTIONAL_GAIN
 from ppafo.errors import StudyError
-from ppafo.parameters.parts import Part, rated_pressure
 from ppafo.signals.recording import Floats
 from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.ensemble import run_ensemble
@@ -57,8 +56,9 @@ WIDER = (2.0, 4.0, 16.0)
 """Factors [-] on the valve opening that show whether the flow is the limit."""
 NEAR_CEILING = 1.2
 """Ratio [-] of lowest gauge pressure to ceiling gauge pressure up to which the torque counts as the limit."""
-LAGS = {"delay", "spool_frequency", "slew_limit", "opening_delay", "closing_delay", "switching_interval"}
-"""Figures of a valve that moves late or slowly; without them it moves at once."""
+_LAGS = ("delay", "spool_frequency", "slew_limit", "opening_delay", "closing_delay", "switching_interval")
+LAGS = {f"valve.{name}" for name in _LAGS}
+"""Numbers of a valve that moves late or slowly; at 0 it moves at once."""
 LEAST_PEAK = 0.7
 """Required share of the peak torque [-]: the RMS error over a mostly zero stride alone would accept half the peak."""
 MORE_PRESSURE = 1.1
@@ -98,7 +98,7 @@ class Trials:
         self.seeds = seeds_of_noise([problem.scenario], (), 0, STREAMS, _SEED)
         self._threads = threads
 
-    def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
+    def run(self, valve: CandidateValve, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
         """Run trials of a valve at supply pressures [Pa absolute].
 
         Each trial has an index of a gain set in ``gains`` and a factor on the valve opening in ``opening`` [-].
@@ -126,7 +126,7 @@ class Trials:
         trial["error"], trial["gas"] = error.max(axis=0), gas.mean(axis=0) / self.problem.simulated
         return trial
 
-    def best(self, valve: Part, pressure: Floats, opening: float = 1.0, like: int = 0) -> Trial:
+    def best(self, valve: CandidateValve, pressure: Floats, opening: float = 1.0, like: int = 0) -> Trial:
         """Return for each pressure the trial with the best set of gains at the scale of the gain set ``like``.
 
         The best set uses the least gas of all sets that keep the error limit; if no set keeps the limit, it has the
@@ -142,18 +142,17 @@ class Trials:
         chosen = np.where(works.any(axis=1), gas.argmin(axis=1), error.argmin(axis=1))
         return np.asarray(trial[np.arange(pressure.size), chosen])
 
-    def columns(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
-        """Return the columns of trials in SI: figures of the parts, both supply pressures, gains.
+    def columns(
+        self, valve: CandidateValve, pressure: Floats, gains: NDArray[np.intp], opening: Floats
+    ) -> dict[str, Floats]:
+        """Return the columns of trials in SI: numbers of the valve, both supply pressures, gains.
 
-        The gains of the scenario fit its own device. For other parts and pressures they are scaled, so that the ratio
+        The gains of the scenario fit its own device. For other valves and pressures they are scaled, so that the ratio
         to the gains of the rules in ``control.torque_loop`` stays the same.
         """
         problem, count = self.problem, pressure.size
-        columns = {path: np.full(count, number) for path, number in valve.model_numbers.items()}
+        columns = {path: np.full(count, number) for path, number in valve.numbers.items()}
         columns |= {path: columns[path] * opening for path in _OPENINGS if path in columns}
-        if problem.actuator is not None:
-            for name in ("torque_constant", "displacement_per_radian"):
-                columns[f"actuator.{name}"] = np.full(count, problem.actuator.values[name])
         columns |= {"supply.pressure": pressure, "supply.dorsiflexion_pressure": pressure}
         settings = problem.scenario.controller.settings
         gain_ratio = self.rule_gain(columns) / self.rule_gain({}) if problem.gains else 1.0
@@ -173,18 +172,13 @@ class Trials:
         return term.number(lambda path: columns[path] if path in columns else number_at(scenario, path))
 
 
-def highest_pressure(problem: SizingProblem, valve: Part) -> float:
-    """Return the highest pressure [Pa absolute] to try: limit of the file, or rated pressure of the parts."""
-    return min(problem.highest_pressure, rated_pressure(valve, *problem.carried))
-
-
-def try_pressures(trials: Trials, valve: Part) -> Trial:
+def try_pressures(trials: Trials, valve: CandidateValve) -> Trial:
     """Search the lowest feasible pressure of a valve to 0.1 psi; returns the best trial at each pressure tried.
 
     Gains of the next scale are tried unless the torque or the requested range limits the valve.
     """
     problem, best, reached = trials.problem, None, (np.inf, np.inf)
-    pressures = np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID)
+    pressures = np.linspace(problem.lowest_pressure, problem.highest_pressure, GRID)
     for first in range(0, len(trials.gain_sets), trials.combinations):
         tried = trials.best(valve, pressures, like=first)
         while lowest := first_of(works_in(problem, tried)):
@@ -216,7 +210,7 @@ def first_of(members: NDArray[np.bool_]) -> int | None:
     return int(members.argmax()) if members.any() else None
 
 
-def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
+def limit_of(trials: Trials, valve: CandidateValve, tried: Trial) -> Limit:
     """Return the quantity that limits a valve at lower pressures, or at every pressure if no pressure is feasible.
 
     The limit is the torque if the lowest feasible pressure is near ``ceiling_pressure``. Otherwise a valve without lag,
@@ -228,8 +222,8 @@ def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
         return known
     first = first_of(works_in(problem, tried))
     pressure = np.array([0.5 * (float(tried["pressure"][-1 if first is None else first]) + ceiling_pressure(problem))])
-    at_once = replace(valve, values={name: valve.values[name] for name in valve.values.keys() - LAGS})
-    is_slow = at_once.values != valve.values
+    at_once = replace(valve, numbers={**valve.numbers, **dict.fromkeys(LAGS & valve.numbers.keys(), 0.0)})
+    is_slow = at_once.numbers != valve.numbers
     for part, opening in [(at_once, 1.0)] * is_slow + [(valve, wider) for wider in WIDER]:
         for first in range(0, len(trials.gain_sets), trials.combinations):
             if trials.best(part, pressure, opening, first)["error"][0] <= problem.largest_error:
@@ -282,7 +276,7 @@ def ceiling(problem: SizingProblem, pressure: float) -> float:
     return problem.torque_constant * (pressure - problem.atmosphere)
 
 
-def flow_margin(trials: Trials, valve: Part, pressure: float, like: int) -> float:
+def flow_margin(trials: Trials, valve: CandidateValve, pressure: float, like: int) -> float:
     """Return the possible reduction of the opening [-] at a gauge pressure one tenth higher, with the best gains.
 
     Gains have the scale of the gain set ``like``. At the lowest feasible pressure itself no reduction is possible.

@@ -1,1 +1,0 @@
-"""Smallest valve, pressure and bottle that suffice for a torque profile."""

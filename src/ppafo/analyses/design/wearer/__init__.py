@@ -1,1 +1,0 @@
-"""Lightest parts with which a wearer walks for a required time on one bottle."""

@@ -1,1 +1,0 @@
-"""Catalogue of real parts with the source of each figure."""
