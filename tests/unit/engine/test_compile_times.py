@@ -15,7 +15,6 @@ from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
 from ppafo.engine.compilers import Effort
 from ppafo.engine.lanes import Batch, effort_for
-from ppafo.errors import ProgramError
 from ppafo.golden_bits import plain_batch
 from tests.compilers_here import ScriptCompiler
 
@@ -25,29 +24,6 @@ QUICK = "answer = {}\n"
 @pytest.fixture(autouse=True)
 def _soon(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(making, "QUIET", 0.05)
-
-
-def test_nothing_is_said_of_what_is_quick(caplog: pytest.LogCaptureFixture) -> None:
-    with announce("kept"):
-        pass
-    time.sleep(0.1)
-    assert caplog.messages == []
-
-
-def test_what_takes_longer_is_said_while_it_runs_and_at_its_end(caplog: pytest.LogCaptureFixture) -> None:
-    with announce("kept in a folder"):
-        time.sleep(0.2)
-        assert caplog.messages == ["ppafo: compiling a model for this computer ..."]
-    assert len(caplog.messages) == 2
-    assert caplog.messages[1].startswith("ppafo: compiled in 0.")
-    assert caplog.messages[1].endswith(" s, kept in a folder")
-
-
-def test_what_fails_is_no_longer_announced(caplog: pytest.LogCaptureFixture) -> None:
-    with pytest.raises(KeyboardInterrupt), announce("kept"):
-        raise KeyboardInterrupt
-    time.sleep(0.1)
-    assert caplog.messages == []
 
 
 def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_message(
@@ -70,16 +46,6 @@ def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_mess
     assert caplog.messages[:1] == ["ppafo: compiling 2 models for this computer ..."]
     assert len(caplog.messages) == 2
     assert len(list_programs(fresh_cache)) == 3
-
-
-@pytest.mark.usefixtures("fresh_cache")
-def test_a_model_that_cannot_be_compiled_beside_others_is_an_error() -> None:
-    def fail(_source: str, _effort: Effort) -> None:
-        raise ProgramError("no")
-
-    sources = [QUICK.format(time.time() + number) for number in range(2)]
-    with pytest.raises(ProgramError, match="no"):
-        load_all([(source, Effort.FULL) for source in sources], ScriptCompiler(), fail)
 
 
 def test_a_quick_program_is_made_only_where_the_full_one_is_not_kept(

@@ -6,11 +6,7 @@ import sys
 import time
 from pathlib import Path
 
-import pytest
-
-from ppafo.engine.cache import making as lock
 from ppafo.engine.cache.folder import LOCK
-from ppafo.engine.cache.making import one_process
 from ppafo.engine.cache.programs import load_generated
 from tests.compilers_here import ScriptCompiler
 
@@ -65,21 +61,3 @@ def test_killed_process_holds_no_lock(fresh_cache: Path, tmp_path: Path) -> None
     finally:
         del os.environ["SEEN"]
     assert time.monotonic() - begin < 30.0
-
-
-def test_process_that_waits_too_long_goes_on_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lock, "LONGEST_WAIT", 0.2)
-    with one_process(tmp_path / "program"):
-        begin = time.monotonic()
-        with one_process(tmp_path / "program"):
-            assert 0.1 < time.monotonic() - begin < 20.0
-        assert list(tmp_path.glob(f"{LOCK}*"))
-    assert not list(tmp_path.iterdir())
-
-
-def test_lock_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
-    (tmp_path / f"{LOCK}program").mkdir()
-    for place in (tmp_path / "program", tmp_path / "absent" / "program"):
-        with one_process(place):
-            pass
-    assert [item.name for item in tmp_path.iterdir()] == [f"{LOCK}program"]

@@ -18,7 +18,6 @@ from ppafo.engine.entries import (
     HEADER,
     INT,
     entry_text,
-    entry_types,
     with_arrays,
 )
 from ppafo.translation.native_entries import NativeEntry
@@ -66,11 +65,6 @@ def library(x: Vector, y: Vector, found: Table) -> None:
         found[1, place] = math.log(x[place])
         found[2, place] = x[place] ** y[place]
         found[3, place] = math.exp(-2.5) * x[place]
-
-
-def test_types_of_an_entry_are_read_from_its_text() -> None:
-    text = HEADER + entry_text("show", {"x": ARRAY_2D, "y": ARRAY, "time": FLOAT, "count": INT}, ["y[0] = time"])
-    assert entry_types(text) == {"show": [ARRAY_2D, ARRAY, FLOAT, INT]}
 
 
 @pytest.mark.parametrize("is_packed", [False, True])

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from ppafo.engine.groups import Role, check_rows, filled, given, handed, merged
+from ppafo.engine.groups import Role, check_rows, filled
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import is_row
 from ppafo.engine.step.lane import Lane, NoParameters
@@ -69,8 +69,3 @@ def test_a_block_with_a_row_too_few_is_refused_before_it_is_run() -> None:
     ):
         run_batch(replace(batch, parameters=batch.parameters[:-1]))
     check_rows(1, {"mine": Mine}, Role.STATE)
-
-
-def test_two_components_with_a_group_of_one_name_are_refused() -> None:
-    with pytest.raises(ProgramError, match="two components of a program define the group 'mine'"):
-        merged({"mine": given(Mine)}, {"mine": handed(Other)})

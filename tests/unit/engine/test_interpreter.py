@@ -1,9 +1,7 @@
 """Python runs the functions of the step as they are: the reference for the bits of every compiler."""
 
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,6 @@ from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
-from ppafo.engine.step import phases
 from ppafo.golden_bits import digest
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -58,21 +55,3 @@ def test_operations_that_go_on_give_what_processors_give() -> None:
     assert np.isnan(quotient(0.0, 0.0))
     assert quotient(1.0, 3.0) == 1.0 / 3.0
     assert (whole_part(2.9), whole_part(-2.9), whole_part(float("nan"))) == (2, -2, -(2**63))
-
-
-def test_a_debugger_stops_in_a_phase(monkeypatch: pytest.MonkeyPatch) -> None:
-    batch = short(scenario_batch("torque-task-proportional"), 1)
-    stopped: list[str] = []
-
-    def trace(frame: FrameType, event: str, _given: Any) -> Any:
-        if frame.f_code is phases.open_valve.__code__ and event == "call":
-            stopped.append(frame.f_code.co_filename)
-        return None
-
-    before = sys.gettrace()
-    sys.settrace(trace)
-    try:
-        by_python(batch, monkeypatch)
-    finally:
-        sys.settrace(before)
-    assert stopped == [phases.__file__]

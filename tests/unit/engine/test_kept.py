@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.engine.cache.folder import TEXTS
 from ppafo.engine.cache.texts import kept_bytes
-from ppafo.engine.cache.tidying import clear, list_texts
+from ppafo.engine.cache.tidying import clear
 
 
 class Maker:
@@ -47,24 +47,6 @@ def test_what_is_damaged_is_made_anew_and_kept_again(fresh_cache: Path, place: i
     assert kept_bytes("text", "a program", make) == make.content
     assert kept_bytes("text", "a program", make) == make.content
     assert make.times == 2
-
-
-@pytest.mark.parametrize("content", [b"", b"short"])
-def test_a_file_without_its_hash_is_not_read(fresh_cache: Path, content: bytes) -> None:
-    make = Maker()
-    kept_bytes("text", "a program", make)
-    only_file(fresh_cache).write_bytes(content)
-    assert kept_bytes("text", "a program", make) == b"made"
-    assert make.times == 2
-
-
-def test_nothing_is_left_of_what_could_not_be_made(fresh_cache: Path) -> None:
-    def fail() -> bytes:
-        raise ValueError("it cannot be made")
-
-    with pytest.raises(ValueError, match="cannot be made"):
-        kept_bytes("text", "a program", fail)
-    assert not (fresh_cache / TEXTS).exists()
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders have no owners here")
@@ -109,26 +91,3 @@ def test_what_was_not_used_for_long_goes_and_what_was_used_stays(fresh_cache: Pa
     assert before.isdisjoint((fresh_cache / TEXTS).iterdir())
     kept_bytes("text", "used", used)
     assert used.times == 1
-
-
-def test_the_largest_size_is_kept_by_removing_what_was_used_first(
-    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("ppafo.engine.cache.texts.MAXIMUM_BYTES", 1000)
-    for number in range(6):
-        kept_bytes("text", f"program {number}", Maker(bytes(300)))
-    assert sum(text.size for text in list_texts(fresh_cache)) <= 1000
-    last = Maker()
-    kept_bytes("text", "program 5", last)
-    assert last.times == 0
-
-
-def test_clearing_removes_it_and_leaves_what_others_put_there(fresh_cache: Path) -> None:
-    kept_bytes("text", "a program", Maker())
-    theirs = fresh_cache / TEXTS / "notes.txt"
-    theirs.write_text("mine")
-    assert clear(fresh_cache) == sum(map(len, [b"made"])) + 32
-    assert list((fresh_cache / TEXTS).iterdir()) == [theirs]
-    theirs.unlink()
-    clear(fresh_cache)
-    assert not (fresh_cache / TEXTS).exists()

@@ -5,9 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lanes import Batch, LaneBlock, begin_block, run_batch
-from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
+from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together, state_row_numbers
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -117,41 +115,11 @@ def test_recording_changes_no_bit_of_the_final_state() -> None:
     assert np.array_equal(run_batch(batch_of(run)).states, run_batch(batch_of(silent)).states)
 
 
-def test_last_record_is_the_final_state_and_the_first_is_the_initial_one() -> None:
-    run = different_runs("step-response", 1)[0]
-    batch = batch_of(run)
-    result = run_batch(batch)
-    assert np.array_equal(result.record[-1], result.states)
-    assert result.record[0, state_row_numbers(run)["state.angle"], 0] == run.initial.angle
-
-
 def test_runs_of_different_programs_and_clocks_can_be_asked_for_together() -> None:
     runs = [different_runs(name, 2)[1] for name in NAMES]
     together = run_together(runs)
     for run, result in zip(runs, together, strict=True):
         assert np.array_equal(result.record, run_batch(batch_of(run)).record)
-
-
-def test_lane_that_fails_does_not_disturb_its_neighbours() -> None:
-    runs = different_runs("step-response", 3)
-    broken = dataclasses.replace(runs[1], initial=runs[1].initial._replace(mass_1=-1e-5))
-    results = run_together([runs[0], broken, runs[2]])
-    assert results[1].states[1, 0] < 1.0, "the broken run reports the time of its failure"
-    assert np.array_equal(results[2].record, run_batch(batch_of(runs[2])).record)
-
-
-def test_batch_is_plain_data_of_rows_and_runs() -> None:
-    run = different_runs("torque-task-solenoid", 1)[0]
-    batch = batch_of(run)
-    assert isinstance(batch, Batch)
-    assert batch.parameters.shape[1] == batch.states.shape[1] == 1
-
-
-def test_a_block_takes_no_more_runs_than_its_program_has_lanes() -> None:
-    batch = batch_of(different_runs("torque-task-solenoid", 1)[0])
-    wide = [np.repeat(values, lanes_of(batch.program) + 1, axis=1) for values in (batch.parameters, batch.states)]
-    with pytest.raises(ValueError, match=r"a block has .* lanes, one for each run, too few for"):
-        begin_block(dataclasses.replace(batch, parameters=wide[0], states=wide[1]))
 
 
 def test_noise_depends_on_the_seed_and_not_on_the_place() -> None:
@@ -163,29 +131,3 @@ def test_noise_depends_on_the_seed_and_not_on_the_place() -> None:
     assert np.array_equal(results[0].record, results[39].record)
     other = dataclasses.replace(runs[0], sensors=runs[0].sensors._replace(seed=99.0))
     assert not np.array_equal(results[0].record, run_together([other])[0].record)
-
-
-class BegunError(Exception):
-    """The first block begins."""
-
-
-SAID = (
-    "ppafo: Python runs these models in about 3 min 0 s; compiled models take seconds: install gcc or clang, "
-    "or 'pip install ppafo[native]', which includes zig"
-)
-
-
-@pytest.mark.parametrize(("count", "said"), [(1, []), (300, [SAID])])
-def test_where_python_runs_them_many_runs_say_before_they_begin_how_long_they_take(
-    count: int, said: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    def begin(_block: LaneBlock, _steps: int) -> None:
-        raise BegunError
-
-    monkeypatch.setenv(BACKEND_VARIABLE, PYTHON)
-    monkeypatch.setattr(LaneBlock, "advance", begin)
-    alone = batch_of(plan_run(load_scenario("torque-task-proportional")))
-    columns = (np.repeat(rows, count, axis=1) for rows in (alone.parameters, alone.states))
-    with pytest.raises(BegunError):
-        run_batch(Batch(alone.program, alone.clock, *columns))
-    assert caplog.messages == said

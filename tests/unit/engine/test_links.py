@@ -183,12 +183,6 @@ def test_an_effect_that_cannot_act_says_why(change: dict[str, Any], said: str) -
     assert bool(problem) == bool(said)
 
 
-def test_a_name_that_other_rows_have_is_refused() -> None:
-    program = plan_run(load_scenario("step-response")).program
-    with pytest.raises(ProgramError, match="a component of the program already has this name"):
-        link_program(replace(program, effects=(replace(FIRST, name="valve", laws={}),)), Replacements())
-
-
 def sprung(driving: float, friction: float, damping: float, angle: float, angular_velocity: float) -> float:
     """Equation (1) with a spring in it."""
     return driving - friction - damping - 2.0 * (angle - 1.0)

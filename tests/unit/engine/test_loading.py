@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from ppafo.engine.compilers import OFFERED
 from ppafo.engine.loading import BACKEND_VARIABLE, compilers_to_try
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.translation import compiling, native
-from tests.compilers_here import compilers_here
 from tests.interpreted import load_source
 
 HEADER = "import math\n\n\n"
@@ -77,12 +75,6 @@ def only(names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the computer have only these compilers."""
     monkeypatch.setattr("ppafo.engine.loading.OFFERED", {name: OFFERED[name] for name in names})
     forget()
-
-
-def test_compilers_are_tried_in_a_fixed_order() -> None:
-    assert list(OFFERED) == ["gcc", "clang", "zig"]
-    here = [compiler.name for compiler in compilers_to_try()]
-    assert here == [name for name in OFFERED if name in here]
 
 
 def test_a_computer_without_a_compiler_of_c_lets_python_run_the_models_and_says_so_once(
@@ -152,21 +144,6 @@ def test_a_compiler_that_did_not_work_is_tried_again_after_a_day_or_when_it_is_a
 
 @on_unix
 @needs_gcc
-def test_a_folder_whose_libraries_cannot_be_loaded_is_reported_once_for_all_compilers_of_c(
-    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(os, "statvfs", lambda _: SimpleNamespace(f_flag=os.ST_NOEXEC))
-    assert result_of(text("x[0, 0] - 0.5")) == 1.5
-    (said,) = caplog.messages
-    assert said == (
-        f"ppafo: libraries in {fresh_cache} cannot be loaded, because this folder is mounted noexec; set "
-        "PPAFO_CACHE_DIR to a folder on another file system; "
-        "models are run by Python, some hundred times slower, instead for a day, or until 'ppafo doctor --clear'"
-    )
-
-
-@on_unix
-@needs_gcc
 @pytest.mark.parametrize(
     "end",
     [
@@ -210,15 +187,6 @@ def test_a_compiler_that_never_ends_is_stopped_with_what_it_started_and_the_next
     # Whoever takes over what has lost its parent may not ask how it ended: then it is dead and still there.
     state = Path(f"/proc/{started.read_text(encoding='utf-8').strip()}/stat")
     assert not state.exists() or state.read_text(encoding="utf-8").rpartition(")")[2].split()[0] in "ZX"
-
-
-@on_unix
-@pytest.mark.skipif("zig" not in compilers_here(), reason="no zig on this machine")
-def test_zig_compiles_where_the_environment_has_no_home(monkeypatch: pytest.MonkeyPatch) -> None:
-    only(("zig",), monkeypatch)
-    monkeypatch.delenv("HOME", raising=False)
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    assert result_of(text("x[0, 0] + 0.375")) == 2.375
 
 
 @on_unix

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from ppafo.engine.cache import folder as private
-from ppafo.engine.cache import tidying
 from ppafo.engine.cache.folder import cache_folder, refusal
 from ppafo.engine.cache.kept import is_whole
 from ppafo.engine.cache.programs import load_generated
@@ -21,16 +20,6 @@ from tests.compilers_here import first_compiler
 
 SOURCE = '@entry("void(float64[::1])")\ndef twice(x):\n    x[0] = 2.0 * x[0]\n'
 LIBRARY = "program.so"
-
-RUN = f"""
-import sys
-import numpy as np
-sys.path.insert(0, {str(Path(__file__).parents[3])!r})
-from tests.interpreted import load_source
-x = np.array([21.0])
-load_source({SOURCE!r}).twice(x)
-print(x[0])
-"""
 
 
 def checksums_of(folder: Path) -> dict[str, str]:
@@ -99,31 +88,6 @@ def test_damaged_program_is_compiled_anew(compiled: Path, ending: str, damage: s
     assert is_whole(compiled)
 
 
-def test_what_another_process_tries_beside_a_program_is_no_damage(compiled: Path) -> None:
-    (compiled / "tmpabcdefgh").write_bytes(b"")
-    before = compiled.stat().st_ino
-    assert loaded() == 42.0
-    assert compiled.stat().st_ino == before
-
-
-def test_file_in_the_place_of_a_program_is_no_error(compiled: Path) -> None:
-    clear(compiled.parent)
-    compiled.parent.mkdir(mode=0o700)
-    compiled.write_text("not a folder")
-    assert loaded() == 42.0
-    assert is_whole(compiled)
-
-
-def test_unwritable_cache_leads_to_no_shared_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "file").write_text("in the way")
-    monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path / "file" / "programs"))
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    guessed = tmp_path / f"ppafo-programs-{os.getuid()}"
-    guessed.mkdir(mode=0o777)
-    assert loaded() == 42.0
-    assert list(guessed.iterdir()) == []
-
-
 @pytest.mark.parametrize("kind", ["others can write", "link", "another user", "place can be taken"])
 def test_compiled_code_in_a_folder_that_is_not_private_is_not_run(
     compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
@@ -145,56 +109,6 @@ def test_compiled_code_in_a_folder_that_is_not_private_is_not_run(
     assert not (tmp_path / "sprung").exists()
 
 
-def test_cache_folder_is_made_for_its_user_alone(fresh_cache: Path) -> None:
-    before = os.umask(0)
-    try:
-        assert refusal(fresh_cache) == ""
-    finally:
-        os.umask(before)
-    assert fresh_cache.stat().st_mode & 0o077 == 0
-
-
-def test_user_without_home_and_without_an_entry_goes_without_a_cache(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import pwd
-
-    def no_entry(_: int) -> None:
-        raise KeyError
-
-    for variable in ("HOME", "XDG_CACHE_HOME", "PPAFO_CACHE_DIR"):
-        monkeypatch.delenv(variable, raising=False)
-    monkeypatch.setattr(pwd, "getpwuid", no_entry)
-    monkeypatch.chdir(tmp_path)
-    assert cache_folder() is None
-    assert loaded() == 42.0
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_full_disk_is_no_error(tmp_path: Path) -> None:
-    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
-    environment = {**os.environ, "PPAFO_CACHE_DIR": str(tmp_path / "programs")}
-    # Without -B Python would keep what it compiles of the package itself cut at the limit, and break all later imports.
-    done = subprocess.run(
-        [sys.executable, "-B", "-c", limit + RUN], env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.stdout == "42.0\n", done.stderr
-    assert "cannot be cached" in done.stderr
-    assert "models are run by Python, some hundred times slower, instead in this run" in done.stderr
-    assert list((tmp_path / "programs").iterdir()) == []
-
-
-def test_two_processes_that_compile_the_same_program_leave_it_whole(tmp_path: Path) -> None:
-    environment = {**os.environ, "PPAFO_CACHE_DIR": str(tmp_path / "programs")}
-    started = [
-        subprocess.Popen([sys.executable, "-c", RUN], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        for _ in range(2)
-    ]
-    assert [process.communicate()[0] for process in started] == [b"42.0\n"] * 2
-    (program,) = (tmp_path / "programs").iterdir()
-    assert is_whole(program)
-
-
 def test_program_that_no_one_used_for_long_is_removed_and_a_used_one_stays(compiled: Path) -> None:
     old = compiled.with_name(compiled.name.replace(f"ppafo_{first_compiler().name}", "ppafo_old"))
     left = compiled.with_name(".writing-0123456789abcdef")
@@ -203,29 +117,6 @@ def test_program_that_no_one_used_for_long_is_removed_and_a_used_one_stays(compi
         os.utime(place, (0.0, 0.0))
     evict(compiled.parent)
     assert [place.name for place in compiled.parent.iterdir()] == [compiled.name]
-
-
-def test_programs_beyond_the_largest_size_are_removed_oldest_first(
-    compiled: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    older = compiled.with_name(compiled.name.replace(f"ppafo_{first_compiler().name}", "ppafo_older"))
-    older.mkdir()
-    (older / "large").write_bytes(bytes(1000))
-    used = compiled.stat().st_mtime
-    os.utime(older, (used - 60.0, used - 60.0))
-    monkeypatch.setattr(tidying, "MAXIMUM_BYTES", list_programs(compiled.parent)[0].size + 500)
-    evict(compiled.parent)
-    assert compiled.is_dir()
-    assert not older.exists()
-
-
-def test_a_program_that_is_being_removed_is_not_there_half(compiled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def killed(place: Path) -> None:
-        raise PermissionError(place)
-
-    monkeypatch.setattr("ppafo.engine.cache.kept.shutil.rmtree", killed)
-    clear(compiled.parent)
-    assert all(place.name.startswith(".writing-") for place in compiled.parent.iterdir())
 
 
 def test_clearing_leaves_what_is_not_a_program(compiled: Path) -> None:
@@ -261,17 +152,6 @@ def test_program_into_which_others_can_write_is_compiled_anew(compiled: Path, wh
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no permission bits here")
-def test_a_program_is_this_users_whatever_the_habits_of_files(fresh_cache: Path) -> None:
-    before = os.umask(0o002)
-    try:
-        assert loaded() == 42.0
-    finally:
-        os.umask(before)
-    (kept,) = list_programs(fresh_cache)
-    assert not any(place.stat().st_mode & 0o022 for place in (kept.path, *kept.path.rglob("*")))
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no permission bits here")
 def test_a_folder_above_may_be_written_by_a_group_of_this_user_alone(
     fresh_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -281,12 +161,3 @@ def test_a_folder_above_may_be_written_by_a_group_of_this_user_alone(
     assert refusal(fresh_cache) == ""
     monkeypatch.setattr(private, "_is_own_group", lambda _number: False)
     assert "other users can replace" in refusal(fresh_cache)
-
-
-def test_entry_that_is_a_link_to_itself_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    loop = tmp_path / "loop"
-    loop.symlink_to(loop)
-    for folder in (loop, loop / "in"):
-        monkeypatch.setenv(private.CACHE_VARIABLE, str(folder))
-        assert refusal(cache_folder()) != ""
-        assert loaded() == 42.0

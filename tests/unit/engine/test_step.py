@@ -13,8 +13,6 @@ from typing import Any
 import pytest
 
 from ppafo.engine.compilers import FLAGS, Effort
-from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import batch_of
 from ppafo.engine.step import (
     energy_balance,
@@ -28,9 +26,6 @@ from ppafo.engine.step import (
     stated,
     walk,
 )
-from ppafo.engine.step.lane import Lane, Now
-from ppafo.model.plant import chamber_pressures
-from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.translation.c99 import program_source
@@ -38,72 +33,6 @@ from ppafo.translation.c99 import program_source
 MODULES: list[ModuleType] = [
     *(energy_balance, foot, isothermal, lines, meters, not_ideal, phases, sample, stated, walk)
 ]
-FIRST = Now(
-    step=0,
-    sample=0,
-    goal=1.0,
-    early_command=0,
-    late_command=0,
-    late_signal=0,
-    next_signal=0,
-)
-
-
-def lane_of(name: str, *overrides: str) -> tuple[Program, Lane]:
-    """The parts of a scenario, and its numbers at the start."""
-    batch = batch_of(plan_run(load_scenario(name, list(overrides))))
-    lane, program = Lane(), batch.program
-    for groups, table in ((program.state_rows(), batch.states), (program.parameter_rows(), batch.parameters)):
-        begin = 0
-        for group, row in groups.items():
-            count = len(leaf_paths(row, group))
-            lane[group] = rebuilt(row, table[begin : begin + count, 0].tolist()) if count else ()
-            begin += count
-    return program, lane
-
-
-def do_step(parts: Program, lane: Lane) -> None:
-    """The phases of a whole step of a locked vane."""
-    phases.hold_chambers(parts, lane)
-    phases.open_valve(parts, lane, FIRST)
-    phases.begin_gas(parts, lane, FIRST)
-    phases.pass_gas(parts, lane, FIRST)
-    phases.finish(parts, lane, FIRST)
-
-
-def test_a_step_with_a_closed_valve_changes_nothing() -> None:
-    parts, lane = lane_of("torque-task-proportional", "initial.pressure_1=20 psi_g", "initial.pressure_2=20 psi_g")
-    before = lane.state
-    do_step(parts, lane)
-    assert lane.state.supplied_mass == 0.0
-    assert lane.state.angle == before.angle
-    assert lane.result.failure_time == 1.0e300
-
-
-def test_gas_of_a_step_that_opens_the_valve_is_what_the_supplies_gave() -> None:
-    parts, lane = lane_of("torque-task-proportional")
-    before = lane.state
-    lane.result = lane.result._replace(command=1.0)
-    do_step(parts, lane)
-    gained = lane.state.mass_1 + lane.state.mass_2 - before.mass_1 - before.mass_2
-    assert lane.state.supplied_mass > 0.0
-    assert gained == pytest.approx(lane.state.supplied_mass - lane.state.vented_mass, rel=1e-9)
-    first, _ = chamber_pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
-    assert first > chamber_pressures(lane.plant, before.angle, before.mass_1, before.mass_2)[0]
-
-
-def test_a_state_that_no_device_can_have_is_the_end_of_a_run() -> None:
-    parts, lane = lane_of("torque-task-proportional")
-    lane.state = lane.state._replace(mass_1=-1.0)
-    do_step(parts, lane)
-    assert lane.result.failure_time == pytest.approx(lane.timing.step)
-
-
-def test_an_ensemble_with_samples_inside_steps_and_no_meters_ends() -> None:
-    scenario = load_scenario("torque-task-proportional", ["run.output_interval=1.5 ms", "run.duration=0.3 s"])
-    found = run_ensemble(scenario, {"supply.pressure": [4.0e5, 5.0e5]}, ["gas_supplied"])
-    values = found.metrics["gas_supplied"]
-    assert values[1] > values[0] > 0.0
 
 
 def functions() -> list[tuple[str, Callable[..., Any]]]:

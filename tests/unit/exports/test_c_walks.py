@@ -6,26 +6,19 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ppafo.engine.channels import TRACED
-from ppafo.engine.lanes import Batch, run_batch
-from ppafo.engine.rows import row_numbers
+from ppafo.engine.lanes import Batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import ParameterError, ScenarioError
-from ppafo.exports.c_library import c_library, library_of, walk_library
+from ppafo.exports.c_library import walk_library
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import ExportParameter, Library
-from ppafo.exports.c_library.walk_preparation import settings_of_walk
-from ppafo.loading import load_scenario
-from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.walking import list_walks, load_walk
-from ppafo.walking.loading import FILE
 from ppafo.walking.planning import plan_walk
 from tests.built_once import shared_library
 
@@ -157,43 +150,6 @@ def test_c_makes_the_numbers_of_a_walk_that_python_makes(name: str, overrides: t
         assert counts.tolist() == [clock.record_every, clock.step_count, clock.steps_per_sample, *delays, 0.0]
 
 
-def samples_in_c(library: ctypes.CDLL, name: str, values: Values, outputs: int) -> Samples:
-    """Every sample of a walk with some settings, the time first."""
-    settings = np.array(list(values.values()))
-    size = library[f"{name}_size"]
-    size.restype = ctypes.c_size_t
-    memory = (ctypes.c_double * (size(ctypes.c_void_p(settings.ctypes.data)) // 8 + 1))()
-    assert library[f"{name}_initialise"](memory, ctypes.c_void_p(settings.ctypes.data)) == 0
-    found, sample = [], np.zeros(1 + outputs)
-    while library[f"{name}_step"](memory) == 0:
-        library[f"{name}_read_outputs"](memory, ctypes.c_void_p(sample.ctypes.data))
-        found.append(sample.copy())
-    return np.array(found)
-
-
-@pytest.mark.parametrize(("name", "overrides"), VARIED)
-def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
-    name: str, overrides: tuple[str, ...], tmp_path: Path
-) -> None:
-    item, _ = exported(name, overrides)
-    library = built(name, overrides, tmp_path)
-    paths = {"angle": "state.angle", "angular_velocity": "state.angular_velocity", "command": "result.command"}
-    program = item.program.program
-    paths |= {name: f"state.{name}" for name in ("supplied_mass", "leaked_mass") if name in item.program.outputs}
-    paths |= {
-        output: path
-        for output, path in program.traces.items()
-        if output not in TRACED and path in row_numbers(program.state_rows())
-    }
-    for values, batch in batches(name, overrides)[1 : 1 + RUNS]:
-        found = samples_in_c(library, item.name, values, len(item.program.outputs))
-        record = run_batch(batch, 1).record[:, :, 0]
-        rows = row_numbers(batch.program.state_rows())
-        for output, path in paths.items():
-            column = found[:, 1 + item.program.outputs.index(output)]
-            assert column.tobytes() == record[:, rows[path]].tobytes(), output
-
-
 def shown(folder: Path, name: str, *command: str) -> tuple[list[str], Samples, dict[str, float]]:
     """Names, samples and metrics that the example prints, built by a compiler with flags."""
     target = folder / "example"
@@ -229,21 +185,6 @@ def test_a_walk_of_every_feature_is_clean_under_the_sanitizers_and_the_same_in_c
         assert (again[0], again[1].tobytes()) == (first[0], first[1].tobytes())
 
 
-def test_what_cannot_leave_is_refused_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="a walk with a bottle cannot be exported"):
-        c_library(load_walk("solenoid", bottle="paper-co2-9oz"))
-    with pytest.raises(ScenarioError, match="did you mean 'solenoid'"):
-        load_scenario("solenoide")
-
-
-def test_a_file_is_a_scenario_or_a_walk_by_its_sections(tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_bytes(FILE.read("solenoid"))
-    assert load_scenario(file).motion.motion_kind.layout == WALK
-    file.write_bytes((resources.files("ppafo") / "scenarios" / "step-response.toml").read_bytes())
-    assert load_scenario(file).motion.motion_kind.layout == VANE
-
-
 def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_other_functions(tmp_path: Path) -> None:
     library = built("proportional", (), tmp_path)
     names = [item.name for item in exported("proportional")[0].settings]
@@ -262,21 +203,3 @@ def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_
         changed[names.index(name)] = value
         assert library.proportional_bad_setting(changed) == said
         assert library.proportional_size(changed) == 0
-
-
-def test_what_is_written_out_in_the_source_is_no_setting() -> None:
-    """A setting that changes nothing would be worse than none: persons are drawn in Python."""
-    paths = [item.path for item in settings_of_walk(load_walk("solenoid"))]
-    assert "valve.area" in paths
-    assert "wearer.person" not in paths
-
-
-def test_a_library_of_another_actuator_says_nothing_of_a_vane_or_of_a_supply_that_it_has_not() -> None:
-    bladder = f"device.set={ACTUATORS / 'measured-bladder.toml'}"
-    files = library_files(library_of(load_walk("proportional", (bladder,))))
-    readme, source = files["README.md"].decode(), files["proportional.c"].decode()
-    assert "supply_dorsiflexion_pressure" not in readme
-    assert "`controller_nominal_dorsiflexion_pressure` (`supply_atmospheric_pressure`)" in readme
-    comments = re.findall(r"/\*.*?\*/", source, re.DOTALL)
-    assert [text for text in comments if re.search(r"\bvane\b", text)] == []
-    assert any("an actuator at rest" in text for text in comments)

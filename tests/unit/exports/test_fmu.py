@@ -3,13 +3,8 @@
 import importlib
 import importlib.util
 import io
-import math
 import re
-import shutil
-import struct
 import subprocess
-import sys
-import tempfile
 import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -19,10 +14,8 @@ import numpy as np
 import pytest
 
 import ppafo.cli
-from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
-from ppafo.exports.fmu import platforms
 from ppafo.exports.fmu.interface import closed_loop
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
@@ -115,17 +108,6 @@ def test_gains_that_nobody_gives_follow_the_parameters_of_a_unit(tmp_path: Path)
     assert {item: float(np.abs(found[item] - recording[item]).max()) for item in names} == dict.fromkeys(names, 0.0)
 
 
-def test_the_toolbox_for_units_finds_nothing(unit: str) -> None:
-    if importlib.util.find_spec("fmu_manipulation_toolbox") is None:
-        pytest.skip("fmu-manipulation-toolbox is not installed (pip install -e .[dev])")
-    command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", unit, "-check"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    said = done.stdout + done.stderr
-    assert done.returncode == 0
-    assert "compliant with FMI-" in said
-    assert not [line for line in said.splitlines() if line.startswith(("ERROR", "WARNING", "CRITICAL"))]
-
-
 def test_every_setting_is_a_parameter_with_its_unit_and_metrics_can_be_read(unit: str, instance: Instance) -> None:
     described = fmpy.read_model_description(unit)
     found = {item.name: item for item in described.modelVariables}
@@ -140,20 +122,6 @@ def test_every_setting_is_a_parameter_with_its_unit_and_metrics_can_be_read(unit
     instance.go_to(0.3)
     read = {name: instance.get(f"metrics.{name}") for name in ("rms_error_hold", "gas_supplied", "largest_pressure")}
     assert read == pytest.approx({name: expected[name].value for name in read}, rel=1e-12)
-
-
-def test_two_instances_at_once_do_not_know_of_each_other(unit: str) -> None:
-    scenario = "torque-task-proportional"
-    wide = (*SHORT, "valve.area=9 mm^2")
-    expected = [simulate(scenario, given).recording["torque"] for given in (SHORT, wide)]
-    one, other = Instance(unit), Instance(unit, {"valve.area": 9.0e-6})
-    for number, torques in enumerate(zip(*expected, strict=True)):
-        if number:
-            one.go_to(number * 1e-3)
-            other.go_to(number * 1e-3)
-        assert (one.get("torque"), other.get("torque")) == torques
-    one.close()
-    other.close()
 
 
 def test_a_state_that_is_restored_goes_on_with_the_same_bits(instance: Instance, unit: str) -> None:
@@ -180,63 +148,6 @@ def test_a_state_of_something_else_is_refused_and_changes_nothing(instance: Inst
     other.go_to(0.1)
     assert other.course(0.1, 0.2) == instance.course(0.1, 0.2)
     other.close()
-
-
-STEPS_DONE, STEPS_PER_SAMPLE, SAMPLE_COUNT, TAKEN, SHOWN = range(2, 7)
-"""Words of a state behind that with the bytes of its run; the one before it is the interval, steps are the next."""
-
-
-def changed(kept: bytes, word: int, value: bytes) -> bytes:
-    """A state with another value in a word of its run, and a hash that fits."""
-    size = kept[40:48]
-    at = kept.index(size, len(kept) - 8 - int.from_bytes(size, "little")) + 8 * word
-    return sealed(kept[:at] + value + kept[at + 8 :])
-
-
-def sealed(kept: bytes) -> bytes:
-    """A state with the FNV-1a hash of its bytes in place of its own."""
-    found = 14695981039346656037
-    for byte in kept[:-8]:
-        found = (found ^ byte) * 1099511628211 % 2**64
-    return kept[:-8] + found.to_bytes(8, "little")
-
-
-def test_a_state_whose_counts_cannot_be_is_refused(instance: Instance, unit: str) -> None:
-    instance.go_to(0.1)
-    given = instance.kept()
-    assert sealed(given) == given
-    assert int.from_bytes(changed(given, SHOWN, given[:8])[48:56], "little") == 2  # the phase: it runs
-    whole = {
-        STEPS_DONE: (-1,),
-        STEPS_PER_SAMPLE: (0, -1),
-        SAMPLE_COUNT: (0, 2**60),
-        TAKEN: (-1, 99, 2**60),
-        SHOWN: (-1, 2**60),
-        1: (-1, 2**60),
-    }
-    bad = [changed(given, word, struct.pack("<q", value)) for word, values in whole.items() for value in values]
-    bad += [changed(given, -1, struct.pack("<d", value)) for value in (0.0, -1.0, math.nan, math.inf)]
-    bad += [sealed(given[:48] + struct.pack("<q", phase) + given[56:]) for phase in (-1, 4)]
-    begun = Instance(unit)
-    early = begun.slave
-    early.reset()
-    fresh = begun.kept()
-    bad.append(sealed(fresh[:56] + bytes(8) + fresh[64:]))  # nothing is stale, and there is no run
-    for wrong in bad:
-        with pytest.raises(Exception, match=r"De[sS]erializeFMU[sS]tate"):
-            instance.restored(wrong)
-    instance.drop(instance.restored(given))
-    shutil.rmtree(begun.files)
-
-
-def test_a_tool_that_adds_up_its_time_has_the_sample_that_is_due(instance: Instance) -> None:
-    recording = simulate("torque-task-proportional", SHORT).recording
-    for sample in (100, 101, 150):
-        instance.go_to(sample * 1e-3 - 5e-7)
-        assert instance.get("torque") == recording["torque"][sample]
-    instance.go_to(0.15)
-    instance.go_to(0.15098)
-    assert instance.get("torque") == recording["torque"][150]
 
 
 def test_the_clock_of_fmi_3_ticks_when_the_controller_decides(tmp_path: Path) -> None:
@@ -318,15 +229,6 @@ def test_parameters_that_cannot_be_are_refused_by_name(
     assert said in capfd.readouterr().out
 
 
-def test_a_run_that_has_ended_says_which_parameter_makes_it_longer(
-    instance: Instance, capfd: pytest.CaptureFixture[str]
-) -> None:
-    instance.go_to(0.3)
-    with pytest.raises(Exception, match="DoStep"):
-        instance.go_to(0.302)
-    assert "run.duration = 0.3 s" in capfd.readouterr().out
-
-
 def test_instances_are_freed_without_growth(unit: str) -> None:
     assert growth_of(unit, 1000, warm=200) < 100_000
 
@@ -339,13 +241,6 @@ def test_the_unit_holds_sources_that_build_it_without_a_warning(unit: str, tmp_p
     page = (tmp_path / "documentation" / "index.html").read_text()
     assert "<td>linux64</td><td>run in the tests</td>" in page
     assert "@" not in page
-
-
-def test_what_nobody_has_run_is_asked_for_by_name_and_marked() -> None:
-    with pytest.raises(ScenarioError, match="did you mean 'linux64'"):
-        functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux46"])
-    with pytest.raises(ScenarioError, match="is not defined in FMI 2"):
-        functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux-aarch64"])
 
 
 def test_no_name_of_a_scenario_meets_another_name_of_its_unit(tmp_path: Path) -> None:
@@ -371,18 +266,3 @@ def test_no_name_of_a_scenario_meets_another_name_of_its_unit(tmp_path: Path) ->
             words = ["gcc", "-std=c99", "-fsyntax-only", file]
             done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
             assert done.returncode == 0, (front, done.stderr)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="the compiler is a script of a shell")
-def test_what_a_compiler_leaves_goes_away_with_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    compiler, temporary = tmp_path / "cc", tmp_path / "temporary"
-    # As one that is killed in the middle.
-    compiler.write_text('#!/bin/sh\ntouch "${TMPDIR:?}/cc1234.s"\nexit 1\n', encoding="utf-8")
-    compiler.chmod(0o700)
-    temporary.mkdir()
-    monkeypatch.setenv("TMPDIR", str(temporary))
-    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
-    monkeypatch.setattr(platforms, "compiler_for", lambda _name: [str(compiler)])
-    with pytest.raises(ProgramError, match="failed to build the library"):
-        platforms.build("linux64", {"unit.c": b""}, "unit.c")
-    assert list(temporary.iterdir()) == []

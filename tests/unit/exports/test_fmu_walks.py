@@ -121,10 +121,3 @@ def instance_step(unit: str) -> float:
     """Step [s] of a plant, of which communication steps are multiples."""
     (found,) = [item for item in fmpy.read_model_description(unit).modelVariables if item.name == "run.step"]
     return float(found.start)
-
-
-def test_a_plant_on_its_leg_takes_the_command_alone(plant: str) -> None:
-    variables = fmpy.read_model_description(plant).modelVariables
-    assert [item.name for item in variables if item.causality == "input"] == ["command"]
-    hidden = ("sensors.", "controller.", "metrics.")
-    assert not [item.name for item in variables if item.name.startswith(hidden)]

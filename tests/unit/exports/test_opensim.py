@@ -70,47 +70,6 @@ def test_a_recording_is_written_with_what_it_has(tmp_path: Path, capsys: pytest.
     assert {"ankle_angle_r", "ankle_angle_r_moment", "ground_force_r_vy"} <= set(table.columns)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["RECORDING", "--minutes", "1"], "--minutes is allowed only for a walk, not for a recording"),
-        (["RECORDING", "--set", "wearer.keeps_gait=1"], "--set is allowed only for a walk, not for a recording"),
-        (["RECORDING", "--body-mass", "62"], "--body-mass 62: a mass needs a unit: '62 g' or '62 kg'"),
-    ],
-)
-def test_options_of_the_other_source_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
-) -> None:
-    write_csv(tmp_path / "walk.csv", walk_recording(load_gait("falisse2019-subject1"), 1))
-    given = [str(tmp_path / "walk.csv") if word == "RECORDING" else word for word in words]
-    assert main(["export", "opensim", *given, "--out", str(tmp_path / "out")]) == 2
-    assert said in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-TASK_SEQUENCE = """schema_version = 1
-name = "short"
-description = "A few steps."
-
-[[segment]]
-kind = "walk"
-speed = "1.2 m/s"
-duration = "4 s"
-"""
-
-
-@pytest.mark.parametrize(("given", "end"), [([], 4.0), (["--minutes", "2 s"], 2.0)])
-def test_a_walk_is_as_long_as_its_task_sequence_unless_minutes_are_given(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], given: list[str], end: float
-) -> None:
-    (tmp_path / "short.toml").write_text(TASK_SEQUENCE, encoding="utf-8")
-    words = ["export", "opensim", "solenoid", "--set", f"task_sequence={tmp_path / 'short.toml'}", *given]
-    assert main([*words, "--out", str(tmp_path / "out")]) == 0, capsys.readouterr().err
-    times = read_opensim(tmp_path / "out" / "device_torque.sto").time
-    # A segment is a whole number of strides.
-    assert (times[0], times[-1]) == (0.0, pytest.approx(end, abs=0.6))
-
-
 def test_a_motion_may_begin_below_0_s_and_the_help_says_how(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["export", "opensim", "--help"])
@@ -122,14 +81,3 @@ def test_a_motion_may_begin_below_0_s_and_the_help_says_how(tmp_path: Path, caps
     assert "load '" in capsys.readouterr().out
     times = read_opensim(folder / "device_torque.sto").time
     assert (times[0], times[-1]) == (-0.4, 0.8)
-
-
-@pytest.mark.parametrize("times", ["", "a,b", "0.5", "0.5,nan", "1,2,1.5"])
-def test_bad_strikes_are_one_line_and_exit_code_2(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], times: str
-) -> None:
-    assert main(["export", "opensim", "solenoid", "--strikes", times, "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert "--strikes" in said
-    assert said.count("\n") == 1
-    assert not (tmp_path / "out").exists()

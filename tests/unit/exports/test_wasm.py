@@ -2,15 +2,12 @@
 
 import json
 import shutil
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ppafo.errors import ProgramError
 from ppafo.exports.c_library import library_of
 from ppafo.loading import load_scenario
 from ppafo.page import wasm
@@ -99,40 +96,6 @@ def test_other_numbers_need_no_compiler(monkeypatch: pytest.MonkeyPatch) -> None
     }
 
 
-_COMPOSED_NEVER = """\
-from ppafo.engine.scheme import pneumatics
-from ppafo.loading import load_scenario
-from ppafo.page import wasm
-from scripts.wasm_programs import keys_of
-
-# Again, as the first time loads modules.
-_, keys = keys_of(["step-response"]), keys_of(["step-response"])
-scenario = load_scenario("step-response")
-stored_data = wasm.stored_data
-wasm.stored_data = lambda file: keys if file.endswith(wasm.SHIPPED_KEYS) else stored_data(file)
-composed, translated = [], []
-outlines, source_of = wasm.outline_of_unit, wasm.source_of
-wasm.outline_of_unit = lambda *given: composed.append(given) or outlines(*given)
-wasm.source_of = lambda *given: translated.append(given) or source_of(*given)
-wasm.check_can_build = lambda: None
-wasm.build = lambda text: b"built"
-assert wasm.module_of(scenario).wasm != b"built" and not composed, "as it is shipped"
-assert wasm.module_of(load_scenario("step-response", ["run.duration=0.1 s"])).wasm != b"built"
-assert composed and not translated, "with another duration"
-pneumatics.GAMMA = 0.3
-assert wasm.module_of(scenario).wasm == b"built" and translated, "with a number changed"
-"""
-
-
-@pytest.mark.long
-def test_a_shipped_scenario_has_its_program_without_composing_and_with_other_settings_without_translating(
-    fresh_cache: Path,
-) -> None:
-    """In a process of its own: this one has functions of the tests in the package, which then has no keys."""
-    done = subprocess.run([sys.executable, "-c", _COMPOSED_NEVER], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-
-
 def as_it_is(number: float) -> float:
     """Stands for another function of the preparation."""
     return number
@@ -142,8 +105,6 @@ def as_it_is(number: float) -> float:
     ("place", "value"),
     [
         ("ppafo.engine.scheme.pneumatics.GAMMA", 0.3),
-        ("ppafo.metrics.switching.OSCILLATION_THRESHOLD", 0.06),
-        ("ppafo.simulation.plan.WHOLE", 1e-8),
         ("ppafo.simulation.plan.rounded_up", as_it_is),
     ],
 )
@@ -158,21 +119,6 @@ def test_changed_physics_never_takes_a_program_of_the_package(
         patch.setattr(place, value)
         assert module_of(scenario).wasm.startswith(b"built of ")
     assert module_of(scenario).wasm == shipped
-
-
-def test_what_had_to_be_built_is_built_once(fresh_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    built: list[str] = []
-    monkeypatch.setattr(wasm, "check_can_build", lambda: None)
-    monkeypatch.setattr(wasm, "build", lambda text: built.append(text) or b"built")
-    scenario = load_scenario("torque-task-proportional", ["sensors.delay=2 ms"])
-    assert [module_of(scenario).wasm for _ in range(3)] == [b"built"] * 3
-    assert len(built) == 1
-
-
-def test_without_a_compiler_it_is_said_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wasm.importlib.util, "find_spec", lambda _name: None)
-    with pytest.raises(ProgramError, match=r"pip install 'ppafo\[workbench\]'"):
-        module_of(load_scenario("torque-task-proportional", ["sensors.delay=2 ms"]))
 
 
 def test_a_description_says_of_each_setting_where_it_comes_from() -> None:

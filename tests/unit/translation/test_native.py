@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from ppafo.cli.main import main
 from ppafo.engine import loading
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
@@ -20,7 +19,6 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.translation import compiling, native
 from ppafo.translation.native_source import translated_text
-from scripts.built_programs import build
 from scripts.golden_bits import drawn_batch
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -84,28 +82,6 @@ def test_a_program_of_gcc_is_kept_found_again_and_made_anew_where_it_is_damaged(
     assert "is damaged and is compiled again" in caplog.text
 
 
-@needs_gcc
-def test_without_a_folder_for_it_a_program_of_gcc_runs_all_the_same(
-    batch: Batch, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    expected = by("gcc", batch, monkeypatch)
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path / "file"))
-    forget_programs(monkeypatch)
-    assert by("gcc", batch, monkeypatch) == expected
-    assert "compiled models are not cached" in caplog.text
-
-
-def test_a_name_that_is_no_compiler_is_refused_in_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    monkeypatch.setenv("PPAFO_BACKEND", "gc")
-    assert main(["simulate", "torque-task-proportional", "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert said == "ppafo: PPAFO_BACKEND = 'gc': must be c, gcc, clang, zig, python, did you mean 'gcc'?\n"
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.parametrize(("name", "missing"), [("c", "no C compiler was found"), ("clang", "'clang' is not installed")])
 def test_a_computer_without_a_compiler_says_what_to_install(
     name: str, missing: str, fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
@@ -119,7 +95,6 @@ def test_a_computer_without_a_compiler_says_what_to_install(
 OBEYS = '#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\n'
 BROKEN = {
     "no interpreter": ("#!/no/such/interpreter\n", "cannot be run: no such file or directory"),
-    "no program": ("\0\1\2", "cannot be run: exec format error"),
     "no library": (f"{OBEYS}exit 0\n", "reported success but wrote no library"),
     "half a library": (
         f'{OBEYS}for word; do [ "$last" = -o ] && printf half > "$word"; last="$word"; done\n',
@@ -131,11 +106,6 @@ BROKEN = {
         "lacks functions of the model",
     ),
     "killed": (f"{OBEYS}kill -9 $$\n", "does not compile a model: it returned -9"),
-    "no utf-8": ("#!/bin/sh\nprintf '\\377\\n' >&2\nexit 1\n", "does not compile a model: \ufffd"),
-    "a warning first": (
-        f"{OBEYS}echo warning: w >&2; echo p.c:3: error: e >&2; exit 1\n",
-        "does not compile a model: p.c:3: error",
-    ),
 }
 
 
@@ -157,18 +127,6 @@ def test_a_compiler_that_fails_halfway_is_said_in_one_line_and_leaves_nothing(
     with pytest.raises(CompilerError, match=line):
         load_generated(source, compiler)
     assert list(fresh_cache.iterdir()) == []
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="the compiler is a shell script")
-def test_temporary_files_of_a_compiler_that_is_killed_are_with_what_it_was_to_make(tmp_path: Path) -> None:
-    killed = tmp_path / "cc"
-    killed.write_text('#!/bin/sh\ntouch "$TMPDIR/program-1.o"\nkill -9 $$\n', encoding="utf-8")
-    killed.chmod(0o700)
-    aside = tmp_path / "aside"
-    aside.mkdir()
-    with pytest.raises(CompilerError):
-        build("int one(void) { return 1; }", aside, [str(killed)])
-    assert (aside / "program-1.o").exists()
 
 
 def test_what_has_no_c_is_refused() -> None:
