@@ -1,8 +1,7 @@
-"""The doors of Python: compiled code, an ensemble, a result that was stored and read again, one that was pickled."""
+"""The doors of Python: compiled code, an ensemble, a result that was stored and read again."""
 
 import json
 import math
-import pickle
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ import pytest
 from ppafo.engine.channels import TRACED
 from ppafo.engine.loading import PYTHON
 from ppafo.measuring import evaluate
-from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.ensemble.running import offered
 from ppafo.storage.reading import read_recording
@@ -82,15 +80,3 @@ def test_a_result_that_was_stored_is_read_with_its_bits(case: Case, tmp_path: Pa
     assert written == {name: None if math.isnan(value) else value for name, value in answer.metrics.items()}
     measured = {name: metric.value for name, metric in evaluate(folder).items()}
     assert_near_metrics({name: measured[name] for name in measured if name in answer.metrics or not case.walks}, answer)
-
-
-@pytest.mark.parametrize("case", parameters())
-def test_a_result_and_a_scenario_that_were_pickled_are_the_same(case: Case) -> None:
-    answer = python_answer(case)
-    result = pickle.loads(pickle.dumps(compiled_result(case)))
-    assert str(result) == str(compiled_result(case))
-    with run_by(""):
-        again = simulate(pickle.loads(pickle.dumps(scenario_of(case))))
-    for found in (answer_of(result), answer_of(again)):
-        assert_same_channels(found.channels, answer)
-        assert found.metrics == answer.metrics

@@ -1,4 +1,4 @@
-"""A unit is compared with Python before it is written, and one with a late command gives what Python gives."""
+"""A unit is compared with Python before it is written."""
 
 import pytest
 
