@@ -1,6 +1,5 @@
 """Results state the values that overrides changed: in the text, on the page and in JSON."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,6 @@ import pytest
 
 import ppafo
 from ppafo.analyses.sweep.answer import load_study_results
-from ppafo.cli.main import main
 from ppafo.report.finding import REPORT, Finding, files_of
 
 TASK, STUDY = "torque-task-proportional", "torque-task-uncertainty"
@@ -58,24 +56,3 @@ def test_results_of_a_study_state_its_changes_when_they_are_read_again(tmp_path:
     ppafo.sweep(study, out=tmp_path / "study")
     read = str(load_study_results(tmp_path / "study"))
     assert f"values changed: {SHORT}, solenoid:sensors.delay=3 ms\n" in read
-
-
-def test_numbers_from_python_are_stated_in_the_units_of_the_device() -> None:
-    # 401,325 Pa are 3 bar above the standard atmosphere, and 0.1 rad are 18/pi degrees.
-    changes = {"supply.pressure": 401325.0, "reference": {"amplitude": 0.1}, "run.duration": 2}
-    servo = ppafo.simulate("cylinder-servo", changes)
-    words = "values changed: supply.pressure=3 bar_g, reference.amplitude=5.72957795 deg, run.duration=2 s"
-    assert words in str(servo).splitlines()
-
-
-@pytest.mark.parametrize("name", ["cylinder-servo", "off"])
-def test_a_run_states_its_changes_in_text_and_json(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["simulate", name, "--set", "run.duration=6 s", "--set", "supply.pressure=4 bar_g", "--out", str(tmp_path)]
-    assert main(words) == 0
-    assert "values changed: run.duration=6 s, supply.pressure=4 bar_g" in capsys.readouterr().out.splitlines()
-    page = (tmp_path / "report.html").read_text()
-    assert "<code>supply.pressure</code>=4 bar_g" in page
-    assert main([*words, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["overrides"] == ["run.duration=6 s", "supply.pressure=4 bar_g"]

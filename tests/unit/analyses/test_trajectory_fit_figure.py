@@ -35,25 +35,6 @@ def test_every_fitted_channel_has_a_panel_and_one_for_what_is_left() -> None:
     assert np.asarray(left) == pytest.approx(np.full(101, -0.5))
 
 
-def test_all_panels_have_one_time_axis() -> None:
-    figure = fit_figure(recording("synthetic", 0.0), recording("simulated", 0.5))
-    assert len(figure.axes) > 2
-    assert len({axes.get_xlim() for axes in figure.axes}) == 1
-
-
-def test_samples_are_dots_and_the_model_is_a_line() -> None:
-    samples, model = fit_figure(recording("synthetic", 0.0), recording("simulated", 0.5)).axes[0].lines
-    assert (samples.get_marker(), samples.get_label()) == ("o", "synthetic measurement")
-    assert (model.get_marker(), model.get_linestyle(), model.get_label()) == ("None", "-", "model")
-
-
-def test_a_figure_of_synthetic_samples_says_so() -> None:
-    said = [text.get_text() for text in fit_figure(recording("synthetic", 0.0), recording("simulated", 0.0)).texts]
-    assert "synthetic" in said
-    measured = [text.get_text() for text in fit_figure(recording("measured", 0.0), recording("simulated", 0.0)).texts]
-    assert "synthetic" not in measured
-
-
 def test_a_model_at_other_times_is_refused() -> None:
     with pytest.raises(DataError, match=r"its times differ from .*; give both recordings the same times"):
         fit_figure(recording("measured", 0.0), recording("simulated", 0.0).between(0.0, 0.5))

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.sensors import GaitMeasurement
 from ppafo.walking import load_walk, walk
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import WalkResult, compare_walks
 from tests.actuators import vane_of_others
 from tests.actuators.soft import soft
@@ -84,45 +82,3 @@ def test_a_cylinder_and_a_bladder_walk_and_nothing_stops_them(walked: str, actua
     for channels in (result.recording.names, bare.recording.names, bare.averages):
         assert {name for name in channels if name.startswith("pressure")} == chambers
     assert walk_figure({"with": result}).axes
-
-
-def test_a_cylinder_brings_the_ankle_near_to_the_healthy_one() -> None:
-    result = walk(load_walk("proportional", [CYLINDER]), minutes=MINUTES)
-    assert result.metrics["net_push_off_work"].value == pytest.approx(1.47, abs=0.05)
-    assert result.metrics["gas"].value == pytest.approx(0.16e-3, rel=0.1)
-    recording, device = result.recording, result.scenario.device
-    actuator = ACTUATORS[device.actuator.kind].model
-    plant = plan_walk(result.scenario).plant
-    for sample in range(0, recording.time.size, 97):
-        values = (float(recording[name][sample]) for name in ("angle", "pressure_1", "pressure_2"))
-        assert recording["torque"][sample] == pytest.approx(actuator.torque(plant, *values), abs=1e-9)
-
-
-class Watching:
-    """Fills both chambers of a walk in turn, and keeps what the sensors show."""
-
-    def __init__(self) -> None:
-        self.seen: list[GaitMeasurement] = []
-
-    def reset(self) -> None:
-        """Nothing was seen yet."""
-        self.seen = []
-
-    def update(self, time: float, _reference: float, measurement: GaitMeasurement) -> float:
-        """Half open, to either side for 0.2 s."""
-        self.seen.append(measurement)
-        return 0.5 if time % 0.4 < 0.2 else -0.5
-
-
-@pytest.mark.parametrize("sensors", [(), NOISY], ids=["ideal", "noisy"])
-def test_a_controller_in_python_is_shown_the_pressures_and_the_torque_of_the_kind(sensors: tuple[str, ...]) -> None:
-    watching = Watching()
-    result = walk(load_walk("proportional", [BLADDER, *sensors]).controlled_by(watching), minutes=0.1)
-    assert result.status.is_completed
-    run = plan_walk(result.scenario)
-    for seen in watching.seen[::137]:
-        torque = run.program.actuator.torque(run.plant, seen.angle, seen.pressure_1, seen.pressure_2)
-        assert seen.torque == torque
-    if not sensors:
-        shown = [seen.pressure_1 for seen in watching.seen]
-        assert max(shown) == pytest.approx(float(np.max(result.recording["pressure_1"])), rel=0.02)

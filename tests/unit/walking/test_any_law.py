@@ -1,13 +1,10 @@
 """Any torque law walks under its own name: no module, no line of the catalogue."""
 
-from dataclasses import replace
-
 import pytest
 
-from ppafo.control.catalog import CONTROLLERS, switching_remedy
-from ppafo.control.walking.catalog import WALKING_CONTROLLERS, law_that_walks, walking_controllers
+from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS, walking_controllers
 from ppafo.errors import ScenarioError
-from ppafo.model.declaration import Quantity
 from ppafo.model.helping import MID_STANCE, PUSH_OFF
 from ppafo.model.valves.kind import VENT
 from ppafo.walking import load_walk, walk
@@ -54,27 +51,6 @@ def test_the_law_of_the_paper_switches_solenoid_valves_and_a_pid_does_not() -> N
         ScenarioError, match="gradually, which in a walk needs a proportional valve, not a solenoid valve"
     ):
         load_walk("solenoid", ["controller.kind=pid"])
-
-
-def test_an_on_off_law_that_does_not_declare_it_is_told_the_declaration(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(CONTROLLERS, "bang", replace(CONTROLLERS["on_off"], name="bang", only_switches=False))
-    with pytest.raises(
-        ScenarioError, match=r"gradually \(only_switches=True in its ControllerKind, if it commands only"
-    ):
-        load_walk("solenoid", ["controller.kind=bang"])
-    monkeypatch.setitem(CONTROLLERS, "bang", replace(CONTROLLERS["on_off"], name="bang"))
-    assert load_walk("solenoid", ["controller.kind=bang"]).controller.kind == "bang"
-    assert not switching_remedy("pid")
-
-
-def test_a_law_whose_setting_has_a_name_of_walking_is_refused_by_that_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    law = CONTROLLERS["on_off"]
-    named = replace(law, name="own", quantities=(Quantity("peak_time", "s", "its own", 1.0, 0.0, 2.0),))
-    with pytest.raises(ScenarioError, match="'own': setting 'peak_time' has the name of a setting that all"):
-        law_that_walks(named)
-    monkeypatch.setitem(CONTROLLERS, "own", named)
-    assert "own" not in walking_controllers(), "and the other laws walk as before"
-    assert load_walk("proportional").controller.kind == "event_proportional"
 
 
 def test_the_law_of_the_paper_walks_and_follows_the_torque_of_its_phases() -> None:

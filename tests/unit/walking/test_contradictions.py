@@ -62,12 +62,6 @@ def test_bandwidths_are_what_is_left_after_a_sample() -> None:
     assert has_ideal_sensors(load_walk("solenoid", ["sensors.force_bandwidth=10 Hz"]))
 
 
-def test_bandwidth_of_0_is_a_sensor_that_follows_at_once_as_in_a_scenario() -> None:
-    given = load_walk("solenoid", ["sensors.angle_bandwidth=0 Hz", "sensors.pressure_bandwidth=0 Hz"])
-    assert (given.sensors, given.controller) == (load_walk("solenoid").sensors, load_walk("solenoid").controller)
-    assert has_ideal_sensors(given)
-
-
 @pytest.mark.parametrize("overrides", PROFILE)
 def test_a_torque_profile_that_contradicts_itself_is_refused(overrides: str) -> None:
     with pytest.raises(ScenarioError, match=PROFILE[overrides]):
@@ -89,10 +83,6 @@ def test_the_published_schema_accepts_the_shipped_walks_and_no_unknown_key() -> 
         jsonschema.validate(document, schema)
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**document, "wearers": {}}, schema)
-
-
-def test_a_period_given_takes_the_place_of_the_rate_of_the_file() -> None:
-    assert load_walk("solenoid", ["controller.period=2 ms"]).controller.period == pytest.approx(2.0e-3)
 
 
 def test_unknown_names_have_a_hint() -> None:

@@ -8,7 +8,6 @@ import pytest
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
-from ppafo.simulation.numbers import with_numbers
 from ppafo.walking import load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.wearer import paper_subject
@@ -52,16 +51,6 @@ def test_segments_follow_a_stature_that_is_given_and_the_body_mass_but_for_those
     assert alone == replace(paper, body_mass=90.0), "without a stature segments stay as they are"
 
 
-@pytest.mark.parametrize("in_file", [True, False])
-def test_a_column_of_stature_or_mass_is_the_single_run_with_it(in_file: bool) -> None:
-    fixed = ("wearer.stature=1.6 m", "wearer.toe_lever=0.2 m") if in_file else ()
-    varied = {"wearer.body_mass": 90.0} | ({} if in_file else {"wearer.stature": 1.75})
-    row = with_numbers(load_walk("solenoid", fixed), varied)
-    units = {"wearer.body_mass": "kg", "wearer.stature": "m"}
-    single = load_walk("solenoid", (*fixed, *(f"{path}={value} {units[path]}" for path, value in varied.items())))
-    assert walk_of(row).wearer == walk_of(single).wearer
-
-
 def test_a_stature_beyond_those_of_adults_is_said() -> None:
     (adult,) = person_remarks(load_walk("solenoid", ["wearer.stature=1.75 m"]))
     assert "; 1.75 m tall, segments scaled by mass and stature; the curves of the gait are not scaled" in adult
@@ -73,14 +62,6 @@ def test_a_stature_beyond_those_of_adults_is_said() -> None:
     assert ", with the leg of the paper's subject, 72.5 kg; wearer.stature scales the leg; " in thin
     with pytest.raises(ScenarioError, match=r"wearer.stature=3 m: must be at least 0.5 m and at most 2.5 m"):
         load_walk("solenoid", ["wearer.stature=3 m"])
-
-
-def test_without_a_named_gait_the_papers_subject_walks_and_the_difference_is_said() -> None:
-    found = load_walk("solenoid")
-    assert walk_of(found).wearer == paper_subject()
-    (line,) = person_remarks(found)
-    assert line.startswith("wearer: 72.5 kg, the paper's subject; the subject of gait 'falisse2019-subject1' has 62 kg")
-    assert walk_of(load_walk("solenoid", gait="falisse2019-subject1")).wearer.body_mass == 62.0
 
 
 def test_a_gait_that_the_walk_file_names_brings_its_subject_too(tmp_path: Path) -> None:
@@ -110,9 +91,3 @@ def test_a_subject_who_cannot_wear_the_device_is_refused_with_the_key(tmp_path: 
         ScenarioError, match=r"so wearer\.body_mass would be 6 kg, but it must be 10 to 300 kg; give wearer"
     ):
         load_walk("solenoid", gait=gait_file(tmp_path, 6.0))
-
-
-def test_a_tilted_foot_is_remarked_where_it_walks(tmp_path: Path) -> None:
-    straight, tilted = (load_walk("off", gait=gait_file(tmp_path, 62.0, tilt=tilt)) for tilt in (0.0, 0.1))
-    assert len(person_remarks(straight)) == 1
-    assert "the flat foot appears tilted by 10.3 deg" in person_remarks(tilted)[1]

@@ -2,24 +2,17 @@
 
 from dataclasses import replace
 from inspect import unwrap
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ppafo.engine.lanes import BatchResult, Floats
-from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
-from ppafo.parameters.bottles.bottle import FILE as BOTTLES
 from ppafo.parameters.overrides import over
 from ppafo.walking import load_walk, walk, walk_population
-from ppafo.walking.bottle import coupling
-from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.figures.bottle import bottle_figure
-from ppafo.walking.motion import walk_of, with_duration
-from ppafo.walking.planning import plan_walk
+from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import bottle_life, compare_walks, without_device
+from ppafo.walking.walk import compare_walks, without_device
 from tests.reference import bottle as independent
 
 WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
@@ -48,25 +41,6 @@ def test_the_band_of_the_line_is_seen_beside_the_pressure_of_the_regulator(small
     assert np.ptp(heights) > 0.1 * (highest - lowest)
 
 
-def test_the_temperatures_of_the_figure_are_means_of_strides_without_the_ripple_of_the_pulses(
-    small: WalkResult,
-) -> None:
-    assert small.supply is not None
-    (drawn,) = [
-        line
-        for axes in bottle_figure(small).axes
-        if "Temperature" in axes.get_title("left")
-        for line in axes.lines
-        if line.get_label() == "bottle"
-    ]
-    times, series = small.supply.times, small.supply.values["bottle_temperature"]
-    strikes = small.recording.time[small.starts]
-    inside = (times >= strikes[1]) & (times < strikes[2])
-    assert drawn.get_ydata()[1] == pytest.approx(series[inside].mean() - 273.15)
-    assert len(drawn.get_ydata()) == strikes.size - 1
-    assert np.all(np.diff(drawn.get_ydata()) < 0.0), "the bottle cools from stride to stride"
-
-
 def test_a_bottle_of_a_gram_ends_empty_and_its_gas_stays_what_a_gas_can_be() -> None:
     found = walk(WALK, minutes=0.1, overrides=["bottle.gas_mass=1 g", "bottle.volume=1.5 cm^3"], bottle=BOTTLE)
     assert found.supply is not None
@@ -76,14 +50,6 @@ def test_a_bottle_of_a_gram_ends_empty_and_its_gas_stays_what_a_gas_can_be() -> 
     assert values["bottle_temperature"].max() <= 298.0 + 1e-9, "nothing is warmer than the room"
     assert values["bottle_pressure"].max() == values["bottle_pressure"][0]
     assert np.diff(values["bottle_mass"]).min() > -0.06e-3, "no more than a share leaves between two meetings"
-
-
-def test_how_long_a_bottle_lasts_is_walked_with_small_steps_too() -> None:
-    """A day of them would be more than a run may have."""
-    small = ["run.step=0.05 ms", "bottle.gas_mass=1 g", "bottle.volume=30 cm^3"]
-    life = bottle_life(load_walk("solenoid", small, bottle="paper-co2-9oz"), Schedule(86400.0, 0.0, 86400.0))
-    assert life.course.ending.kind == "empty"
-    assert 0.5 < life.walked < 10.0
 
 
 def test_what_leaves_the_bottle_is_in_the_lines_or_went_into_the_device(small: WalkResult) -> None:
@@ -106,13 +72,6 @@ def test_an_independent_simulator_coupled_at_every_stage_says_the_same(
     assert gaps["regulated_mass"] < 1e-3 * 1.5e-3
     assert max(gaps[f"{name}_temperature"] for name in ("bottle", "regulator", "hose", "gas")) < 0.12
     assert max(gaps[f"{name}_rms"] for name in ("line_pressure_1", "pressure_1", "pressure_2")) < 200.0
-
-
-def test_a_tenfold_finer_coupling_changes_little(small: WalkResult) -> None:
-    fine = walk(WALK, minutes=0.15, overrides=[*SMALL, "bottle.coupling=10 ms"], bottle=BOTTLE)
-    assert fine.metrics["total_gas"].value == pytest.approx(small.metrics["total_gas"].value, rel=5e-4)
-    for name in ("bottle_temperature", "regulator_temperature", "gas_temperature"):
-        assert fine.recording[name][-1] == pytest.approx(small.recording[name][-1], abs=0.05)
 
 
 def test_a_bottle_whose_gas_comes_warm_feeds_as_a_supply_without_end() -> None:
@@ -158,43 +117,6 @@ def test_the_walk_ends_with_its_supply_and_says_why_and_when(kind: str) -> None:
         assert reached < 0.9 * 344.74e3 * 1.001, "less than 90 % of the torque in the last stride"
 
 
-class Breaking:
-    """Stands for the lanes: gas flows through the regulator evenly, until ``good`` advances are done."""
-
-    def __init__(self, wrong: str, good: int, rows: dict[str, int], states: Floats) -> None:
-        self.wrong, self.good, self.rows, self.states = wrong, good, rows, states.copy()
-
-    def set_parameters(self, rows: list[int], values: Floats) -> None:
-        assert len(rows) == len(values)
-
-    def advance(self, steps: int) -> None:
-        self.good -= 1
-        self.states[self.rows["line_state.regulated_mass"]] += 1.0e-5
-        if self.good < 0:
-            self.states[self.rows[self.wrong]] = 0.25 if self.wrong == "result.failure_time" else np.nan
-
-    def result(self) -> BatchResult:
-        return BatchResult(self.states, np.zeros((100_000, *self.states.shape)))
-
-
-@pytest.mark.parametrize("wrong", ["line_state.regulated_mass", "line_state.mass_1", "result.failure_time"])
-@pytest.mark.parametrize("good", [0, 2])
-def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
-    wrong: str, good: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    chosen = load_walk(WALK, bottle=BOTTLE)
-    run = plan_walk(with_duration(chosen, 12.0))
-    rows = row_numbers(run.program.state_rows())
-    monkeypatch.setattr(coupling, "begin_block", lambda batch, _effort: Breaking(wrong, good, rows, batch.states))
-    assert walk_of(chosen).bottle is not None
-    _, course = coupling.run_on_bottle(run, chosen.device, walk_of(chosen).bottle, 1.1, lambda *_: None)
-    assert course.ending.kind == "diverged"
-    assert "diverged with 255 g left" in course.ending.message
-    assert course.ending.time == pytest.approx(min(0.25, 0.1 * (good + 1)) if "failure" in wrong else 0.1 * (good + 1))
-    assert course.regulated == pytest.approx(1.0e-5 * good)
-    assert course.balance.left_bottle == pytest.approx(course.regulated, abs=1e-12)
-
-
 def test_ice_narrows_the_seat_until_the_gas_lacks_no_more_than_it_is_given() -> None:
     found = walk(WALK, minutes=0.2, overrides=[*ENDINGS["iced"], "bottle.least_torque=0.01"], bottle=BOTTLE)
     assert found.supply is not None
@@ -230,59 +152,6 @@ def test_a_mistake_is_named_in_one_line(override: str) -> None:
     with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[override]) as caught:
         load_walk(WALK, over(["bottle.name=paper-co2-9oz"], [override]))
     assert "\n" not in str(caught.value)
-
-
-def test_a_file_that_sets_its_regulator_to_another_pressure_is_refused(tmp_path: Path) -> None:
-    """The walk would have gone at the pressure of the supply, and said nothing."""
-    shipped = (Path(str(BOTTLES.shipped)) / f"{BOTTLE}.toml").read_text(encoding="utf-8")
-    file = tmp_path / "own.toml"
-    file.write_text(shipped.replace('50.0\nunit = "psi_g"', '30.0\nunit = "psi_g"'), encoding="utf-8")
-    words = r"own\.toml sets regulator\.set_pressure to 30 psi_g, but supply\.pressure is 50 psi_g: set supply\.p"
-    with pytest.raises(ScenarioError, match=words):
-        load_walk(WALK, bottle=file)
-    with pytest.raises(
-        ScenarioError, match=r"^2 things are wrong: .*contains CO2, but the device uses air.*set supply"
-    ):
-        load_walk(WALK, ["gas.species=air"], bottle=file)
-    file.write_text(shipped.replace('50.0\nunit = "psi_g"', '6.0\nunit = "bar_g"'), encoding="utf-8")
-    with pytest.raises(
-        ScenarioError, match=r"to 6 bar_g, but supply\.pressure is 50 psi_g: set supply\.pressure=6 bar_g"
-    ):
-        load_walk(WALK, bottle=file)
-    assert walk_of(load_walk(WALK, ["supply.pressure=6 bar_g"], bottle=file)).bottle is not None
-    file.write_text(shipped.replace('50.0\nunit = "psi_g"', '30.0\nunit = "psi_g"'), encoding="utf-8")
-    lower = ["supply.pressure=30 psi_g", "supply.dorsiflexion_pressure=25 psi_g"]
-    assert walk_of(load_walk(WALK, lower, bottle=file)).bottle is not None
-
-
-@pytest.mark.parametrize("room", ["1.000 bar_a", "0.980 bar_a", "1.01325 bar_a"])
-def test_gauge_pressures_of_bottle_and_set_are_one_in_any_atmosphere(tmp_path: Path, room: str) -> None:
-    shipped = (Path(str(BOTTLES.shipped)) / f"{BOTTLE}.toml").read_text(encoding="utf-8")
-    file = tmp_path / "own.toml"
-    file.write_text(shipped.replace('50.0\nunit = "psi_g"', '5.5\nunit = "bar_g"'), encoding="utf-8")
-    wanted = [f"supply.atmospheric_pressure={room}", "supply.pressure=5.5 bar_g"]
-    supply = walk_of(load_walk(WALK, wanted, bottle=file)).bottle
-    assert supply is not None
-    assert supply.bottle.regulator.set_pressure == pytest.approx(1e5 * float(room.split(maxsplit=1)[0]) + 5.5e5)
-
-
-def test_a_bottle_of_the_package_is_set_to_the_pressure_of_the_walk_and_says_so() -> None:
-    supply = walk_of(load_walk(WALK, ["supply.pressure=60 psi_g"], bottle=BOTTLE)).bottle
-    assert supply is not None
-    told = supply.to_dict()["values"]["regulator.set_pressure"]
-    assert told["value"] == pytest.approx(supply.bottle.regulator.set_pressure)
-    assert told["source"] == "supply.pressure of the walk"
-
-
-@pytest.mark.parametrize(
-    ("path", "value"), [("gait", "falisse2019-subject1"), ("task_sequence", "stairs"), ("bottle", BOTTLE)]
-)
-def test_what_is_named_twice_is_refused(path: str, value: str) -> None:
-    own = "bottle.name=other" if path == "bottle" else f"{path}=other"
-    with pytest.raises(
-        ScenarioError, match=f"override '{own}': the {path} is already given as '{value}'; omit one of them"
-    ):
-        load_walk(WALK, [own], **{path: value})
 
 
 def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:

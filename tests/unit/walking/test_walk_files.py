@@ -7,20 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema  # type: ignore[import-untyped]
-import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.sensitivity.methods import METHODS
-from ppafo.analyses.walk.question import walk_with_and_without
 from ppafo.cli.main import main
 from ppafo.errors import DataError, PpafoError, ScenarioError
-from ppafo.loading import json_schema, list_all_scenarios, load_scenario, reloaded, scenario_from_dict
+from ppafo.loading import json_schema, list_all_scenarios, load_scenario, scenario_from_dict
 from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.simulation.numbers import declared_numbers
-from ppafo.simulation.scenario import Scenario
-from ppafo.studies.limits import check_metrics
-from ppafo.walking.kind import WALK_KIND
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 
@@ -42,11 +36,6 @@ def written(folder: Path, text: str) -> Path:
     path = folder / "mine.toml"
     path.write_text(text)
     return path
-
-
-def recorded(scenario: Scenario) -> dict[str, list[float]]:
-    recording = ppafo.simulate(scenario).recording
-    return {name: recording[name].tolist() for name in recording.names}
 
 
 def test_every_shipped_walk_says_in_its_motion_that_it_is_one() -> None:
@@ -115,14 +104,6 @@ def test_a_mistake_in_a_walk_is_one_line(what: str, tmp_path: Path) -> None:
         load_scenario(written(tmp_path, text_of(NAME) + MOTION + added))
 
 
-def test_a_misspelt_motion_is_told_of_walks_too(tmp_path: Path) -> None:
-    text = (text_of(NAME) + MOTION).replace('"walk"', '"wlak"')
-    with pytest.raises(
-        ScenarioError, match=r"motion\.kind = 'wlak' is not known, did you mean 'walk'\?; allowed: free"
-    ):
-        load_scenario(written(tmp_path, text))
-
-
 def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Path) -> None:
     assert load_walk(NAME, ["motion.kind=walk"]).controller == load_walk(NAME).controller
     with pytest.raises(ScenarioError, match=r"override 'motion\.kind=free': a walk file needs motion.kind = 'walk'"):
@@ -164,20 +145,6 @@ def test_the_schema_of_scenarios_takes_every_shipped_one_and_a_motion_that_is_a_
     assert list(validator.iter_errors(documents[-1] | {"reference": {"kind": "constant", "level": "1 N m"}}))
 
 
-def test_another_kind_drops_the_settings_of_the_old_one_as_in_every_scenario() -> None:
-    on_off = load_scenario(NAME, ["controller.kind=event_on_off"])
-    assert "peak_torque" not in on_off.controller.settings
-    warm = ("kind=thermal", "heat_transfer_coefficient=50 W/(m^2 K)", "wall_area_per_volume=100 1/m")
-    thermal = load_scenario(NAME, [f"gas_model.{text}" for text in warm])
-    assert thermal.gas_model is not None
-    assert reloaded(thermal, ["gas_model.kind=isothermal"]).gas_model is None
-    with pytest.raises(
-        ScenarioError,
-        match=r"'controller.peak_torque=5 N m': .* has no value '.*' after override 'controller.kind=event_on_off'",
-    ):
-        load_scenario(NAME, ["controller.peak_torque=5 N m", "controller.kind=event_on_off"])
-
-
 def test_simulate_runs_a_walk_with_its_metrics_and_its_figure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -190,78 +157,9 @@ def test_simulate_runs_a_walk_with_its_metrics_and_its_figure(
     assert {"figure.svg", "recording.nc", "report.html", "run.json"} <= {path.name for path in folder.iterdir()}
 
 
-def test_a_walk_that_is_simulated_names_the_command_that_compares_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = written(tmp_path, text_of(NAME) + MOTION)
-    assert main(["simulate", str(path), "--set", SHORT, "--out", str(tmp_path / "out")]) == 0
-    assert f"'ppafo walk {path}' compares it" in capsys.readouterr().out
-
-
-def test_a_run_of_a_walk_says_what_it_determines() -> None:
-    check = ppafo.simulate(NAME, ["run.duration=12 s"]).check()
-    rows = {row.name: row for row in check.metrics}
-    assert rows["toe_clearance"].is_determined
-    assert all(np.isfinite(row.allowed) for row in rows.values())
-
-
-def test_messages_offer_a_scenario_only_the_metrics_that_it_has() -> None:
-    for name, own, other in (
-        (NAME, "toe_clearance", "rms_error"),
-        ("torque-task-solenoid", "rms_error", "toe_clearance"),
-    ):
-        with pytest.raises(ppafo.StudyError) as caught:
-            check_metrics(["misspelt"], load_scenario(name))
-        assert own in str(caught.value)
-        assert other not in str(caught.value)
-
-
 def test_every_number_of_a_walk_can_vary_from_either_form(tmp_path: Path) -> None:
     new = load_scenario(written(tmp_path, text_of(NAME) + MOTION))
     assert declared_numbers(new).keys() == declared_numbers(load_scenario(NAME)).keys()
-
-
-STUDY = """
-schema_version = 1
-name = "lifting"
-description = "What decides how high the toes are?"
-
-[[configurations]]
-name = "mine"
-scenario = "walks/mine.toml"
-overrides = ["run.duration=6 s"]
-
-[sample]
-method = "sobol"
-runs = 64
-seed = 1
-
-[[vary]]
-path = "wearer.body_mass"
-kind = "uniform"
-minimum = "70 kg"
-maximum = "75 kg"
-
-[[vary]]
-path = "supply.dorsiflexion_pressure"
-kind = "uniform"
-minimum = "20 psi_g"
-maximum = "40 psi_g"
-
-[outputs]
-metrics = ["toe_clearance"]
-"""
-
-
-def test_sensitivity_ranks_what_varies_in_a_walk_whose_file_lies_in_another_folder(tmp_path: Path) -> None:
-    folder = tmp_path / "studies"
-    (folder / "walks").mkdir(parents=True)
-    written(folder / "walks", text_of(NAME) + MOTION)
-    (folder / "study.toml").write_text(STUDY)
-    found = ppafo.sensitivity(folder / "study.toml", samples=64).found
-    (metric,) = found.metrics
-    shares = dict(zip(found.paths, metric.indices.values[METHODS[found.method].shown[0]], strict=True))
-    assert shares["supply.dorsiflexion_pressure"] > 10.0 * shares["wearer.body_mass"] > 0.0
 
 
 def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others() -> None:
@@ -277,12 +175,3 @@ def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others()
     rules = {f"{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}" for term in terms}
     assert "default_gains.proportional_gain_of_device" in rules
     assert {rule for rule in rules if f'"{rule}":' not in page} == set()
-
-
-def test_a_duration_is_given_once_in_python_too() -> None:
-    with pytest.raises(ScenarioError, match=r"overrides run\.duration and minutes both set the duration"):
-        walk_with_and_without(NAME, minutes=0.2, overrides=["run.duration = 30 s"])
-
-
-def test_the_command_that_compares_a_walk_is_quoted_for_a_file_with_a_space() -> None:
-    assert WALK_KIND.further_command("my walk.toml").startswith("'ppafo walk 'my walk.toml'' compares")

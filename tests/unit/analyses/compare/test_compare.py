@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.compare.answer import _change_panels, _pareto_panels
 from ppafo.analyses.compare.pairs import best_probabilities, compare_pairs, pareto_front
 from ppafo.analyses.compare.question import compare
 from ppafo.errors import StudyError
-from ppafo.report.finding import text_of
 from ppafo.studies.distributions import NormalAround
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.study import RandomValue
@@ -94,7 +92,6 @@ def test_the_front_has_what_nothing_beats_in_all_goals() -> None:
 
 
 STUDY = "torque-task-uncertainty"
-PANELS = (_pareto_panels, _change_panels)
 
 
 def test_the_paper_comes_out_and_holds_over_the_uncertainty_of_the_device() -> None:
@@ -155,16 +152,6 @@ def test_without_a_reference_there_is_gas_and_no_error() -> None:
 FAST = ["controller.proportional_gain=60 1/(N m)", "controller.derivative_gain=0.05 s/(N m)", "valve.delay=5 ms"]
 
 
-def test_the_gains_of_each_configuration_stand_below_its_task() -> None:
-    given = compare(["torque-task-proportional", "torque-task-solenoid"])
-    text = str(given)
-    # The paper's gains, stated in the scenario; the solenoid pair switches and has no gain.
-    assert "torque-task-proportional: gains: proportional_gain 0.095 1/(N m), integral_gain 0.25 1/(N m s)" in text
-    assert "torque-task-solenoid: gains" not in text
-    faster = ppafo.load_scenario("torque-task-proportional", ["controller.proportional_gain=0.2 1/(N m)"])
-    assert "gains: proportional_gain 0.2 1/(N m)" in str(compare([faster, "torque-task-solenoid"]))
-
-
 def test_a_loop_that_oscillates_is_said_and_is_on_no_front() -> None:
     fast = ppafo.load_scenario("torque-task-proportional", FAST)
     given = {"paper": ppafo.load_scenario("torque-task-proportional"), "fast": fast}
@@ -180,23 +167,6 @@ def test_a_loop_that_oscillates_is_said_and_is_on_no_front() -> None:
     assert (
         "none of the tried values of controller.proportional_gain, controller.derivative_gain alone sufficed" in said[0]
     )
-
-
-def test_valves_that_switch_without_a_limit_are_remarked_on_as_in_a_run() -> None:
-    changes = ["valve.switching_interval=0 s", "controller.rate=1 kHz", "reference.level=3 N m"]
-    quick = ppafo.load_scenario("torque-task-solenoid", changes)
-    slow = ppafo.load_scenario("torque-task-solenoid", changes[2:])
-    (said,) = (text for text in ppafo.simulate(quick).warnings if "the valves are reversed" in text)
-    remarks = compare({"quick": quick, "slow": slow}).found.remarks
-    assert [text for text in remarks if "the valves are reversed" in text] == [f"quick, as written: {said}"]
-
-
-def test_a_remedy_that_is_said_was_tried() -> None:
-    beyond = ppafo.load_scenario("torque-task-proportional", ["reference.level=9 N m"])
-    remarks = compare({"beyond": beyond, "paper": ppafo.load_scenario("torque-task-proportional")}).found.remarks
-    said = next(text for text in remarks if text.startswith("beyond"))
-    assert "with overrides=['beyond:supply.pressure=94.5 psi_g'] it follows" in said
-    assert "it follows, as a further run shows, with a margin; not counted among the best" in said
 
 
 UNKNOWN_GAINS = {
@@ -231,43 +201,6 @@ def test_a_remedy_for_one_configuration_is_addressed_to_it_and_taken_by_the_comm
     assert ppafo.sweep(UNKNOWN_GAINS, overrides=together).found.summary["completed"] == 128
 
 
-def test_an_override_that_one_configuration_lacks_names_it_and_the_way_to_another() -> None:
-    given = ["torque-task-proportional", "torque-task-solenoid"]
-    with pytest.raises(StudyError) as caught:
-        compare(given, overrides=["controller.proportional_gain=1 1/(N m)"])
-    assert str(caught.value).startswith("configuration 'torque-task-solenoid': override 'controller.proportional_gain")
-    assert "did you mean" not in str(caught.value)
-    assert "to change only 'torque-task-proportional', give overrides=['torque-task-proportional:PATH=" in str(
-        caught.value
-    )
-    with pytest.raises(StudyError, match="there is no configuration 'solenoid', did you mean 'torque-task-solenoid'"):
-        compare(given, overrides=["solenoid:valve.area=5 mm^2"])
-
-
-def test_without_draws_the_least_error_and_gas_are_named_of_those_that_follow() -> None:
-    beyond = ppafo.load_scenario("torque-task-proportional", ["reference.level=9 N m"])
-    pair = {
-        "paper": ppafo.load_scenario("torque-task-proportional"),
-        "small": ppafo.load_scenario("torque-task-proportional", ["valve.area=6 mm^2"]),
-    }
-    answer = compare({**pair, "beyond": beyond})
-    text = text_of(answer)
-    (task,) = answer.found.tasks
-    for metric in ("rms_error", "gas_supplied"):
-        least = min(pair, key=lambda name: task.case(name).value(metric))
-        assert f"best: {metric}: {least} (" in text
-
-
-def test_a_configuration_has_one_colour_in_all_figures() -> None:
-    compared = compare(study=STUDY, draws=32).found
-    pareto, change = (
-        {mark.label: mark.colour for mark in panels(compared)[0].marks if mark.label} for panels in PANELS
-    )
-    assert set(pareto) == {"proportional", "solenoid"}
-    assert pareto["solenoid"] == change["solenoid"]
-    assert pareto["proportional"] != pareto["solenoid"]
-
-
 def test_mistakes_are_one_line() -> None:
     with pytest.raises(StudyError, match="nothing to compare"):
         compare()
@@ -296,16 +229,6 @@ def test_a_scenario_that_was_changed_in_python_is_not_changed_back_in_silence() 
     other = replace(scenario, name="longer", run=replace(scenario.run, duration=4.0))
     with pytest.raises(StudyError, match="'longer' was changed in Python"):
         compare([scenario, other], tasks={"slow": ["reference.ramp_time=2 s"]})
-
-
-def test_configurations_that_do_another_thing_are_said_to() -> None:
-    base = ppafo.load_scenario("torque-task-proportional")
-    lower = ppafo.load_scenario("torque-task-proportional", ["reference.level=3 N m"])
-    wider = ppafo.load_scenario("torque-task-proportional", ["valve.area=12 mm^2"])
-    remarks = compare({"base": base, "lower": lower, "wider": wider}).found.remarks
-    assert len(remarks) == 1
-    assert "lower follows a different reference" in remarks[0]
-    assert compare({"base": base, "wider": wider}).found.remarks == []
 
 
 @pytest.mark.parametrize(

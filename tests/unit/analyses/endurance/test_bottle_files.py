@@ -9,7 +9,6 @@ import pytest
 import ppafo
 from ppafo.errors import ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
-from ppafo.parameters.bottles.declaration import json_schema
 from ppafo.report.finding import text_of
 
 TEXT = (resources.files("ppafo.parameters.bottles") / "files" / f"{PAPER_BOTTLE}.toml").read_text(encoding="utf-8")
@@ -95,14 +94,6 @@ def test_the_nearest_name_is_that_of_a_bottle(name: str, near: str) -> None:
         load_bottle(name)
 
 
-def test_every_wrong_unit_of_a_file_is_named_at_once(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text(TEXT.replace('"psi_g"', '"psi"').replace('"cm^3"', '"K"'), encoding="utf-8")
-    words = r"^2 things are wrong: .*bottle\.volume = 375 K: .*regulator\.set_pressure = 50 psi: 'psi' needs the kind"
-    with pytest.raises(ParameterError, match=words):
-        load_bottle(path)
-
-
 def test_a_missing_value_is_named(tmp_path: Path) -> None:
     start = TEXT.index("[regulator.droop]")
     end = TEXT.index("[regulator.pressure_margin]")
@@ -140,10 +131,6 @@ def filled_by_pressure(tmp_path: Path, pressure: float) -> Path:
     return path
 
 
-def test_the_schema_of_a_file_names_every_value() -> None:
-    assert {"bottle", "regulator", "room", "gas"} <= set(json_schema()["properties"])
-
-
 @pytest.mark.parametrize(
     ("name", "mass", "volume"), [("co2-12g", 12.0, 17.6), ("co2-16g", 16.0, 23.5), ("co2-88g", 88.0, 129.0)]
 )
@@ -155,21 +142,3 @@ def test_a_cartridge_is_filled_as_transport_rules_allow_and_lasts_seconds(
     assert bottle.mass / bottle.volume == pytest.approx(680.0, rel=0.01)
     said = text_of(ppafo.bottle(gas_per_stride="0.4 g", stride_time="1.1 s", bottle=name))
     assert ("min of walking" in said) == (name == "co2-88g")
-
-
-@pytest.mark.parametrize(
-    ("left_out", "words"),
-    [
-        ("volume", "'bottle.volume' is missing; at the largest filling with CO2, 680 g/L (49 CFR 173.304a), "
-         "bottle.volume is 23.5 cm^3; 'ppafo new bottle NAME --from co2-16g' writes a file with all of them"),
-        ("gas_mass", "give either bottle.gas_mass or bottle.fill_pressure and bottle.fill_temperature; at the largest "
-         "filling with CO2, 680 g/L (49 CFR 173.304a), bottle.gas_mass is 16 g"),
-    ],
-)  # fmt: skip
-def test_a_file_with_the_mass_or_the_volume_alone_is_told_the_other(tmp_path: Path, left_out: str, words: str) -> None:
-    sections = (Path(ppafo.__file__).parent / "parameters/bottles/files/co2-16g.toml").read_text().split("\n\n")
-    file = tmp_path / "mine.toml"
-    file.write_text("\n\n".join(text for text in sections if not text.startswith(f"[bottle.{left_out}]")))
-    with pytest.raises(ParameterError) as caught:
-        load_bottle(file)
-    assert str(caught.value) == f"{file}: {words}"

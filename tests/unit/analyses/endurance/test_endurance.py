@@ -1,7 +1,5 @@
 """How a run ends and why, rests, and gas uses from recordings."""
 
-import re
-import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,10 +11,7 @@ from ppafo.analyses.endurance.answer import Endurance, Endurances
 from ppafo.analyses.endurance.gas_demand import demand_of_numbers, demand_of_recording
 from ppafo.analyses.endurance.question import bottle as endurance
 from ppafo.analyses.endurance.solve import follow_bottle
-from ppafo.analyses.walk.question import walk_with_and_without
-from ppafo.cli.main import main
 from ppafo.errors import DataError, ParameterError
-from ppafo.parameters.bottles.bottle import FILE as BOTTLES
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle.coupling import Schedule
@@ -161,15 +156,6 @@ def test_recordings_that_say_nothing_of_a_gas_use_are_refused(
         demand_of_recording(recording, stride_time)
 
 
-def test_the_verb_takes_numbers_as_the_command_takes_texts() -> None:
-    found = endurance(gas_per_stride=1e-3, stride_time=1.1, overrides=["bottle.gas_mass=100 g"])
-    assert isinstance(found.found, Endurance)
-    assert found.found.draw.mean_flow == pytest.approx(1e-3 / 1.1)
-    assert found.to_dict()["bottle"]["gas_mass"] == pytest.approx(0.1)
-    labels = [axes.get_title(loc="left") for axes in found.plot().axes]
-    assert labels == ["Temperature of the bottle (°C)", "Pressure in the bottle (psig)", "Left in the bottle (g)"]
-
-
 def test_the_verb_takes_recordings_one_or_several() -> None:
     one, two = staircase(1e-3, 1.0, 0.2), staircase(2e-3, 1.0, 0.2)
     alone = endurance(one)
@@ -200,80 +186,3 @@ def test_the_regulator_of_a_bottle_is_set_to_the_supply_pressure_of_a_run_unless
     assert "(values changed: regulator.set_pressure=6 bar_g)" in str(found)
     stated = ppafo.bottle(tmp_path / "task", overrides=["regulator.set_pressure=5 bar_g"]).found
     assert stated.bottle.regulator.set_pressure == pytest.approx(601325.0)
-
-
-def test_a_walk_on_another_gas_than_the_bottle_holds_is_told_the_command_that_feeds_it_so() -> None:
-    walked = ppafo.walk("proportional", minutes=0.1, overrides=["controller.peak_time=0.52"])
-    with pytest.raises(DataError, match="the device uses CO2, but bottle 'air-48ci-3000psi' contains air") as caught:
-        endurance(walked, bottle="air-48ci-3000psi")
-    told = "'ppafo walk proportional --set controller.peak_time=0.52 --set gas.species=air --minutes 0.1 --out FOLDER'"
-    assert told in str(caught.value)
-    again = ppafo.walk("proportional", minutes=0.1, overrides=["gas.species=air"])
-    lasting_on_air = endurance(again, bottle="air-48ci-3000psi", longest=20.0).found
-    assert isinstance(lasting_on_air, Endurance)
-    assert lasting_on_air.discharge.walking_time > 0.0
-
-
-def test_the_command_for_another_gas_carries_pressure_duration_and_bottle_of_the_walk(tmp_path: Path) -> None:
-    file = tmp_path / "air.toml"
-    shipped = (Path(str(BOTTLES.shipped)) / "air-48ci-3000psi.toml").read_text(encoding="utf-8")
-    file.write_text(
-        re.sub(r"(?s)(\[regulator\.set_pressure\]\nvalue = )\S+(\nunit = )\S+", r'\g<1>6.0\2"bar_g"', shipped)
-    )
-    for own in (None, "co2-25g"):
-        walked = ppafo.walk("proportional", minutes=0.1, bottle=own)
-        with pytest.raises(
-            DataError, match="the device uses CO2, but bottle 'air-48ci-3000psi' contains air"
-        ) as caught:
-            endurance(walked, bottle=file)
-        command = shlex.split(str(re.findall(r"'ppafo (walk .*) --out FOLDER'", str(caught.value))[0]))
-        given = ["gas.species=air", "supply.pressure=6 bar_g", *([] if own is None else [f"bottle.name={file}"])]
-        assert set(command[3:-2:2]) == set(given)
-        assert command[-2:] == ["--minutes", "0.1"]
-    # The command as it stands, on the command line: the walk runs, and the bottle then lasts for a time.
-    assert main([*command, "--out", str(tmp_path / "again")]) == 0
-    lasting = endurance(tmp_path / "again", bottle=file, longest=20.0).found
-    assert isinstance(lasting, Endurance)
-    assert lasting.discharge.walking_time > 0.0
-
-
-@pytest.mark.parametrize(
-    ("gas", "told"),
-    [
-        ("CO2", "bottle='paper-co2-9oz' to"),
-        ("air", "'air-48ci-3000psi' to"),
-        ("N2", "'n2-48ci-3000psi' to"),
-        ("He", "uses He"),
-    ],
-)
-def test_a_walk_recommends_a_bottle_of_its_own_gas(gas: str, told: str) -> None:
-    shown = str(walk_with_and_without("solenoid", overrides=[f"gas.species={gas}"], minutes=0.1))
-    assert told in shown
-    assert ("paper-co2-9oz" in shown) == (gas == "CO2")
-
-
-@pytest.mark.parametrize("typed", ["gas.species", "gas", "gas.value", "bottle.gas"])
-def test_a_gas_set_at_a_bottle_is_told_to_repeat_the_run(typed: str) -> None:
-    with pytest.raises(
-        ParameterError, match=f"a bottle has no parameter '{typed}'; the gas of a bottle is set in"
-    ) as caught:
-        endurance(staircase(1e-3, 1.0, 0.2), overrides=[f"{typed}=air"])
-    assert "repeat the run of walk with overrides=['gas.species=air']" in str(caught.value)
-    with pytest.raises(
-        ParameterError, match=f"a bottle has no parameter '{typed}'; choose the gas by the name or file"
-    ):
-        endurance(gas_per_stride="0.4 g", overrides=[f"{typed}=air"])
-
-
-@pytest.mark.parametrize("typed", ["gas", "gas.value"])
-def test_a_gas_under_another_name_is_told_its_species(typed: str) -> None:
-    with pytest.raises(ParameterError, match=r"did you mean 'gas\.species=air'"):
-        ppafo.load_walk("proportional", [f"{typed}=air"])
-
-
-def test_a_bottle_with_changed_values_says_so_and_one_without_does_not() -> None:
-    changes = ["bottle.volume=500 cm^3", "bottle.gas_mass=300 g"]
-    shipped, changed = (endurance(bottle="co2-88g", gas_per_stride="0.4 g", overrides=given) for given in ([], changes))
-    assert "changed" not in f"{shipped.said} {shipped.parts[1].title}"
-    assert changed.said[0].endswith("(values changed: bottle.gas_mass=300 g, bottle.volume=500 cm^3)")
-    assert changed.parts[1].title.startswith("co2-88g (values changed): 0.4 g per stride")

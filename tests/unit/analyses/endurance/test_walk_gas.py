@@ -13,10 +13,9 @@ import ppafo
 from ppafo.analyses.endurance.answer import Endurance, finding_of
 from ppafo.analyses.endurance.gas_demand import largest_flow
 from ppafo.analyses.endurance.question import bottle as endurance
-from ppafo.analyses.endurance.solve import endurance_of_walk
 from ppafo.analyses.endurance.walk_gas import WalkGas, demand_of_walk, read_walk_gas, walk_gas
 from ppafo.cli.main import main
-from ppafo.errors import DataError, ParameterError, ScenarioError
+from ppafo.errors import DataError, ScenarioError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.numbers import with_numbers
@@ -168,20 +167,6 @@ def test_what_does_not_belong_to_a_walk_is_refused(
     assert words in capsys.readouterr().err
 
 
-def test_several_recordings_have_one_folder_and_none_comes_twice(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = str(folder_of(pulses(5.0), tmp_path / "walk"))
-    assert main(["bottle", folder, folder, "--out", str(tmp_path / "out")]) == 2
-    assert "given twice" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-    other = str(folder_of(pulses(6.0), tmp_path / "other"))
-    assert main(["bottle", folder, other, "--longest", "2 s", "--out", str(tmp_path / "out")]) == 0
-    names = ["endurance.json", "endurance.txt", "ppafo.json", "report.html"]
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
-    assert set(json.loads((tmp_path / "out" / "endurance.json").read_text())["recordings"]) == {folder, other}
-
-
 def test_a_walk_without_gas_lasts_for_ever() -> None:
     with pytest.raises(DataError, match="would become empty"):
         demand_of_walk(replace(pulses(5.0), gas_per_stride=0.0))
@@ -198,13 +183,6 @@ def test_the_largest_flow_is_that_of_the_bottles_regulator_where_there_are_lines
     )
 
 
-def test_a_time_between_rests_without_a_rest_is_refused() -> None:
-    with pytest.raises(
-        ParameterError, match=r"^walk is the walking time between two rests; also give rest, or use longest"
-    ):
-        endurance(gas_per_stride=3.0e-4, walk=60.0)
-
-
 def test_rests_warm_the_bottle_that_is_walked_on() -> None:
     without, rested = (endurance(solenoid(), overrides=SMALL, walk=10.0, rest=rest).found for rest in (0.0, 120.0))
     assert isinstance(without, Endurance)
@@ -217,12 +195,6 @@ def test_rests_warm_the_bottle_that_is_walked_on() -> None:
     assert rests == int(rested.discharge.walking_time / 10.0)
     mass = rested.discharge.recording["bottle_mass"]
     assert mass[0] - mass[-1] == pytest.approx(rested.draw.mass_per_stride * rested.discharge.strides)
-
-
-def test_a_walk_whose_numbers_were_changed_in_python_is_not_taken_for_that_of_its_file() -> None:
-    changed = walk(with_numbers(load_walk("solenoid"), {"valve.area": 1.0e-6}), minutes=0.1)
-    with pytest.raises(ScenarioError, match="when loading the walk"):
-        endurance_of_walk(changed)
 
 
 @pytest.mark.parametrize(

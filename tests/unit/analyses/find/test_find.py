@@ -11,13 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 import ppafo
-from ppafo.analyses.find import solve
 from ppafo.analyses.find.answer import Threshold
 from ppafo.analyses.find.question import find
 from ppafo.analyses.find.solve import ACCURACY
 from ppafo.cli.main import main
 from ppafo.errors import StudyError
-from ppafo.parameters.plant import plant_parameters
 from ppafo.progress import Progress
 from ppafo.report.finding import Finding
 from ppafo.simulation.tracking.settled import settled_task
@@ -158,16 +156,6 @@ def test_the_lower_end_of_valid_values_is_no_limit_of_a_metric() -> None:
     assert answer.said[0].endswith("; for lower values, add overrides=['friction.dynamic_torque=0.01 N m']")
 
 
-def test_the_lower_end_takes_the_unit_of_the_upper_one() -> None:
-    base = ppafo.load_scenario(TASK)
-    for text in ("supply.pressure=20..90 psi_g", "supply.pressure = 20 psi_g .. 90 psi_g", RANGE):
-        path, low, high = solve.range_of(text, base)
-        assert path.path == "supply.pressure"
-        assert low < high
-    assert solve.range_of("valve.discharge_coefficient=0.1..0.25", base)[1:] == (0.1, 0.25)
-    assert solve.range_of("valve.area=1.5..2 mm^2", base)[1:] == pytest.approx((1.5e-6, 2e-6))
-
-
 def test_the_value_meets_the_condition_in_a_run_of_its_own_and_its_neighbour_does_not(tmp_path: Path) -> None:
     heard: list[Progress] = []
     answer = find(
@@ -270,35 +258,6 @@ def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_erro
     assert tried.judged == pytest.approx(max(final_error, there)) or math.isnan(tried.judged)
 
 
-def test_the_error_that_decides_is_named_beside_the_metric_and_so_is_what_ends_the_range() -> None:
-    said = find(
-        "torque-task-solenoid",
-        overrides=["reference.level=3 N m"],
-        vary="valve.area=2..30 mm^2",
-        such_that="final_error <= 0.5 N m",
-        highest=True,
-        grid=15,
-    ).said[0]
-    assert re.search(r"final_error is 0.\d+ N m there, and the RMS error in .*, which decides, 0.3\d+ N m", said)
-    unstable = ["sensors.delay=20 ms", "reference.level=3 N m"]
-    gain = find(
-        TASK,
-        overrides=unstable,
-        vary="controller.proportional_gain=0.1..3 1/(N m)",
-        such_that="final_error <= 0.05 N m",
-        highest=True,
-        grid=8,
-    )
-    assert gain.said[0].endswith("; above it the loop oscillates")
-
-
-def test_one_instant_of_a_loop_that_settles_is_its_error() -> None:
-    found = find(TASK, vary="supply.pressure=60..80 psi_g", such_that="final_error <= 0.1 N m", grid=5).found
-    alone = ppafo.simulate(TASK, ["supply.pressure=60 psi_g"]).metrics
-    assert found.unsettled == 0
-    assert found.tried[0].metric == pytest.approx(alone["final_error"].value)
-
-
 def test_a_step_that_has_settled_is_judged_as_its_run_is_whatever_its_first_reversals() -> None:
     ringing = [
         *("reference.kind=constant", "reference.level=3 N m", "valve.delay=8 ms"),
@@ -315,41 +274,6 @@ def test_a_step_that_has_settled_is_judged_as_its_run_is_whatever_its_first_reve
     assert found.tried[0].judged == pytest.approx(alone.metrics["final_error"].value)
 
 
-def test_a_torque_that_the_actuator_does_not_give_is_not_followed(tmp_path: Path) -> None:
-    """Pressure above the atmosphere times one volume; 5 % of 6 N m may be missing, so that a run follows before."""
-    answer = find(TASK, vary="supply.pressure=50..62 psi_g", such_that="follows", grid=5)
-    found, volume = answer.found, plant_parameters(ppafo.load_scenario(TASK).device).torque_constant
-    assert found.value == pytest.approx(101325.0 + 6.0 / volume, rel=1e-5)
-    assert "is the lowest value that lets the run follow its reference (bracketed to " in answer.said[0]
-    assert "refused" not in answer.said[0]
-    run = ppafo.simulate(TASK, [f"supply.pressure={found.value!r} Pa_a"])
-    assert run["torque"].max() == pytest.approx(6.0, abs=0.1)
-    assert " the torque follows its reference; from 2 s on: RMS error " in answer.said[1]
-    assert "the reference exceeds the largest available torque by " in answer.said[2]
-    answer.save(tmp_path / "out")
-    assert json.loads((tmp_path / "out" / "find.json").read_text())["condition"] == "follows"
-    # The error passes its limit at 95 % of the torque; one without overshoot is far below it beyond.
-    axes = answer.plot("find").axes[0]
-    pressures, errors = map(np.asarray, axes.lines[0].get_data())
-    at_limit = float(np.interp(1.0, errors[::-1], pressures[::-1]))
-    assert at_limit * 6894.757 * volume == pytest.approx(5.7, abs=0.05)
-    assert errors[-1] < 0.2
-    assert axes.get_ylabel().replace("\n", " ") == "Largest tracking number over its limit"
-
-
-@pytest.mark.parametrize("upper", [62, 54])
-def test_the_condition_alone_is_told_where_the_reference_is_not_followed(upper: int) -> None:
-    """The supply limits the torque at 57.6 psi_g less 5 %; an RMS error below 1.2 N m asks less."""
-    answer = find(TASK, vary=f"supply.pressure=30..{upper} psi_g", such_that="rms_error <= 1.2 N m", grid=9)
-    told = re.search(r"the condition alone is met from ([\d.]+) psi_g \(not at ([\d.]+) psi_g\)$", answer.said[0])
-    assert told is not None
-    metrics = {f"{(sample.value - 101325.0) / 6894.757:.4g}": sample.metric for sample in answer.found.tried}
-    met, unmet = (metrics[text] for text in told.groups())
-    assert met <= 1.2 < unmet
-    assert "and follows its reference" in answer.said[0]
-    assert ("; below it the reference is not followed: " in answer.said[0]) == (answer.found.value is not None)
-
-
 def test_a_run_that_follows_is_a_condition_of_its_own() -> None:
     task = ["reference.level=4 N m", "controller.integral_gain=0 1/(N m s)"]
     answer = find(
@@ -364,37 +288,3 @@ def test_a_run_that_follows_is_a_condition_of_its_own() -> None:
         find("step-response", vary="supply.pressure=50..60 psi_g", such_that="follows")
     with pytest.raises(StudyError, match=r"or 'follows' \(the run follows its reference\)"):
         find(TASK, vary="supply.pressure=50..60 psi_g", such_that="following")
-
-
-def test_a_number_of_the_other_form_of_an_orifice_names_the_form_and_the_scenario_once() -> None:
-    """The cylinder's valve is given by a sonic conductance."""
-    message = (
-        r"^cylinder-servo: the device is given by valve\.sonic_conductance and valve\.critical_ratio; "
-        r"to vary valve\.area instead, "
-        r"also vary valve\.discharge_coefficient, or first set valve\.area and valve\.discharge_coefficient$"
-    )
-    with pytest.raises(StudyError, match=message):
-        find("cylinder-servo", vary="valve.area=1..5 mm^2", such_that="rms_angle_error <= 3 deg", grid=3)
-
-
-def test_a_run_without_a_verdict_is_none_that_follows() -> None:
-    wave = ["reference.kind=sine", "reference.level=2 N m", "reference.amplitude=0.5 N m"]
-    answer = find(TASK, vary="reference.frequency=0.1..1 Hz", such_that="follows", grid=10, overrides=wave)
-    # The judged half of 3 s holds half a period of a third of a hertz.
-    assert answer.found.value == pytest.approx(1.0 / 3.0, rel=1e-3)
-    assert "no verdict on the torque: " in answer.said[2]
-    assert "0.5 periods of the reference" in answer.said[2]
-
-
-def test_a_gain_that_another_kind_of_controller_keeps_is_told_as_simulate_tells_it() -> None:
-    overrides = ["controller.kind=damped_proportional"]
-    answer = find(
-        "torque-task-proportional",
-        overrides=overrides,
-        vary="supply.pressure=50..60 psi_g",
-        such_that="follows",
-        grid=8,
-    )
-    kept = ppafo.load_scenario("torque-task-proportional", overrides).origin.replaced
-    assert kept.startswith("kept from pid for damped_proportional: controller.proportional_gain=")
-    assert kept in answer.found.remarks

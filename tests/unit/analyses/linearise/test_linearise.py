@@ -1,18 +1,15 @@
 """Linear models: slopes of the textbook, steady states that stay, the square law of steps, and what is refused."""
 
-import io
-import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.linearise.answer import finding_of, frequency_panels, steps_of
+from ppafo.analyses.linearise.answer import frequency_panels, steps_of
 from ppafo.analyses.linearise.model import LinearModel, SlopeKink
 from ppafo.analyses.linearise.question import linearise
 from ppafo.constants import STANDARD_GRAVITY
@@ -168,29 +165,6 @@ def test_the_error_of_a_step_falls_with_the_square_of_its_amplitude_over_three_d
     assert slopes[2] == pytest.approx(2.0, abs=0.03)
 
 
-def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
-    assert steady.sides["chamber 2 to atmosphere"].startswith("choked")
-    assert steady.sides["source to chamber 1"].startswith("below choking")
-    assert steady.sides["source to chamber 2"] == "closed"
-    assert steady.edges == ()
-    at_stop = linear("step-response")
-    assert at_stop.sides["ankle"] == "against a stop"
-    assert "straight line" in at_stop.sides["source to chamber 1"]
-    assert at_stop.edges == (SlopeKink("command", is_above=False),)
-    assert "the column of `command` is valid only below 1; the derivative above this value differs" in text_of(
-        finding_of(at_stop)
-    )
-    assert at_stop.b[:, 0].any(), "of a valve that is fully open the side is taken on which it closes"
-    deaf = linear(TASK, 0.1, ["valve.dead_band=0.5", "controller.dead_band=0"])
-    assert "the column of the command is 0" in deaf.sides["valve"]
-    assert not deaf.b[:, 0].any()
-    assert not finding_of(deaf).figures
-    stuck = linear("step-response", 0.0, ["motion.kind=free", "initial.pressure_2=atmosphere", "motion.angle=60 deg"])
-    assert stuck.sides["ankle"] == "sticks by static friction"
-    assert [item.name for item in stuck.states] == ["pressure_1", "pressure_2"]
-    assert linear("step-response", 0.1).sides["ankle"] == "slides in plantarflexion"
-
-
 def test_a_valve_at_its_slew_limit_does_not_answer_and_one_that_has_arrived_does() -> None:
     slow = ("valve.slew_limit=0.05 1/s", *HOLD)
     moving, steady = linear(TASK, 0.3, slow), linear(TASK, overrides=slow)
@@ -214,17 +188,6 @@ def test_at_a_closed_valve_the_model_is_that_of_an_opening_to_chamber_1(
     closed, opened = (of_the_textbook(run, None, {**at, "command": command}) for command in (0.0, 1e-3))
     slopes = [1e3 * (opened[row] - closed[row]) for row in ("rate of pressure_1", "rate of pressure_2")]
     assert model.b[:, 0] == pytest.approx(slopes, rel=1e-9, abs=1e-6)
-
-
-def test_a_closed_spool_is_taken_to_open_to_chamber_1_too() -> None:
-    model = linear("torque-task-slow-valve", 0.0)
-    run = plan_run(model.scenario)
-    column = [item.name for item in model.states].index("valve_opening")
-    at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)} | {"external_torque": 0.0}
-    closed, opened = (of_the_textbook(run, None, {**at, "valve_opening": value}) for value in (0.0, 1e-3))
-    slopes = [1e3 * (opened[row] - closed[row]) for row in ("rate of pressure_1", "rate of pressure_2")]
-    assert model.a[:2, column] == pytest.approx(slopes, rel=1e-9, abs=1e-6)
-    assert slopes[0] > 1e6
 
 
 def test_a_time_is_taken_to_the_nearest_step_before_the_first_one_too() -> None:
@@ -280,21 +243,6 @@ def test_an_energy_balance_slows_what_isothermal_gas_does_at_once() -> None:
     warm = linear(TASK, overrides=(*HOLD, *walls))
     assert warm.poles[:2] == pytest.approx(cold.poles, rel=1e-3)
     assert abs(warm.poles[2]) > 1e3 * abs(cold.poles[1])
-
-
-def test_the_folder_has_names_units_and_matrices(steady: LinearModel, tmp_path: Path) -> None:
-    finding_of(steady).save(tmp_path / "out")
-    data = json.loads((tmp_path / "out/linearise.json").read_text(encoding="utf-8"))
-    assert data["inputs"][0]["name"] == "command"
-    assert {item["name"]: item["unit"] for item in data["outputs"]}["torque"] == "N m"
-    arrays = np.load(io.BytesIO((tmp_path / "out/linearise.npz").read_bytes()))
-    for name, matrix in (("A", steady.a), ("B", steady.b), ("C", steady.c), ("D", steady.d)):
-        assert (arrays[name] == matrix).all()
-        assert data[name] == matrix.tolist()
-    assert arrays["states"].tolist() == ["pressure_1", "pressure_2"]
-    assert arrays["inputs_units"].tolist()[0] == "1"
-    assert (tmp_path / "out/steps.png").stat().st_size > 10_000
-    assert "Matrix A" in text_of(finding_of(steady))
 
 
 def test_the_system_for_python_control_has_the_same_response(steady: LinearModel) -> None:
@@ -391,16 +339,6 @@ def test_margins_and_crossover_are_those_of_loop_shaping() -> None:
     assert sealed.is_stable
 
 
-def test_what_is_zero_within_rounding_is_zero_and_one_state_is_singular(steady: LinearModel) -> None:
-    angle = [item.name for item in steady.inputs].index("angle")
-    assert not steady.b[:, angle].any(), "at rest in a steady state a locked angle changes no flow"
-    text = text_of(finding_of(steady))
-    assert "Matrix C (SI)" in text
-    assert "Matrix D (SI)" in text
-    bladder = Path(__file__).parents[3] / "actuators/torque-task-measured-bladder.toml"
-    assert ": 1 state, 4 inputs" in text_of(linearise(bladder))
-
-
 def test_a_pressure_loop_has_an_equilibrium_at_its_reference() -> None:
     for controlled in ("pressure_1", "pressure_2"):
         model = linear("pressure-loop", overrides=[f"reference.of={controlled}"])
@@ -408,10 +346,3 @@ def test_a_pressure_loop_has_an_equilibrium_at_its_reference() -> None:
         assert point[controlled] == pytest.approx(3e5 + model.scenario.device.supply.atmospheric_pressure, rel=1e-9)
         assert model.margins is not None
         assert model.margins.is_stable
-
-
-def test_matrices_are_found_under_their_names_in_the_equations() -> None:
-    model = ppafo.linearise("torque-task-proportional", overrides=["reference.level=3 N m"]).found
-    assert (model.A is model.a, model.B is model.b, model.C is model.c, model.D is model.d) == (True,) * 4
-    with pytest.raises(AttributeError, match="no attribute 'E'"):
-        model.E  # noqa: B018

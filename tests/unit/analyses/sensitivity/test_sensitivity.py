@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import qmc
 
-from ppafo.analyses.sensitivity.answer import finding_of, overlapping_pairs, remarks
-from ppafo.analyses.sensitivity.methods import METHODS, EvaluatedBlocks, changes
+from ppafo.analyses.sensitivity.answer import finding_of, overlapping_pairs
+from ppafo.analyses.sensitivity.methods import METHODS
 from ppafo.analyses.sensitivity.question import sensitivity
 from ppafo.analyses.sensitivity.solve import Influences, SensitivitySettings, analyse
 from ppafo.errors import StudyError
@@ -78,19 +77,6 @@ def test_the_result_is_the_same_every_time() -> None:
     assert np.array_equal(one.metrics[0].indices.bands["total"], other.metrics[0].indices.bands["total"])
 
 
-def test_a_distribution_without_ends_has_finite_effects() -> None:
-    normal = Uncertainty((RandomValue("x1", NormalAround(0.0, 1.0)), RandomValue("x2", NormalAround(5.0, 2.0))))
-
-    def first(columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        return {METRIC: columns["x1"].copy()}
-
-    for method in METHODS.values():
-        indices = analysed(first, normal, method.name, SensitivitySettings(64)).metrics[0].indices
-        assert np.all(np.isfinite(indices.values[method.shown[0]]))
-        least = 1e-9 if method.name != "shapley" else indices.bands["shapley"][1]
-        assert indices.values[method.shown[0]][1] == pytest.approx(0.0, abs=least)
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_a_failed_run_takes_its_whole_block_with_it(method: str) -> None:
     settings = SensitivitySettings(128, maximum_failed=0.02)
@@ -102,14 +88,6 @@ def test_a_failed_run_takes_its_whole_block_with_it(method: str) -> None:
     whole = analysed(ishigami, ANGLES, method, settings).metrics[0]
     name = METHODS[method].shown[0]
     assert found.metrics[0].indices.values[name] == pytest.approx(whole.indices.values[name], rel=0.2, abs=0.05)
-
-
-def test_failures_at_the_beginning_only_shorten_the_course() -> None:
-    rows = METHODS["sobol"].block_rows(3)
-    model = failing(ishigami, np.arange(62) * rows)
-    found = analysed(model, ANGLES, "sobol", SensitivitySettings(1024)).metrics[0]
-    assert [each.blocks for each in found.settling] == [128, 256, 512, 1024]
-    assert [each.used for each in found.settling] == [66, 194, 450, 962]
 
 
 def test_a_sample_with_hardly_a_whole_block_says_nothing() -> None:
@@ -263,12 +241,6 @@ def test_shapley_effects_of_correlated_values_are_the_known_ones_and_their_bands
     assert np.mean(held) >= 0.9
 
 
-def test_shapley_effects_of_independent_values_share_out_what_acts_together() -> None:
-    first, total = known_indices()
-    found = analysed(ishigami, ANGLES, "shapley", SensitivitySettings(8192)).metrics[0].indices
-    assert found.values["shapley"] == pytest.approx(0.5 * (first + total), abs=0.03)
-
-
 STUDY = "torque-task-uncertainty"
 
 
@@ -287,16 +259,6 @@ def test_what_matters_for_the_error_and_what_for_the_gas() -> None:
     assert change["actuator.leak.area"] > 0.0 > change["gas.temperature"]
     assert np.sum(found.metrics[0].indices.values["first"]) == pytest.approx(1.0, abs=0.1)
     assert found.runs == 256 * 9
-
-
-def test_few_base_points_are_not_taken_for_interactions() -> None:
-    found = sensitivity(
-        STUDY, metrics=["gas_supplied"], samples=64, configuration="proportional", independent=True
-    ).found
-    (metric,) = found.metrics
-    # The indices happen to sum to more than 1, of which no rest can be left.
-    assert np.sum(metric.indices.values["first"]) > 1.0
-    assert "interactions, if any, are within this error" in remarks(found, metric)[-1]
 
 
 def test_the_study_of_the_package_with_its_correlation_gets_shapley_effects() -> None:
@@ -342,32 +304,3 @@ def test_mistakes_are_one_line() -> None:
         sensitivity(STUDY, method="sobol", configuration="solenoid", samples=64)
     with pytest.raises(StudyError, match="has no 'gas': the metric needs a walk"):
         sensitivity(STUDY, metrics=["gas"], configuration="solenoid")
-
-
-@pytest.mark.parametrize(
-    ("metric", "fewest"),
-    [(lambda x: np.exp(1.5 * x), 18), (lambda x: np.maximum(x - 0.07, 0.0), 19), (lambda x: np.sin(6.0 * x), 19)],
-    ids=["curve", "kink", "wave"],
-)
-def test_the_band_of_a_change_has_what_the_metric_bends_beside_the_spread(
-    metric: Callable[[np.ndarray], np.ndarray], fewest: int
-) -> None:
-    """Of 20 bands none held of a kink or a wave, whose spread says nothing of what a parabola leaves."""
-    held = 0
-    for seed in range(20):
-        points = np.empty((8 * 1024, 2, 2))
-        for scramble in range(8):
-            points[scramble::8, 0] = qmc.Sobol(2, scramble=True, seed=100 * seed + scramble).random(1024)
-        points[:, 1] = points[:, 0, ::-1]
-        drawn = points.reshape(-1, 2)
-        values = metric(drawn[:, 0]) + 0.1 * drawn[:, 1]
-        ends = np.array([[0.05, 0.05], [0.95, 0.95]])
-        change, band = changes(EvaluatedBlocks(drawn, drawn, values, np.arange(len(points)), ends, seed), 0.95)
-        held += bool(abs(change[0] - np.diff(metric(np.array([0.05, 0.95])))[0]) <= band[0])
-    assert held >= fewest
-
-
-def test_the_convergence_has_ticks_at_the_sample_sizes_that_it_shows() -> None:
-    axes = sensitivity(STUDY, metrics=["gas_supplied"], samples=512, configuration="proportional").plot().axes[1]
-    assert [text.get_text() for text in axes.get_xticklabels()] == ["512", "128"]
-    assert list(axes.get_xticks()) == [512, 128]

@@ -25,29 +25,3 @@ def test_a_map_is_drawn_of_what_differs_and_of_whether_the_run_follows() -> None
     narrow = finding.plot(width="84 mm")
     narrow.draw_without_rendering()
     assert min(axes.yaxis.label.get_window_extent().x0 for axes in narrow.axes if axes.get_ylabel()) > 0.0
-
-
-def test_a_metric_that_all_runs_share_is_named_and_not_drawn_unless_it_is_the_only_one() -> None:
-    def swept(name: str, *metrics: str) -> tuple[list[tuple[str, float, float]], str]:
-        vary = [
-            {"path": path, "kind": "uniform", "minimum": f"{low} {unit}", "maximum": f"{high} {unit}"}
-            for path, low, high, unit in (
-                ("supply.pressure", 45, 55, "psi_g"),
-                ("valve.area", 8, 12, "mm^2"),
-                ("actuator.leak.area", 0.1, 0.2, "mm^2"),
-            )
-        ]
-        configurations = [{"name": "task", "scenario": "torque-task-proportional", "overrides": ["run.duration=0.2 s"]}]
-        parts = {"configurations": configurations, "vary": vary, "outputs": {"metrics": list(metrics)}}
-        finding = ppafo.sweep({"schema_version": 1, "name": name, "sample": {"method": "random", "runs": 8}, **parts})
-        axes = finding.plot(width="84 mm").axes
-        return [(each.get_xlabel(), *each.get_xlim()) for each in axes], finding.figures["figure"].caption
-
-    # The vane is locked, so that its angle has no range.
-    drawn, caption = swept("three", "angle_range", "gas_imbalance", "peak_torque")
-    assert [name for name, _, _ in drawn] == ["Peak torque (N m)"]
-    assert caption.endswith("Not drawn, because without a difference in the runs: angle_range, gas_imbalance.")
-    ((name, low, high),), caption = swept("one", "angle_range")
-    assert name == "Angle range (deg)"
-    assert -5.0 < low < 0.0 < high < 5.0
-    assert "Not drawn" not in caption

@@ -14,9 +14,7 @@ import pytest
 
 import ppafo
 from ppafo.errors import StudyError
-from ppafo.model.sensors import Measurement
 from ppafo.studies.study import Study
-from ppafo.study.controller_document import controller_document
 
 LAW = """
 class Law:
@@ -86,45 +84,6 @@ def test_a_study_goes_on_with_the_same_law_and_is_refused_with_any_other(
         ppafo.sweep(controlled_by(written(LAW).Law(0.3)), out=out)
     with pytest.raises(StudyError, match=r"controller\.custom\.source was '.*' and is now '.*'; undo the change"):
         ppafo.sweep(controlled_by(written(LAW.replace("0.5 *", "0.6 *")).Law()), out=out)
-
-
-class Table:
-    """Settings of every kind, some in slots; it holds itself."""
-
-    __slots__ = ("inner", "itself", "law", "names", "quiet", "values")
-
-    def __init__(self, values: Any, quiet: Any, law: Any) -> None:
-        self.values, self.quiet, self.law, self.names, self.itself = values, quiet, law, {"b", "a"}, self
-        self.inner = {"limits": (1.0, float("inf")), "key": b"abc"}
-
-    def reset(self) -> None: ...
-
-    def update(self, time: float, reference: float, measurement: Measurement) -> float:
-        return 0.0
-
-
-def test_every_setting_counts_wherever_it_lies() -> None:
-    found = controller_document(Table(np.arange(3.0), np.True_, abs))["settings"]
-    assert found["values"] == [0.0, 1.0, 2.0]
-    assert found["quiet"] is True
-    assert found["names"] == ["a", "b"]
-    assert found["inner"]["limits"] == [1.0, "inf"]
-    assert found["itself"]["settings"]["itself"].endswith("Table")
-    long = [controller_document(Table(np.full(1000, value), False, abs)) for value in (1.0, 2.0, 1.0)]
-    assert long[0] == long[2] != long[1]
-    laws = [controller_document(Table([], False, law))["settings"]["law"] for law in (controlled_by, Table)]
-    assert laws[0]["type"].endswith("controlled_by")
-    assert laws[1]["type"].endswith("Table")
-
-
-def test_a_law_without_a_file_is_known_by_its_code() -> None:
-    sources = []
-    for text in (LAW, LAW.replace("0.5 *", "0.6 *"), LAW):
-        names: dict[str, Any] = {"__name__": "__main__"}
-        exec(text, names)
-        names["Law"].__module__ = "nowhere"
-        sources.append(controller_document(names["Law"]())["source"])
-    assert sources[0] == sources[2] != sources[1]
 
 
 COMPOSED = """

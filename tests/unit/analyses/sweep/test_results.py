@@ -1,17 +1,15 @@
 """Results of a study: statistics of what is too large for the memory, tables and columns, bands, the figure."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ppafo.analyses.sweep.answer import finding_of, load_study_results
+from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.analyses.sweep.results import StudyResults
 from ppafo.analyses.sweep.solve import describe, sorted_quantiles, sweep
-from ppafo.errors import ArgumentError, DataError, PpafoError, StudyError, UnitError
-from ppafo.report.style import render_figure
+from ppafo.errors import DataError, PpafoError, StudyError, UnitError
 
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.777, 0.95, 1.0)
 RANDOM = np.random.default_rng(6)
@@ -90,20 +88,6 @@ def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
         load_study_results(tmp_path)
 
 
-def test_results_do_what_everything_solved_does(small_results: StudyResults, tmp_path: Path) -> None:
-    finding = finding_of(small_results)
-    finding.save(tmp_path / "saved")
-    names = {path.name for path in (tmp_path / "saved").iterdir()}
-    assert names == {"figure.png", "figure.svg", "ppafo.json", "report.html", "sweep.json", "sweep.txt"}
-    stored = json.loads((tmp_path / "saved" / "sweep.json").read_text(encoding="utf-8"))
-    assert stored == finding.to_dict() == {**small_results.summary, "folder": str(small_results.folder.path)}
-    page = (tmp_path / "saved" / "report.html").read_text(encoding="utf-8")
-    assert "of their normal scores" in page
-    assert "Sampled by sobol: 8 draws, seed 3." in page
-    with pytest.raises(ArgumentError, match="a result of 'sweep' has no figure 'pareto'; available: figure"):
-        finding.plot("pareto")
-
-
 BAND_SHARES = (0.0, 0.05, 0.25, 0.5, 0.9, 1.0)
 
 
@@ -122,7 +106,6 @@ def test_quantiles_over_time_are_those_of_numpy_wherever_runs_failed() -> None:
 AXIS = {"path": "reference.level", "kind": "grid", "first": "2 N m", "last": "5 N m", "count": 3}
 OTHER = {"path": "valve.area", "kind": "grid", "first": "4 mm^2", "last": "16 mm^2", "count": 3}
 DRAWN = {"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"}
-LEAK = {"path": "actuator.leak.area", "kind": "uniform", "minimum": "0.2 mm^2", "maximum": "0.4 mm^2"}
 
 
 def study(*vary: dict[str, Any], names: tuple[str, ...] = ("proportional",), **outputs: Any) -> dict[str, Any]:
@@ -142,48 +125,6 @@ def study(*vary: dict[str, Any], names: tuple[str, ...] = ("proportional",), **o
 
 
 BOTH = ("proportional", "solenoid")
-
-
-@pytest.mark.parametrize(
-    ("document", "panels"),
-    [
-        # A proportional valve switches once in every run: no panel of what is constant.
-        (study(DRAWN), ["Supply pressure (psig)"]),
-        (study(DRAWN, LEAK, names=BOTH, bands=["torque"]), ["Supply pressure (psig)"] * 4 + ["Time (s)"]),
-        (study(AXIS, OTHER | {"spacing": "logarithmic"}, DRAWN, names=BOTH), ["Torque to hold (N m)"] * 4),
-        (study(DRAWN, metrics=[], bands=["command"]), ["Time (s)"]),
-        (study(names=BOTH), ["RMS error (N m)", "Switchings"]),
-    ],
-)
-def test_there_is_a_panel_for_everything_that_was_asked(document: dict[str, Any], panels: list[str]) -> None:
-    figure = sweep(document).plot()
-    shown = [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
-    assert [axes.get_xlabel() for axes in shown] == panels
-    assert render_figure(figure, ["png"])["png"].startswith(b"\x89PNG")
-    assert any("simulated" in text.get_text() for text in figure.texts)
-
-
-def test_two_values_that_were_drawn_are_the_axes_of_each_panel() -> None:
-    figure = sweep(study(DRAWN, LEAK, metrics=["gas_supplied"])).plot()
-    assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == (
-        "Supply pressure (psig)",
-        "Leak area (mm$^2$)",
-    )
-    assert figure.axes[1].get_ylabel() == "Gas supplied (g)"
-
-
-def test_maps_of_several_configurations_have_one_scale_of_colours_for_a_metric() -> None:
-    levels = {"path": "reference.level", "kind": "list", "values": ["2 N m", "5 N m", "6 N m"]}
-    figure = sweep(study(levels, OTHER, names=BOTH, metrics=["rms_error", "gas_supplied"])).plot()
-    panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
-    assert len(panels) == 4
-    for row in (panels[:2], panels[2:]):
-        limits = {axes.collections[0].get_clim() for axes in row}
-        assert len(limits) == 1
-        low, high = limits.pop()
-        assert low == min(axes.collections[0].get_array().min() for axes in row)
-        assert high == max(axes.collections[0].get_array().max() for axes in row)
-    assert [label.get_text() for label in panels[0].get_xticklabels()] == ["2", "5", "6"], "a list: cells side by side"
 
 
 def test_a_map_shows_the_mean_over_the_draws_where_it_belongs() -> None:

@@ -1,7 +1,6 @@
 """A study from its file to its rows: every run is what it is alone, failures are rows, a stopped study goes on."""
 
 import dataclasses
-import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -11,18 +10,15 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.sweep import solve
 from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.analyses.sweep.results import StudyResults
 from ppafo.analyses.sweep.solve import LOG, sweep
 from ppafo.errors import DataError, StudyError
-from ppafo.metrics import METRICS
 from ppafo.progress import Progress
-from ppafo.signals.recording import CHANNELS
 from ppafo.studies.loading import load_study
 from ppafo.study import store
 from ppafo.study.folder import StudyFolder
-from ppafo.study.store import chunk_file, compute_chunk, estimate_bytes, stored_unit
+from ppafo.study.store import chunk_file, compute_chunk, estimate_bytes
 
 AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
 
@@ -79,17 +75,6 @@ def test_a_row_has_the_estimated_error_of_each_metric_where_the_study_keeps_it(v
     assert all(table["largest_pressure_error"] < 10.0)
 
 
-def test_tables_tell_absolute_pressures_from_differences(varying: Callable[..., Any]) -> None:
-    document = varying(
-        {"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"},
-        {"path": "sensors.pressure_resolution", "kind": "uniform", "minimum": "0 Pa_d", "maximum": "9 Pa_d"},
-    )
-    units = load_study(document).units
-    assert (units["supply.pressure"], units["sensors.pressure_resolution"]) == ("Pa_a", "Pa_d")
-    assert stored_unit(METRICS["largest_pressure"].unit) == stored_unit(CHANNELS["pressure_1"].unit) == "Pa_a"
-    assert stored_unit(CHANNELS["pressure_difference"].unit) == "Pa_d"
-
-
 def test_both_configurations_get_the_same_draws(small_results: StudyResults) -> None:
     for path in small_results.varied:
         one, other = small_results.by_configuration(path).values()
@@ -137,15 +122,6 @@ def test_bands_are_the_quantiles_over_the_runs(small_results: StudyResults) -> N
     assert bands["runs"][own].tolist() == [16] * 11
     for share in (0.05, 0.5, 0.95):
         np.testing.assert_allclose(bands[f"q{share:g}"][own], np.quantile(traces, share, axis=0), rtol=1e-14)
-
-
-def test_bands_read_a_few_times_at_once_are_the_same(
-    small: Any, small_results: StudyResults, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(solve, "MAXIMUM_IN_MEMORY", 40)
-    again = sweep(small).found.bands()
-    for name, values in small_results.bands().items():
-        np.testing.assert_array_equal(again[name], values)
 
 
 def test_chunks_are_the_same_in_any_order_and_on_any_number_of_threads(small_results: StudyResults, small: Any) -> None:
@@ -221,18 +197,6 @@ def test_the_results_are_the_same_with_any_number_of_runs_of_a_chunk(
         assert (tmp_path / "out" / name).read_bytes() == (small_results.folder.path / name).read_bytes()
     for name, values in small_results.table(["rms_error", "supply.pressure"]).items():
         np.testing.assert_array_equal(again.table([name])[name], values)
-
-
-def test_an_interrupt_in_the_first_moments_keeps_the_first_runs(small: Any, tmp_path: Path) -> None:
-    del small["runs_of_chunk"]
-    small["configurations"], small["sample"]["runs"] = small["configurations"][:1], 500
-    with pytest.raises(StoppedError):
-        sweep(small, out=tmp_path / "out", progress=stopped_after(1))
-    kept = sorted((tmp_path / "out" / "finished").iterdir())
-    assert [json.loads(path.read_bytes())["runs"] for path in kept] == [64, 128][: len(kept)]
-    sweep(small, out=tmp_path / "out")
-    sweep(small, out=tmp_path / "in-peace")
-    assert contents(tmp_path / "out") == contents(tmp_path / "in-peace")
 
 
 def cut(content: bytes) -> bytes:
@@ -317,19 +281,6 @@ def test_a_changed_study_is_refused_with_what_changed(
     assert contents(small_results.folder.path) == before
 
 
-def test_results_of_a_study_and_of_a_run_name_the_function_that_reads_them(
-    small_results: StudyResults, tmp_path: Path
-) -> None:
-    for read in (ppafo.read_result, ppafo.read_recording):
-        with pytest.raises(DataError, match=r"results of a study, not of a run; read them by load_study_results$"):
-            read(small_results.folder.path)
-    folder = ppafo.simulate("step-response", overrides=["run.duration=10 ms"]).save(tmp_path / "run")
-    with pytest.raises(DataError, match=r"no study results .*; read the result of a run by read_result$"):
-        ppafo.load_study_results(folder)
-    with pytest.raises(DataError, match=r"no study results \(study\.json cannot be read\)$"):
-        ppafo.load_study_results(tmp_path / "nothing")
-
-
 def test_the_folder_of_another_study_is_refused(small_results: StudyResults, small: Any) -> None:
     small["name"] = "other"
     with pytest.raises(StudyError, match="contains the results of the study 'small', not of 'other'"):
@@ -410,32 +361,9 @@ def test_without_a_folder_the_results_live_as_long_as_their_object(varying: Call
     assert not folder.exists()
 
 
-def test_the_log_has_a_line_for_every_session_and_nothing_else_tells_the_time(small: Any, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    with pytest.raises(StoppedError):
-        sweep(small, out=out, progress=stopped_after(2))
-    sweep(small, out=out)
-    sweep(small, out=out)
-    lines = [json.loads(line) for line in (out / LOG).read_text(encoding="utf-8").splitlines()]
-    assert [line["runs"] for line in lines][-1] == 0
-    assert all(line["seconds"] >= 0.0 for line in lines)
-
-
-def test_results_at_an_address_are_refused(small: Any) -> None:
-    with pytest.raises(DataError, match=r"s3://bucket/study: is a URL; give a folder on this computer"):
-        sweep(small, out="s3://bucket/study")
-
-
 def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any]) -> None:
     document = varying(AREA, runs=4)
     seeds = (None, document["sample"]["seed"], document["sample"]["seed"] + 1)
     first, same, other = (sweep(document, seed=seed).found.table(["valve.area"])["valve.area"] for seed in seeds)
     assert (first == same).all()
     assert (first != other).all()
-
-
-def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> None:
-    with pytest.raises(
-        StudyError, match="a loaded Study accepts no overrides, draws or seed; give these to load_study"
-    ):
-        sweep(load_study(small), draws=3)

@@ -89,14 +89,6 @@ def test_json_has_the_summary(study: Path, tmp_path: Path, capsys: pytest.Captur
     assert document["folder"] == str(tmp_path / "out")
 
 
-def test_the_same_command_again_changes_no_byte(study: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    assert swept(study, out) == 0
-    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file() and path.name != "log.jsonl"}
-    assert swept(study, out) == 0
-    assert {path: path.read_bytes() for path in before} == before
-
-
 def test_failed_runs_are_told_and_only_all_of_them_are_a_failure(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -125,33 +117,6 @@ def test_an_interruption_says_that_the_command_goes_on(
     )
     monkeypatch.undo()
     assert swept(study, tmp_path / "out") == 0
-
-
-def test_interruption_after_the_last_chunk_says_that_the_chunks_are_kept(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupted(*words: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("ppafo.analyses.sweep.answer.write_sweep_report", interrupted)
-    assert swept(study, tmp_path / "out") == 130
-    assert "finished chunks are kept" in capsys.readouterr().err
-    assert list((tmp_path / "out" / "runs").iterdir())
-
-
-def test_the_schema_describes_the_studies_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
-    import jsonschema
-
-    from ppafo.studies.loading import list_studies, load_study
-
-    assert main(["doctor", "--schema", "study"]) == 0
-    schema = json.loads(capsys.readouterr().out)
-    for name in list_studies():
-        jsonschema.validate(json.loads(json.dumps(load_study(name).document)), schema)
-    broken = json.loads(json.dumps(load_study("pressure-and-area").document))
-    broken["outputs"]["metric"] = []
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(broken, schema)
 
 
 def test_the_share_of_runs_that_do_not_follow_is_said_and_the_share_without_a_verdict(tmp_path: Path) -> None:
