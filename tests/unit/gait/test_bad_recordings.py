@@ -18,7 +18,6 @@ from ppafo.gait.recorded.mapping import (
     MomentMap,
     ShankMap,
     load_map,
-    package_map,
 )
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
@@ -114,12 +113,6 @@ CASES: dict[str, tuple[Change, str]] = {
         scaled((FORWARD, UP), 1000.0),
         "knee_forward and knee_up are 1000 times too large: they differ by",
     ),
-    "knee forward alone in millimetres": (
-        scaled((FORWARD,), 1000.0),
-        "knee_forward and knee_up differ (knee_forward is 1000 times too large)",
-    ),
-    "knee in kilometres": (scaled((FORWARD, UP), 0.001), "knee_forward and knee_up are 1000 times too small"),
-    "knee up alone times g": (scaled((UP,), 9.80665), "differ (knee_up is 9.80665 times too large)"),
     "knee forward alone times g": (scaled((FORWARD,), 9.80665), "differ (knee_forward is 9.80665 times too large)"),
     "knee times g": (scaled((FORWARD, UP), 9.80665), "divide both by 9.80665 in the file"),
     "knee in centimetres": (
@@ -130,23 +123,10 @@ CASES: dict[str, tuple[Change, str]] = {
         exchanged,
         "knee_forward and knee_up are exchanged: they differ by",
     ),
-    "knee exchanged and turned": (
-        lambda columns: exchanged(changed(FORWARD, np.negative)(columns)),
-        "knee_forward and knee_up are exchanged, and knee_up has the opposite sign",
-    ),
     "knee in g": (
         scaled((FORWARD, UP), 1.0 / 9.80665),
         "knee_forward and knee_up are in units of g: they differ by 79 % (42 % if corrected) from a "
         "rotation of the knee about the resting ankle while the foot is flat; multiply both by 9.80665 in the file",
-    ),
-    "knee in g with gravity": (
-        lambda columns: {**columns, FORWARD: columns[FORWARD] / 9.80665, UP: columns[UP] / 9.80665 + 1.0},
-        "knee_forward and knee_up are in units of g",
-    ),
-    "knee forward alone in g": (scaled((FORWARD,), 1.0 / 9.80665), "differ (knee_forward is in units of g)"),
-    "knee exchanged and in g": (
-        lambda columns: scaled((FORWARD, UP), 1.0 / 9.80665)(exchanged(columns)),
-        "are exchanged and in units of g",
     ),
     "shank in noise": (
         changed(SHANK, lambda x: x + np.random.default_rng(4).normal(0.0, 0.7, x.size)),
@@ -263,17 +243,6 @@ def test_a_reversed_ankle_over_a_stiff_shank_is_refused(
         import_gait([csv_of({**columns, SHANK: shank, ANKLE: turned})], ImportSettings(62.0))
 
 
-def test_all_that_is_wrong_is_said_in_one_go(csv_of: Callable[..., Path], columns: dict[str, Floats]) -> None:
-    several = changed(MOMENT, lambda x: 62.0 * x)(changed(ANKLE, lambda x: np.pi - x)(columns))
-    with pytest.raises(DataError, match=r"^2 things are wrong: \(1\) .*ankle_angle moves into .*; \(2\) .*90.2 N m/kg"):
-        import_gait([csv_of(several)], ImportSettings(62.0))
-    headers = changed(ANKLE, lambda x: x, "ankle_angel [rad]")(
-        changed(SHANK, lambda x: x, "shanc_angle [rad]")(columns)
-    )
-    with pytest.raises(DataError, match=r"did you mean 'shanc_angle'\?; ankle_.*did you mean 'ankle_angel'"):
-        import_gait([csv_of(headers)], ImportSettings(62.0))
-
-
 def test_what_is_wrong_at_several_stages_is_said_in_one_go(
     csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
@@ -323,29 +292,6 @@ def test_an_ankle_that_rests_in_mid_stance_is_no_reversed_one(
     assert any(line.startswith("the sign of ankle_angle is uncertain: in mid-stance") for line in found.remarks)
 
 
-SIGNS: dict[str, Change] = {
-    "shank_angle.positive": changed(SHANK, np.negative),
-    "ankle_angle.positive": changed(ANKLE, lambda x: np.pi - x),
-    "ankle_moment.positive": changed(MOMENT, np.negative),
-    "vertical_force.positive": changed(FORCE, np.negative),
-    "knee.forward": changed(FORWARD, np.negative),
-    "knee.up": changed(UP, np.negative),
-}
-
-
-@pytest.mark.parametrize("key", SIGNS)
-def test_the_remedy_changes_the_gait_map_only_where_one_was_given(
-    csv_of: Callable[..., Path], columns: dict[str, Floats], key: str
-) -> None:
-    path = csv_of(SIGNS[key](columns))
-    columns_map = package_map().model_copy(update={"centre_of_pressure": None})
-    either = r" \(\w+ or \w+\)" if key.endswith("positive") else ""
-    with pytest.raises(DataError, match=f"change (the sign of )?{re.escape(key)} in the gait map{either}"):
-        import_gait([path], ImportSettings(62.0, columns=columns_map))
-    with pytest.raises(DataError, match=f"correct the sign in the file, or change .*{re.escape(key)} in a gait map"):
-        import_gait([path], ImportSettings(62.0))
-
-
 def test_a_reversed_shank_without_a_force_is_named_as_what_it_is(
     csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
@@ -355,12 +301,6 @@ def test_a_reversed_shank_without_a_force_is_named_as_what_it_is(
     ) as refused:
         import_gait([csv_of(reversed_shank)], ImportSettings(62.0))
     assert "force" not in str(refused.value)
-
-
-def test_a_wrong_body_mass_shows_in_the_force(csv_of: Callable[..., Path], columns: dict[str, Floats]) -> None:
-    newtons = changed(FORCE, lambda x: 608.0 * x, "vertical_force [N]")(columns)
-    with pytest.raises(DataError, match="check the body mass"):
-        import_gait([csv_of(newtons)], ImportSettings(20.0))
 
 
 def test_a_force_in_swing_may_rest_and_so_may_a_coarse_sensor_where_it_turns(
@@ -563,7 +503,6 @@ def test_settings_that_make_no_sense_are_refused(
             "[knee]\nforward = ['x']\nup = ['y']\nthigh_length = '0.4 m'\n",
             "thigh_length and thigh_unit are given without thigh; omit them or give thigh",
         ),
-        ("[shank_angle\n", "is not valid TOML"),
         ("[shank_angle]\nterm = ['s']\n", "unknown key 'shank_angle.term', did you mean 'terms'"),
     ],
 )
@@ -573,11 +512,6 @@ def test_a_wrong_map_is_refused_with_key_and_value(tmp_path: Path, text: str, me
     with pytest.raises(DataError, match=re.escape(message)) as refused:
         load_map(path)
     assert str(refused.value).startswith(str(path))
-
-
-def test_a_missing_map_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"none.toml: cannot be read: no such file"):
-        load_map(tmp_path / "none.toml")
 
 
 def test_a_hip_below_the_ground_is_a_sign_and_no_unit(opensim_files: dict[str, Path]) -> None:

@@ -13,9 +13,9 @@ from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.cycle import wrap_cycle
-from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, ShankMap, Side, load_map
+from ppafo.gait.recorded.mapping import AngleMap, GaitMap, ShankMap, Side, load_map
 from ppafo.gait.recorded.signal import Signal
-from ppafo.gait.recorded.source import find_convention, read_source, read_table
+from ppafo.gait.recorded.source import find_convention, read_table
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.opensim import write_opensim
@@ -445,38 +445,3 @@ def test_a_column_without_unit_is_one_that_a_gait_map_may_name(tmp_path: Path) -
         match=r"Kraft\); the foot is placed by both angles.*; name the columns in a gait map \(columns; format",
     ):
         import_gait([path], PERSON)
-
-
-def test_a_plain_table_without_units_asks_for_them(tmp_path: Path) -> None:
-    path = tmp_path / "walk.csv"
-    path.write_text("time,shank_angle,ankle_angle\n" + "".join(f"{0.01 * k},1,2\n" for k in range(30)))
-    with pytest.raises(DataError, match=r"'shank_angle' has no unit in the file; give shank_angle.unit in a"):
-        import_gait([path], PERSON)
-
-
-def test_lost_markers_are_named_in_the_order_of_the_curves(tmp_path: Path) -> None:
-    points = markers(TIME)
-    for label, first in (("RKNE", 100), ("RHEE", 200)):
-        points[label][:, first : first + 3] = np.nan
-    remarks = read_source([trc(tmp_path / "walk.trc", TIME, points)], replace(PERSON, longest_gap=0.1), []).remarks
-    lost = [label for remark in remarks for label in ("RKNE", "RHEE") if f"'{label}' was lost" in remark]
-    assert lost == ["RKNE", "RHEE"]
-
-
-def test_a_remark_leaves_with_the_curve_that_a_map_replaces_and_with_no_other(tmp_path: Path) -> None:
-    """Plates named for the knee of a rig: a map of the knee alone keeps the force of the file and its remark."""
-    halves = {
-        f"knee_{plate}_force_r_vy": force(FAST, "right", strides) for plate, strides in ((1, [0, 2]), (2, [1, 3]))
-    }
-    ik = opensim(tmp_path / "ik.mot", TIME, angles(TIME), "inDegrees=yes")
-    grf = opensim(tmp_path / "grf.mot", FAST, halves)
-    remark = "vertical force: the sum of knee_1_force_r_vy and knee_2_force_r_vy"
-    knee = KneeMap(forward=("pelvis_tilt",), up=("hip_flexion_r",), unit="m/s^2")
-    ankle = AngleMap(terms=("ankle_angle_r",), positive="dorsiflexion")
-    force_map = ForceMap(terms=("knee_1_force_r_vy", "knee_2_force_r_vy"))
-    kept, replaced = (
-        read_source([ik, grf], replace(PERSON, columns=GaitMap.model_validate(curves)), []).remarks
-        for curves in ({"ankle_angle": ankle, "knee": knee}, {"ankle_angle": ankle, "vertical_force": force_map})
-    )
-    assert remark in kept
-    assert remark not in replaced

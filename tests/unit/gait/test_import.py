@@ -349,16 +349,6 @@ def test_what_is_imported_can_be_written_and_loaded(csv_of: Callable[..., Path],
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
-def test_a_wrong_body_mass_of_real_walking_is_remarked(shared_data: Path, side: Side) -> None:
-    folder = shared_data / "gait" / "opensim_subject01"
-    files = [folder / "subject01_walk1_ik.mot", folder / "subject01_walk1_grf_15s.mot"]
-    true, wrong = (import_gait(files, ImportSettings(mass, side, stature=1.8034)) for mass in (72.6, 120.0))
-    assert all("thigh" in remark or "acceleration" in remark for remark in true.remarks), "nothing is odd about it"
-    assert wrong.remarks[0].startswith("vertical_force has a mean of 0.30")
-    assert "the body mass (0.6" in wrong.remarks[0]
-
-
-@pytest.mark.parametrize("side", ["right", "left"])
 def test_a_real_knee_taken_for_numbers_in_g_or_exchanged_is_refused(shared_data: Path, side: Side) -> None:
     folder = shared_data / "gait" / "opensim_subject01"
     files = [folder / "subject01_walk1_ik.mot", folder / "subject01_walk1_grf_15s.mot"]

@@ -247,13 +247,9 @@ def test_the_only_map_of_a_file_needs_no_name_and_a_problem_file_will_do(tmp_pat
 @pytest.mark.parametrize(
     ("text", "name", "message"),
     [
-        ("", None, "is empty; 'ppafo doctor --schema columns' prints its format"),
-        ("a = 1\n", None, "columns"),
         (MAPS + MAPS.replace("logger", "scope"), None, "has several column maps; name one as"),
         (MAPS, "loger", "no column map 'loger', did you mean 'logger'"),
         (MAPS.replace("column = 2", "colum = 2"), None, "did you mean 'column'"),
-        ("columns = 3\n", None, "columns"),
-        ("[columns\n", None, "is not valid TOML"),
     ],
 )
 def test_a_file_of_maps_that_cannot_be_used_is_one_line(
@@ -265,11 +261,6 @@ def test_a_file_of_maps_that_cannot_be_used_is_one_line(
     assert str(caught.value).startswith(str(tmp_path / "maps.toml"))
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_a_file_of_maps_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"nowhere\.toml: cannot be read"):
-        load_column_map(tmp_path / "nowhere.toml")
 
 
 def test_the_published_schema_of_maps_takes_a_map(tmp_path: Path) -> None:

@@ -86,10 +86,8 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("time [s],command [V]\n0,1\n1,10\n", "'command' is dimensionless; give factor in a column map"),
         ("time [s],angle [rad]\n0,1\n1,1_000\n", r"line 3, column 'angle \[rad\]': '1_000' is not a finite number"),
         ("time [s],angle [rad]\n0,1\n1,\uff12\n", "line 3, column 'angle \\[rad\\]': '\uff12' is not a finite number"),
-        ("time [s],angle [rad]\n0,1\n1,\u0662\n", "line 3, column 'angle \\[rad\\]': '\u0662' is not a finite number"),
         ("time [s],angle [rad]\n0,1\n0,2\n", "line 3, column 'time': the clock stands still"),
         ("# a\ntime [s],angle [rad]\n1,1\n0,2\n", "line 4, column 'time': the clock goes backwards"),
-        ("time [s],angle [rad]\n0,1\n0,2\n", "time must increase"),
         ("time,angle\n0,1\n", "name columns as 'name \\[unit\\]', separated by commas, not as 'time'"),
         ("\ntime [s]\n0\n", "line 1 is empty; it must contain the header"),
         (

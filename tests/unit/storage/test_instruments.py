@@ -384,8 +384,6 @@ def test_a_matlab_file_without_a_map_says_what_it_needs(matlab: Path) -> None:
     [
         ("timeseries", "t = log.Time; y = squeeze(log.Data); save('plain.mat', 't', 'y')"),
         ("table", "T = log; s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')"),
-        ("timetable", "T = timetable2table(log); T.(1) = seconds(T.(1) - T.(1)(1)); s = table2struct("),
-        ("datetime", "t = seconds(log - log(1)); save('plain.mat', 't')"),
         ("containers.Map", "save plain.mat t y"),
     ],
 )
@@ -402,11 +400,3 @@ def test_an_object_of_an_older_file_is_named_with_the_line_that_saves_it_plainly
     assert file.objects == [("log", kind)]
     assert f"log ({kind}) is an object that only MATLAB reads" in file.advice_on_objects()
     assert line in file.advice_on_objects()
-
-
-def test_what_the_line_of_a_table_saves_is_read_by_its_names(tmp_path: Path) -> None:
-    # A structure saved with -struct has its fields as variables, columns that stand upright.
-    scipy.io.savemat(tmp_path / "plain.mat", {"t": SECONDS[:, None], "p1": PRESSURE[:, None]})
-    columns = read_matlab(tmp_path / "plain.mat").columns
-    np.testing.assert_array_equal(columns["t"], SECONDS)
-    np.testing.assert_array_equal(columns["p1"], PRESSURE)

@@ -93,16 +93,6 @@ def something_else(folder: Path) -> str:
     return rf"is not empty and not a result of 'ppafo reproduce' \(it has no {MARK}\); choose another folder"
 
 
-def claims_of_somebody_else(folder: Path) -> str:
-    (folder / CLAIMS).write_text('["mine"]')
-    return r"is not empty and not a result of 'ppafo reproduce'"
-
-
-def claims_that_are_no_json(folder: Path) -> str:
-    (folder / CLAIMS).write_text("mine")
-    return r"is not empty and not a result of 'ppafo reproduce'"
-
-
 def a_reproduction_and_notes(folder: Path) -> str:
     write_reproduction(folder, WHOLE)
     (folder / "notes.txt").write_text("mine")
@@ -118,8 +108,6 @@ def a_reproduction_with_a_folder_in_it(folder: Path) -> str:
 
 FILLS = (
     something_else,
-    claims_of_somebody_else,
-    claims_that_are_no_json,
     a_reproduction_and_notes,
     a_reproduction_with_a_folder_in_it,
 )
