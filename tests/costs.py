@@ -90,9 +90,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Let models count apart, and gather the costs where the session is led."""
     config.addinivalue_line("markers", "long: `make test-all` alone runs it")
-    config.addinivalue_line(
-        "markers", "thorough: `make test-all` and `make test-long` run it, continuous integration does not"
-    )
     config.addinivalue_line("markers", "short: `make test` runs it too, whatever it costs")
     kept.RequestedProgram.compile = counted(kept.RequestedProgram.compile)  # type: ignore[method-assign]
     if not hasattr(config, "workerinput"):

@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.cli.main import main
 
-pytestmark = pytest.mark.thorough
+pytestmark = pytest.mark.long
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
 

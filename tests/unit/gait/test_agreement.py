@@ -54,22 +54,6 @@ def test_angles_on_another_clock_than_the_plates_are_said_with_the_delay(
     assert (" late relative to vertical_force" in remark) is (seconds > 0.0)
 
 
-def test_an_ankle_on_another_clock_than_the_shank_is_said_without_a_force(
-    columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]]
-) -> None:
-    angles = {name: columns[name] for name in (SHANK, ANKLE)}
-    assert not [line for line in remarks_of(angles) if "clock" in line]
-    (remark,) = (line for line in remarks_of(later(angles, (ANKLE,), 0.05), (ANKLE,)) if "clock" in line)
-    assert "late relative to shank_angle" in remark
-
-
-@pytest.mark.parametrize("names", [(SHANK, ANKLE), (SHANK,), (ANKLE,), (MOMENT,)])
-def test_curves_of_one_file_are_on_one_clock(
-    columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]], names: tuple[str, ...]
-) -> None:
-    assert not [line for line in remarks_of(later(columns, names, 0.05)) if "clock" in line]
-
-
 @pytest.mark.parametrize(
     ("name", "factor", "words"),
     [

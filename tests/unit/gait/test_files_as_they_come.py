@@ -13,14 +13,14 @@ from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.cycle import wrap_cycle
-from ppafo.gait.recorded.mapping import AngleMap, GaitMap, ShankMap, Side, load_map
+from ppafo.gait.recorded.mapping import Side
 from ppafo.gait.recorded.signal import Signal
-from ppafo.gait.recorded.source import find_convention, read_table
+from ppafo.gait.recorded.source import read_table
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.opensim import write_opensim
 from ppafo.storage.opensim_names import opensim_recording
-from tests.unit.gait.laboratory import GAIT, MASS, SPEED, STRIDE, UNLOADED, angles, curve, force, markers, opensim, trc
+from tests.unit.gait.laboratory import GAIT, MASS, STRIDE, UNLOADED, angles, curve, force, markers, opensim, trc
 
 PHASES = np.linspace(0.0, 1.0, 101)
 TIME, FAST = np.arange(0.0, 5.2, 0.01), np.arange(0.0, 5.2, 0.002)
@@ -86,32 +86,6 @@ def test_one_contact_in_a_long_record_of_a_plate_is_a_force() -> None:
         check_force_scale("plate", 10.0 * weights, "columns")
 
 
-def test_several_plates_of_one_foot_are_summed_and_named(tmp_path: Path) -> None:
-    plates = {
-        "ground_force_vy": force(FAST, "left", [1]),
-        "1_ground_force_vy": force(FAST, "right", [1]),
-        "2_ground_force_vy": force(FAST, "right", [2]),
-    }
-    ik = opensim(tmp_path / "ik.mot", TIME, angles(TIME), "inDegrees=yes")
-    found = import_gait([ik, opensim(tmp_path / "grf.mot", FAST, plates)], PERSON)
-    assert_true(found.gait)
-    assert len(found.curves["vertical_force"].strides) == 2
-    assert (
-        "vertical force: sum of the contacts of this foot, from the lean of the shank, on "
-        "'1_ground_force_vy' (1), '2_ground_force_vy' (1)"
-    ) in found.remarks
-
-
-def test_plates_by_side_are_summed(tmp_path: Path) -> None:
-    halves = {
-        f"{plate}_ground_force_r_vy": force(FAST, "right", strides) for plate, strides in ((1, [0, 2]), (2, [1, 3]))
-    }
-    ik = opensim(tmp_path / "ik.mot", TIME, angles(TIME), "inDegrees=yes")
-    found = import_gait([ik, opensim(tmp_path / "grf.mot", FAST, halves)], PERSON)
-    assert_true(found.gait)
-    assert "vertical force: the sum of 1_ground_force_r_vy and 2_ground_force_r_vy" in found.remarks
-
-
 def test_a_wrong_count_of_columns_and_repeated_last_times_are_mended_and_said(tmp_path: Path) -> None:
     path = opensim(tmp_path / "ik.mot", TIME, angles(TIME), "inDegrees=yes", width=9)
     text = path.read_text().replace(f"nRows={TIME.size}", f"nRows={TIME.size + 2}")
@@ -171,33 +145,6 @@ def test_markers_give_shank_knee_and_an_ankle_whose_zero_is_the_flat_foot(tmp_pa
     assert not any("zero of ankle_angle" in line for line in found.remarks)
 
 
-def test_a_neutral_reading_is_taken_off_the_angle_of_markers_too(tmp_path: Path) -> None:
-    path = walked(tmp_path)
-    usual = import_gait([path], PERSON).gait.ankle_angle.mean
-    for neutral in (10.0, -4.0):
-        found = import_gait([path], ImportSettings(MASS, ankle_neutral=np.radians(neutral)))
-        assert np.degrees(usual - found.gait.ankle_angle.mean) == pytest.approx(neutral, abs=0.01)
-    shifted = import_gait([path], ImportSettings(MASS, ankle_neutral=np.radians(10.0)))
-    (said,) = [line for line in shifted.remarks if "zero of ankle_angle" in line]
-    advised = np.degrees(float(said.split("ankle_neutral=")[1].split(",")[0]))
-    assert abs(advised) < 5.0, "the advice leads back to the foot that stands flat"
-    mapped = AngleMap(heel="RHEE", toe="RTOE", vertical="y", positive="dorsiflexion", neutral="10 deg")
-    columns = GaitMap(shank_angle=ShankMap(knee="RKNE", ankle="RANK", vertical="y"), ankle_angle=mapped)
-    other = import_gait([path], ImportSettings(MASS, columns=columns)).gait.ankle_angle.mean
-    assert np.degrees(other - usual) == pytest.approx(10.0, abs=0.01)
-
-
-def test_the_foot_says_which_way_a_part_of_a_stride_on_a_treadmill_goes(tmp_path: Path) -> None:
-    time = TIME[: int(1.6 * STRIDE / 0.01)]
-    points = markers(time)
-    for point in points.values():
-        # The belt takes the standing foot back; from a heel strike to the next toe-off but one that is a net way.
-        point[0] -= 1000.0 * SPEED * time
-    assert points["RANK"][0, -1] - points["RANK"][0, 0] < -500.0
-    table = read_table(trc(tmp_path / "belt.trc", time, points))
-    assert find_convention([table], "right", MASS).columns.shank_angle.forward == "x"
-
-
 def test_gaps_are_filled_up_to_the_length_that_is_stated_and_named(tmp_path: Path) -> None:
     path = walked(tmp_path, (120, 126))
     with pytest.raises(DataError, match=r"has 1 whole stride without missing .*fill the gaps .longest_gap=0.07"):
@@ -228,18 +175,6 @@ def test_rows_that_are_missing_are_bridged_up_to_the_same_length(tmp_path: Path)
     found = import_gait([path], ImportSettings(MASS, longest_gap=0.08))
     assert_true(found.gait, ("shank_angle", "ankle_angle"))
     assert "ik.mot: rows from 1.99 to 2.06 s are missing and were bridged" in found.remarks
-
-
-def test_a_cell_that_is_no_number_is_a_gap_of_its_column_only(tmp_path: Path) -> None:
-    columns = angles(TIME) | {"lumbar_extension": 0.0 * TIME}
-    columns["lumbar_extension"][50] = np.nan
-    assert_true(
-        import_gait([opensim(tmp_path / "ik.mot", TIME, columns, "inDegrees=yes")], PERSON).gait, ("shank_angle",)
-    )
-    columns["knee_angle_r"][150] = np.nan
-    found = import_gait([opensim(tmp_path / "ik.mot", TIME, columns, "inDegrees=yes")], PERSON)
-    assert all(not stride.start <= 1.5 <= stride.end for stride in found.strides)
-    assert any("markers or angles lost in 1 frame" in remark for remark in found.remarks)
 
 
 def test_start_and_end_leave_out_the_rest(tmp_path: Path) -> None:
@@ -415,33 +350,3 @@ def test_a_mean_stride_over_percent_is_one_stride_of_the_given_duration(tmp_path
     path.write_text(f"time [s],{head}\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows))
     with pytest.raises(DataError, match="stride_time is for a file over percent of the stride"):
         import_gait([path], replace(PERSON, stride_time=1.2))
-
-
-def test_a_map_of_the_ankle_alone_leaves_the_shank_to_the_form_of_the_file(tmp_path: Path) -> None:
-    path, columns_map = tmp_path / "walk.csv", tmp_path / "map.toml"
-    shank, ankle = (np.degrees(curve(name, TIME)) for name in ("shank_angle", "ankle_angle"))
-    columns = {"shank_angle [deg]": shank, "Ankle [deg]": 90.0 - ankle}
-    rows = "".join(",".join(map(repr, row)) + "\n" for row in np.column_stack([TIME, *columns.values()]).tolist())
-    path.write_text(f"{','.join(['time [s]', *columns])}\n{rows}")
-    with pytest.raises(DataError, match=r"there is no column 'ankle_angle' .* name the columns in a gait map"):
-        import_gait([path], PERSON)
-    columns_map.write_text("[ankle_angle]\nterms = ['Ankle']\npositive = 'dorsiflexion'\n")
-    mapped = replace(PERSON, columns=load_map(columns_map))
-    assert_true(import_gait([path], mapped).gait, ("shank_angle", "ankle_angle"))
-    with pytest.raises(DataError, match="columns of both angles in a gait map"):
-        import_gait([path], replace(mapped, side="left"))
-
-
-def test_a_column_without_unit_is_one_that_a_gait_map_may_name(tmp_path: Path) -> None:
-    path = tmp_path / "walk.csv"
-    columns = {f"{name} [deg]": values for name, values in angles(TIME).items()} | {"Kraft": force(TIME)}
-    rows = "".join(",".join(map(repr, row)) + "\n" for row in np.column_stack([TIME, *columns.values()]).tolist())
-    path.write_text(f"{','.join(['time [s]', *columns])}\n{rows}")
-    table = read_table(path)
-    assert (table.units["Kraft"], np.array_equal(table.columns["Kraft"], force(TIME))) == ("", True)
-    path.write_text(f"time [s],Kraft\n{''.join(f'{0.01 * k},1{chr(10)}' for k in range(30))}")
-    with pytest.raises(
-        DataError,
-        match=r"Kraft\); the foot is placed by both angles.*; name the columns in a gait map \(columns; format",
-    ):
-        import_gait([path], PERSON)

@@ -159,14 +159,6 @@ def test_a_gait_file_that_no_leg_walks_is_refused_with_the_remedy(normative: Gai
     assert "\n" not in str(refused.value)
 
 
-def test_a_gait_file_with_its_knee_exchanged_is_refused(normative: Gait) -> None:
-    wrong = dataclasses.replace(normative, knee_forward=normative.knee_up, knee_up=normative.knee_forward)
-    with pytest.raises(
-        DataError, match=r"^bad.toml: knee_forward and knee_up are exchanged: .*; exchange them in the gait file"
-    ):
-        parse_gait(gait_toml(wrong).encode(), "bad.toml")
-
-
 def test_a_gait_file_needs_no_knee_but_not_half_of_one(normative: Gait) -> None:
     half = dataclasses.replace(normative, knee_up=None)
     with pytest.raises(DataError, match=r"half.toml: knee_forward needs knee_up; give both or neither"):
@@ -361,15 +353,3 @@ def test_the_ankle_angle_is_drawn_from_neutral_with_dorsiflexion_positive(import
     np.testing.assert_allclose(gait_finding(gait).plot().axes[1].lines[-1].get_ydata()[[45, 67]], flexion)
     drawn = gait_finding(imported.gait, imported).plot().axes[1].lines
     np.testing.assert_allclose(drawn[2].get_ydata(), 90.0 - np.degrees(imported.curves["ankle_angle"].curves[0]))
-
-
-def test_single_strides_and_their_mean_are_drawn_after_an_import(imported: ImportedGait) -> None:
-    figure = gait_finding(imported.gait, imported).plot()
-    assert len(figure.axes[1].lines) == 2 + len(imported.strides) + 2
-    assert "synthetic" in {text.get_text() for text in figure.texts}
-
-
-def test_a_gait_of_angles_only_has_two_panels() -> None:
-    missing = dict.fromkeys(("ankle_moment", "vertical_force", "knee_forward", "knee_up", "walking_speed"))
-    gait = dataclasses.replace(load_gait(), **missing)
-    assert len(gait_finding(gait).plot().axes) == 2

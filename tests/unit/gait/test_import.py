@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ppafo.errors import DataError
-from ppafo.gait import CURVES, Gait, walk_recording
+from ppafo.gait import Gait, walk_recording
 from ppafo.gait.document import gait_toml, parse_gait
 from ppafo.gait.finding import gait_finding
 from ppafo.gait.gait import KNEE
@@ -25,7 +25,6 @@ from ppafo.gait.recorded.mapping import (
     PressureMap,
     ShankMap,
     Side,
-    opensim_map,
     package_map,
 )
 from ppafo.signals import Recording
@@ -68,16 +67,6 @@ def test_a_csv_file_in_the_units_and_signs_of_the_package(
     assert found.gait.stride_time_deviation == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_csv_file_in_other_units(csv_of: Callable[..., Path], columns: dict[str, Floats], normative: Gait) -> None:
-    changed = {
-        "shank_angle [deg]": np.degrees(columns["shank_angle [rad]"]),
-        "ankle_angle [deg]": np.degrees(columns["ankle_angle [rad]"]),
-        "ankle_moment [N m]": 62.0 * columns["ankle_moment [N m/kg]"],
-        "vertical_force [kN]": 0.062 * 9.80665 * columns["vertical_force [-]"],
-    }
-    assert_same(import_gait([csv_of(changed)], ImportSettings(62.0)).gait, normative)
-
-
 def test_a_map_names_columns_signs_and_zero(
     csv_of: Callable[..., Path], columns: dict[str, Floats], normative: Gait
 ) -> None:
@@ -113,18 +102,6 @@ def test_what_a_map_leaves_out_of_a_csv_file_is_read_by_its_names(
     left = import_gait([csv_of(turned)], ImportSettings(62.0, columns=both, side="left"))
     assert "ankle_moment" not in left.gait.curves
     assert "only the curves of the gait map are imported" in "\n".join(left.remarks)
-
-
-def test_what_a_map_leaves_out_of_opensim_tables_is_read_by_their_labels(
-    opensim_files: dict[str, Path], normative: Gait
-) -> None:
-    path = opensim_files["ik"]
-    path.write_text(path.read_text().replace("ankle_angle_r", "Ankle"))
-    named = GaitMap(ankle_angle=AngleMap(terms=("Ankle",), positive="dorsiflexion"))
-    settings = ImportSettings(normative.body_mass, columns=named, stature=0.4 / 0.245)
-    found = import_gait(list(opensim_files.values()), settings).gait
-    assert_same(found, normative)
-    assert all(largest_difference(found, normative, name) < 0.3 for name in KNEE)
 
 
 def test_opensim_tables_of_one_walk(opensim_files: dict[str, Path], normative: Gait) -> None:
@@ -163,18 +140,6 @@ def test_the_knee_is_read_as_acceleration_as_position_or_from_the_hip(
     for name in KNEE:
         assert largest_difference(found, normative, name) < KNEE_LIMIT
         assert found.curve(name).deviation < KNEE_LIMIT, "all strides are alike"
-
-
-def test_opensim_angles_give_the_knee_once_the_thigh_is_known(opensim_files: dict[str, Path], normative: Gait) -> None:
-    files = list(opensim_files.values())
-    without = import_gait(files, ImportSettings(62.0))
-    assert without.gait.knee_forward is None
-    assert any("give stature, or a gait map with knee.thigh_length" in remark for remark in without.remarks)
-    found = import_gait(files, ImportSettings(62.0, stature=0.4 / 0.245))
-    assert max(largest_difference(found.gait, normative, name) for name in KNEE) < KNEE_LIMIT
-    assert "thigh length is 0.400 m, 0.245 of the stature (Winter 2009)" in found.remarks
-    taller = import_gait(files, ImportSettings(62.0, stature=1.9)).gait
-    assert largest_difference(taller, normative, "knee_forward") > 10.0 * KNEE_LIMIT
 
 
 @pytest.mark.parametrize("facing", [30.0, 90.0, 180.0, -120.0])
@@ -250,23 +215,6 @@ def test_a_knee_that_cannot_be_worked_out_is_refused(
         import_gait([path], ImportSettings(62.0, columns=columns_map))
 
 
-def test_a_knee_that_counts_flexion_above_zero_is_recognised(opensim_files: dict[str, Path], normative: Gait) -> None:
-    path = opensim_files["ik"]
-    head, _, rows = path.read_text().partition("time\t")
-    labels, *lines = rows.splitlines()
-    cells = [line.split("\t") for line in lines]
-    flipped = ["\t".join([*row[:3], str(-float(row[3])), *row[4:]]) for row in cells]
-    path.write_text(head + "time\t" + "\n".join([labels, *flipped]) + "\n")
-    assert_same(import_gait(list(opensim_files.values()), ImportSettings(normative.body_mass)).gait, normative)
-    stated = ShankMap(terms=("pelvis_tilt", "hip_flexion_r", "-knee_angle_r"))
-    columns_map = opensim_map("right").model_copy(update={"shank_angle": stated, "knee": None})
-    settings = ImportSettings(normative.body_mass, columns=columns_map)
-    imported = import_gait(list(opensim_files.values()), settings)
-    found, absent = imported.gait, "no acceleration of the knee: no columns of the knee were found; name them by knee."
-    assert largest_difference(found, normative, "shank_angle") < LIMITS["shank_angle"], "a map's sign is as it says"
-    assert [absent in remark for remark in imported.remarks].count(True) == 1
-
-
 def test_without_a_force_the_strides_come_from_the_shank(opensim_files: dict[str, Path], normative: Gait) -> None:
     found = import_gait([opensim_files["ik"]], ImportSettings(normative.body_mass))
     assert found.events == "shank_angle"
@@ -327,25 +275,6 @@ def test_strides_differ_as_much_as_they_were_made_to(csv_of: Callable[..., Path]
 
 def _starts(one: Recording, lengths: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(lengths * one.duration)[:-1]])
-
-
-def test_a_stride_with_a_missed_event_is_left_out_and_said(
-    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, normative: Gait
-) -> None:
-    during = (walk.time > 2.9 * normative.stride_time) & (walk.time < 3.75 * normative.stride_time)
-    force = np.where(during, 0.0, columns["vertical_force [-]"])
-    found = import_gait([csv_of({**columns, "vertical_force [-]": force})], ImportSettings(62.0))
-    assert len(found.left_out) == 1
-    assert found.left_out[0].time == pytest.approx(2.0 * normative.stride_time, rel=0.01)
-    assert found.gait.stride_time == pytest.approx(normative.stride_time, rel=1e-3)
-    assert any("left out: 2.08 s long" in remark for remark in found.remarks)
-
-
-def test_what_is_imported_can_be_written_and_loaded(csv_of: Callable[..., Path], columns: dict[str, Floats]) -> None:
-    gait = import_gait([csv_of(columns)], ImportSettings(62.0, name="mine")).gait
-    again = parse_gait(gait_toml(gait).encode(), "mine.toml")
-    assert (again.name, again.strides, again.stance_share) == ("mine", gait.strides, gait.stance_share)
-    assert all(name in CURVES for name in again.curves)
 
 
 @pytest.mark.parametrize("side", ["right", "left"])

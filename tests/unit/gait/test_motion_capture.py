@@ -11,7 +11,7 @@ from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.mapping import load_map
 from ppafo.gait.recorded.source import form_of, read_table
 from ppafo.signals.recording import Floats
-from tests.unit.gait.laboratory import MASS, STRIDE, angles, markers, opensim, trc
+from tests.unit.gait.laboratory import MASS, STRIDE, markers, trc
 
 TIME = np.arange(0.0, 5.2, 0.01)
 POINTS = {name: point[:, : TIME.size] for name, point in markers(TIME).items()}
@@ -139,23 +139,6 @@ def test_a_marker_that_is_held_until_it_jumps_was_lost_and_one_at_rest_was_not(t
     assert not any("lost" in remark for remark in whole.remarks)
 
 
-def test_a_cell_of_words_is_named_by_line_and_marker_and_no_key_of_a_map(tmp_path: Path) -> None:
-    path = nexus(tmp_path / "walk.csv")
-    path.write_text(path.read_text().replace("10,0,", "10,0,lots", 1))
-    with pytest.raises(DataError, match=r"line 15, column '\w+.x': 'lots.*' is not a finite number") as refused:
-        import_gait([path], ImportSettings(MASS))
-    assert "channels." not in str(refused.value)
-
-
-def test_rows_of_a_motive_export_are_known_by_their_order_where_they_have_no_words(tmp_path: Path) -> None:
-    path = motive(tmp_path / "walk.csv")
-    whole, text = read_table(path), path.read_text()
-    path.write_text(text.replace(",Type,", ",,").replace(",Name,", ",,").replace(",ID,", ",,"))
-    table = read_table(path)
-    assert list(table.columns) == list(whole.columns)
-    assert np.array_equal(table.columns["RKNE.z"], whole.columns["RKNE.z"])
-
-
 @pytest.mark.parametrize(
     ("write", "old", "new", "said"),
     [
@@ -178,15 +161,6 @@ def test_a_table_of_another_program_is_answered_with_the_line_of_pandas(tmp_path
     path.write_bytes(b"PK")
     with pytest.raises(DataError, match=r"write it as CSV: pandas.read_excel\('.*walk.xlsx'\).to_csv\("):
         import_gait([path], ImportSettings(MASS))
-
-
-def test_a_counter_before_the_time_is_passed_over(tmp_path: Path) -> None:
-    path = tmp_path / "walk.csv"
-    path.write_text(",time,a [deg],b\n0,0.00,1,2\n1,0.01,,4\n2,0.02,5,6\n")
-    table = read_table(path)
-    assert list(table.columns) == ["a", "b"]
-    assert np.isnan(table.columns["a"][1])
-    assert table.columns["b"].tolist() == [2.0, 4.0, 6.0]
 
 
 def standing(path: Path, sway: float) -> Path:
@@ -224,38 +198,3 @@ def test_a_wrong_axis_of_a_map_is_named_before_any_sign(forward: str, vertical: 
     with pytest.raises(DataError, match=said) as refused:
         import_gait([path], ImportSettings(MASS, columns=load_map(tmp_path / "map.toml")))
     assert not refused.value.parts
-
-
-def test_columns_that_neither_angle_has_are_listed_once_and_not_at_any_length(tmp_path: Path) -> None:
-    points = {f"a very long name of a marker, number {n}": ROWS[:, :3].T for n in range(40)}
-    path = trc(tmp_path / "walk.trc", TIME, points)
-    with pytest.raises(
-        DataError, match=r"shank_angle: there is no column 'RKNE.x'.*; ankle_angle: there is"
-    ) as refused:
-        import_gait([path], ImportSettings(MASS))
-    assert str(refused.value).count("number 0,") == 1
-    assert len(str(refused.value)) < 650 + len(str(path))
-
-
-@pytest.mark.parametrize("form", ["trc", "mot"])
-def test_a_table_whose_tabs_a_spreadsheet_saved_as_commas_is_read(form: str, tmp_path: Path) -> None:
-    path = tmp_path / f"walk.{form}"
-    if form == "trc":
-        trc(path, TIME, POINTS)
-    else:
-        opensim(path, TIME, angles(TIME), "inDegrees=yes")
-    right, lines = read_table(path), path.read_text().splitlines()
-    width = max(line.count("\t") for line in lines)
-    # The spreadsheet makes all lines as wide as the widest.
-    path.write_text("\n".join(line.replace("\t", ",") + "," * (width - line.count("\t")) for line in lines) + "\n")
-    read = read_table(path)
-    assert read.units == right.units
-    assert all(np.array_equal(read.columns[name], values) for name, values in right.columns.items())
-
-
-def test_a_joint_centre_without_a_number_is_no_marker_of_the_leg(tmp_path: Path) -> None:
-    empty = {name: np.full((3, TIME.size), np.nan) for name in ("RKNEE", "RANKLE")}
-    renamed = {{"RKNE": "RKneeStudy", "RANK": "RAnkleStudy"}.get(name, name): point for name, point in POINTS.items()}
-    right = import_gait([trc(tmp_path / "walk.trc", TIME, renamed)], ImportSettings(MASS)).gait
-    found = import_gait([trc(tmp_path / "walk.trc", TIME, renamed | empty)], ImportSettings(MASS)).gait
-    assert found.shank_angle == right.shank_angle

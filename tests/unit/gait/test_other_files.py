@@ -77,17 +77,6 @@ def doubled_trc(folder: Path, name: str, file: str = "walk.trc") -> Path:
     return path
 
 
-@pytest.mark.parametrize("file", ["walk.trc", "walk.txt"])
-def test_a_doubled_marker_that_is_not_needed_is_left_out(tmp_path: Path, file: str) -> None:
-    walk = markers(TIME)
-    wanted = import_gait([trc(tmp_path, walk)], ImportSettings(MASS)).gait
-    path = trc(tmp_path, {**walk, "HEAD": walk["RKNE"] + 100.0, "STRAY": walk["RKNE"] + 200.0}, file)
-    path.write_text(path.read_text().replace("STRAY", "HEAD"))
-    found = import_gait([path], ImportSettings(MASS))
-    assert found.gait.shank_angle == wanted.shank_angle
-    assert any("'HEAD#1', 'HEAD#2'" in remark for remark in found.remarks)
-
-
 def test_a_doubled_marker_that_is_needed_is_named_by_its_number(tmp_path: Path) -> None:
     path = doubled_trc(tmp_path, "RKNE")
     with pytest.raises(
@@ -106,14 +95,3 @@ def test_a_doubled_marker_that_is_needed_is_named_by_its_number(tmp_path: Path) 
     turned.write_text(map_file.read_text().replace(', forward = "x"', "").replace("forward", ""))
     again = import_gait([path], ImportSettings(MASS, columns=load_map(turned)))
     assert again.gait.shank_angle == found.gait.shank_angle
-
-
-def test_a_doubled_column_of_a_plain_table_is_left_out_where_it_is_not_needed(
-    columns: dict[str, Floats], csv_of: Callable[..., Path]
-) -> None:
-    wanted = import_gait([csv_of(columns)], ImportSettings(62.0)).gait
-    plain = {header.replace("[", "(").replace("]", ")"): values for header, values in columns.items()}
-    noise = columns[next(iter(columns))]
-    path = csv_of({**plain, "EMG": noise, "STRAY": 2.0 * noise})
-    path.write_text(path.read_text().replace("STRAY", "EMG"))
-    assert import_gait([path], ImportSettings(62.0)).gait.shank_angle == wanted.shank_angle

@@ -158,14 +158,6 @@ def test_the_unit_of_a_moment_is_seen_from_its_size(trial: Trial, unit: str, sca
     assert [f"was read in {read}, from its magnitude" in line for line in said] == [True] * bool(read)
 
 
-def test_a_moment_that_no_unit_explains_is_refused_with_what_is_allowed(trial: Trial) -> None:
-    path = trial(moment_unit="lbf", moment_scale=0.01)
-    with pytest.raises(
-        DataError, match=r"'RAnkleMoment.x' reaches .* \(lbf\), which is implausible .*'N m/kg', 'N mm/kg'"
-    ):
-        import_gait([path], ImportSettings())
-
-
 def test_without_events_the_shank_gives_the_strides_and_the_plate_corrects_them(trial: Trial) -> None:
     path = trial(axis=(1, -1.0), suffix="V", has_events=False, has_subject=False)
     found = import_gait([path], ImportSettings(62.0))
@@ -178,14 +170,6 @@ def test_without_events_the_shank_gives_the_strides_and_the_plate_corrects_them(
         import_gait([path], ImportSettings())
 
 
-def test_zeros_off_the_plate_are_no_drop_out_and_two_plates_count_two_strides(trial: Trial) -> None:
-    path = trial(seconds=4.0, away=0.0, plates={"right": (1, 2), "left": (0, 1)})
-    found = import_gait([path], ImportSettings())
-    assert_true(found)
-    assert len(found.curves["vertical_force"].strides) == 2
-    assert len(found.strides) == 3
-
-
 def test_a_single_stride_past_a_plate_is_a_gait_unless_more_are_asked_for(trial: Trial) -> None:
     path = trial(seconds=2.35)
     found = import_gait([path], ImportSettings())
@@ -193,13 +177,6 @@ def test_a_single_stride_past_a_plate_is_a_gait_unless_more_are_asked_for(trial:
     assert_true(found)
     with pytest.raises(DataError, match=r"has 1 whole stride covered by .*2 are needed; .* fewer with least_strides"):
         import_gait([path], ImportSettings(least_strides=2))
-
-
-def test_a_stance_that_no_plate_carries_leaves_the_loads_out(trial: Trial) -> None:
-    found = import_gait([trial(plates={"right": (0,), "left": (0,)})], ImportSettings())
-    assert found.gait.vertical_force is None
-    assert found.gait.ankle_moment is None
-    assert "vertical_force is left out: not measured throughout the stance of any stride" in found.remarks
 
 
 def test_another_body_mass_than_the_files_is_taken_and_said(trial: Trial) -> None:

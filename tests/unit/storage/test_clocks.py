@@ -144,19 +144,8 @@ def test_many_rows_in_a_second_are_answered_with_a_rate_that_works(tmp_path: Pat
     assert read(tmp_path, text, {"rate": "10 Hz"}).duration == pytest.approx(3.0)
 
 
-def test_micros_that_wrap_in_a_log(tmp_path: Path) -> None:
-    text = "us,M\n4294957296,1\n4294962296,2\n0,3\n5000,4\n".replace("\n0,", "\n0,")
-    found = read(tmp_path, text, {"column": "us", "unit": "us"})
-    assert np.allclose(np.diff(found.time), 0.005, atol=1e-6)
-
-
 def test_a_log_of_the_serial_monitor(tmp_path: Path) -> None:
     text = "".join(f"12:00:0{row}.250 -> {line}\n" for row, line in enumerate(["us,M", "100,1", "5100,2", "10100,3"]))
     found = read(tmp_path, text, {"column": "us", "unit": "us"})
     assert np.allclose(np.diff(found.time), 0.005)
     assert read(tmp_path, text, {"column": "timestamp"}).time.tolist() == [0.0, 1.0, 2.0]
-
-
-def test_a_first_row_that_is_too_short_is_named_with_its_line(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="line 2 has 1 values for 3 columns"):
-        read(tmp_path, "a,M,t\n1\n1,2,08:00:00\n", {"column": "t"})

@@ -1,6 +1,5 @@
 """Files from elsewhere: units, signs, marks and constants; and what is wrong is named with line and column."""
 
-import tomllib
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,8 @@ from hypothesis import strategies as st
 
 import ppafo
 from ppafo.errors import DataError
-from ppafo.storage.column_map import ColumnMap, json_schema, load_column_map
+from ppafo.storage.column_map import ColumnMap, load_column_map
 from ppafo.storage.foreign import read_foreign, read_trials
-from ppafo.storage.text_table import said_of_doubled
 from tests.repeatable import TOO_SLOW
 
 TIME = {"column": 1, "unit": "ms"}
@@ -59,14 +57,6 @@ def test_decimal_commas_semicolons_and_names_are_read(tmp_path: Path) -> None:
         {"delimiter": "semicolon", "decimal": "comma", "skip_lines": 1, "channels": channels}
     )
     assert np.allclose(read_foreign(written(tmp_path, text), columns)["torque"], [1.5, -2.25])
-
-
-def test_groups_of_digits_in_one_column_leave_the_decimal_point_of_another(tmp_path: Path) -> None:
-    time = {"column": 1, "unit": "s", "factor": 1e-6, "thousands": "point"}
-    columns = mapped(delimiter="semicolon", channels={"time": time, "torque": {"column": 2, "unit": "N m"}})
-    recording = read_foreign(written(tmp_path, "101.000;7.5\n12.345.000;7.6\n"), columns)
-    assert np.allclose(recording.time, [0.101, 12.345])
-    assert np.allclose(recording["torque"], [7.5, 7.6])
 
 
 @pytest.mark.parametrize(
@@ -174,13 +164,6 @@ def test_what_is_wrong_is_named_with_its_place(tmp_path: Path, text: str | bytes
     assert str(caught.value).startswith(str(tmp_path / "raw.csv"))
 
 
-def test_a_netcdf_file_is_not_taken_for_text_in_another_encoding(tmp_path: Path) -> None:
-    path = tmp_path / "damaged.nc"
-    path.write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe damaged")
-    with pytest.raises(DataError, match=r"damaged.nc: is a NetCDF file, .* read it without a column map$"):
-        read_foreign(path, mapped(channels={}))
-
-
 @pytest.mark.parametrize(
     ("channel", "message"),
     [
@@ -196,21 +179,6 @@ def test_a_map_that_does_not_fit_is_explained(tmp_path: Path, channel: dict[str,
     with pytest.raises(DataError) as caught:
         read_foreign(written(tmp_path, "0,1\n10,2\n"), mapped(channels={"torque": channel}))
     assert message in str(caught.value)
-
-
-def test_a_unit_that_does_not_fit_is_said_of_the_map_and_its_key(tmp_path: Path) -> None:
-    columns = mapped(channels={"pressure_1": {"column": 2, "unit": "bar"}})
-    wanted = r"raw.csv: column map rig.toml:a: channels.pressure_1.unit = 'bar': 'bar' needs the kind of pressure"
-    with pytest.raises(DataError, match=wanted):
-        read_foreign(written(tmp_path, "0,1\n10,2\n"), columns, map_name="rig.toml:a")
-    with pytest.raises(DataError, match=r"raw.csv: channels.pressure_1.unit = 'bar': 'bar' needs the kind"):
-        read_foreign(written(tmp_path, "0,1\n10,2\n"), columns)
-
-
-def test_a_misspelt_column_gets_the_nearest_name(tmp_path: Path) -> None:
-    columns = mapped(header=True, channels={"time": {"column": "tme", "unit": "s"}})
-    with pytest.raises(DataError, match=r"channels\.time\.column = 'tme': .* did you mean 'time'"):
-        read_foreign(written(tmp_path, "time,force\n0,1\n"), columns)
 
 
 @given(
@@ -238,12 +206,6 @@ angle = { column = 2, unit = "deg" }
 """
 
 
-def test_the_only_map_of_a_file_needs_no_name_and_a_problem_file_will_do(tmp_path: Path) -> None:
-    (tmp_path / "maps.toml").write_text(f'name = "a problem"{MAPS}')
-    assert load_column_map(tmp_path / "maps.toml").channels["angle"].unit == "deg"
-    assert load_column_map(tmp_path / "maps.toml", "logger") == load_column_map(tmp_path / "maps.toml")
-
-
 @pytest.mark.parametrize(
     ("text", "name", "message"),
     [
@@ -261,13 +223,6 @@ def test_a_file_of_maps_that_cannot_be_used_is_one_line(
     assert str(caught.value).startswith(str(tmp_path / "maps.toml"))
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_the_published_schema_of_maps_takes_a_map(tmp_path: Path) -> None:
-    jsonschema = pytest.importorskip("jsonschema")
-    jsonschema.validate(tomllib.loads(MAPS), json_schema())
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(tomllib.loads(MAPS.replace("unit", "unti")), json_schema())
 
 
 def test_a_column_map_says_what_a_channel_does_between_its_samples(tmp_path: Path) -> None:
@@ -288,50 +243,10 @@ def test_a_column_map_says_what_a_channel_does_between_its_samples(tmp_path: Pat
     assert found["supply_pressure"].tolist() == [4.0e5]
 
 
-@pytest.mark.parametrize(("delimiter", "row"), [("semicolon", "0,5;1,5"), ("comma", "0,5,1,5")])
-def test_a_decimal_comma_is_named_where_it_is_met(tmp_path: Path, delimiter: str, row: str) -> None:
-    (tmp_path / "log.csv").write_text(f"{';' if delimiter == 'semicolon' else ','}".join(["t", "u"]) + f"\n{row}\n")
-    channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "u"}}
-    wanted = ColumnMap.model_validate({"delimiter": delimiter, "channels": channels})
-    with pytest.raises(DataError, match='decimal = "comma"'):
-        read_foreign(tmp_path / "log.csv", wanted)
-
-
 def test_a_file_in_utf_16_is_read(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,Öffnung\n0,1\n1,0\n", encoding="utf-16")
     channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "Öffnung"}}
     assert read_foreign(tmp_path / "log.csv", ColumnMap.model_validate({"channels": channels}))["command"][0] == 1.0
-
-
-@pytest.mark.parametrize(
-    ("text", "header", "column"),
-    [("t;u\n0;1\n1;2\n", True, "u"), ("t;u\n0,5;1,5\n", True, "u"), ("0;1\n1;2\n", False, 2), ("t;u\n0;1\n", True, 2)],
-)
-def test_a_delimiter_that_the_map_lacks_is_named(tmp_path: Path, text: str, header: bool, column: str | int) -> None:
-    (tmp_path / "log.csv").write_text(text)
-    channels = {"time": {"column": 1, "unit": "s"}, "command": {"column": column}}
-    wanted = ColumnMap.model_validate({"header": header, "channels": channels})
-    with pytest.raises(DataError, match='give delimiter = "semicolon"') as caught:
-        read_foreign(tmp_path / "log.csv", wanted)
-    assert "did you mean" not in str(caught.value)
-
-
-def test_commas_for_columns_and_decimals_alike_are_named_whatever_the_map_says(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("t,u\n0,5,1,5\n")
-    channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "u"}}
-    with pytest.raises(DataError, match="commas seem to be both delimiter and decimal mark"):
-        read_foreign(tmp_path / "log.csv", ColumnMap.model_validate({"decimal": "comma", "channels": channels}))
-
-
-@pytest.mark.parametrize("content", [b"", None])
-def test_a_foreign_file_that_is_empty_or_absent_is_named_once(tmp_path: Path, content: bytes | None) -> None:
-    path = tmp_path / "logger.csv"
-    if content is not None:
-        path.write_bytes(content)
-    columns = ColumnMap.model_validate({"channels": {"time": {"column": 1, "unit": "s"}}})
-    with pytest.raises(DataError) as refused:
-        read_foreign(path, columns)
-    assert str(refused.value).count(path.name) == 1
 
 
 def test_a_foreign_log_is_measured_and_read_through_a_map_by_name(tmp_path: Path) -> None:
@@ -344,20 +259,6 @@ def test_a_foreign_log_is_measured_and_read_through_a_map_by_name(tmp_path: Path
     )
     assert ppafo.evaluate(log, columns=f"{maps}:bench")["peak_torque"].value == pytest.approx(2.5)
     assert ppafo.read_recording(log, columns=load_column_map(maps))["torque"].tolist() == pytest.approx([0, 1.205, 2.5])
-
-
-def test_a_binary_file_is_not_told_to_be_latin_1(tmp_path: Path) -> None:
-    path = tmp_path / "wheel.txt"
-    path.write_bytes(b"\x05\x00\x80\xff\x00\x01" * 50)
-    with pytest.raises(DataError, match=r"is not a text file \(byte 1 is zero\)$"):
-        read_foreign(path, mapped(channels={"torque": {"column": 2, "unit": "N m"}}))
-
-
-def test_of_many_doubled_names_three_are_told_and_the_rest_counted() -> None:
-    twins = {f"M{number}": [f"M{number}#1", f"M{number}#2"] for number in range(9)}
-    said = said_of_doubled(twins, {name: 0 for names in twins.values() for name in names}, "columns")
-    assert len(said) == 4
-    assert said[-1] == "columns of 6 more repeated names were renamed likewise"
 
 
 def test_one_of_many_trials_with_a_clock_from_0_each_is_a_recording(tmp_path: Path) -> None:
@@ -391,9 +292,3 @@ def test_some_trials_or_all_are_a_recording_each(tmp_path: Path) -> None:
         DataError, match=r"raw.csv: trial = 7: the clock restarts 2 times, so the file has trials 1 to 3"
     ):
         read_trials(path, mapped(channels=channels, trial=[1, 7]))
-
-
-def test_a_clock_that_falls_back_within_a_trial_is_no_other_trial(tmp_path: Path) -> None:
-    channels = {"torque": {"column": 2, "unit": "N m"}}
-    with pytest.raises(DataError, match=r"time must increase from sample to sample$"):
-        read_foreign(written(tmp_path, "0,1\n10,1\n20,1\n15,1\n"), mapped(channels=channels))

@@ -117,12 +117,6 @@ def test_an_unusable_file_is_one_line_that_names_it(tmp_path: Path, content: str
     assert "\n" not in str(caught.value)
 
 
-def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path: Path) -> None:
-    for path in (tmp_path / "nothing.csv", tmp_path):
-        with pytest.raises(DataError, match="cannot be read"):
-            read_csv(path)
-
-
 def test_an_earlier_file_stays_where_writing_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_csv(tmp_path / "bench.csv", recording())
 
@@ -163,42 +157,3 @@ def test_a_table_is_read_whatever_mark_its_encoding_has(tmp_path: Path, encoding
     path = tmp_path / "bench.csv"
     path.write_text("time [s],angle [rad]\n0,1\n1,2\n", encoding=encoding)
     assert read_csv(path)["angle"].tolist() == [1.0, 2.0]
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "time [s],angle [rad]\n0,0,1,5\n",
-        'time [s],angle [rad]\n"0,0","1,5"\n',
-    ],
-)
-def test_a_decimal_comma_is_named_where_it_breaks_a_table(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "bench.csv"
-    path.write_text(text)
-    with pytest.raises(DataError, match='decimal = "comma"'):
-        read_csv(path)
-
-
-@pytest.mark.parametrize("separator", [";", "\t"])
-@pytest.mark.parametrize("decimal", [".", ","])
-def test_semicolons_and_tabs_are_read_with_either_decimal_mark(tmp_path: Path, separator: str, decimal: str) -> None:
-    rows = (("time [s]", "angle [rad]"), (f"0{decimal}0", f"1{decimal}5"), (f"0{decimal}25", f"-2{decimal}5"))
-    path = written(tmp_path, "".join(f"{separator.join(row)}\n" for row in rows))
-    assert read_csv(path).time.tolist() == [0.0, 0.25]
-    assert read_csv(path)["angle"].tolist() == [1.5, -2.5]
-
-
-@pytest.mark.parametrize(
-    ("content", "remedy"),
-    [
-        (b"time [s],angle [rad],\n0.0,1.5,\n", "does the line end with a comma"),
-        (b"time [s],angle [\xb0]\n0.0,1.5\n", 'encoding = "latin-1"'),
-    ],
-)
-def test_how_another_program_writes_a_table_is_named_with_the_remedy(
-    tmp_path: Path, content: bytes, remedy: str
-) -> None:
-    path = tmp_path / "bench.csv"
-    path.write_bytes(content)
-    with pytest.raises(DataError, match=remedy):
-        read_csv(path)

@@ -48,11 +48,6 @@ def test_what_a_result_gives_pandas_and_xarray_comes_back_to_the_bit(tmp_path: P
     assert ppafo.evaluate(table) == ppafo.evaluate(read_recording(table))
 
 
-def test_other_channels_need_a_unit() -> None:
-    with pytest.raises(DataError, match=r"must name columns as 'name .unit.'"):
-        read_recording(pandas.DataFrame({"time": TIME, "spare": FALL}))
-
-
 @pytest.mark.parametrize(
     ("table", "message"),
     [
@@ -76,17 +71,3 @@ def test_a_table_that_is_no_recording_is_refused_in_one_line(table: object, mess
 
 def a_recording() -> Recording:
     return Recording("decay", TIME, {"pressure_1": Channel(FALL, "Pa")})
-
-
-@pytest.mark.parametrize("suffix", [".xlsx", ".json", ".h5", ".npz", ".tdms"])
-def test_other_formats_are_answered_with_the_line_of_pandas_that_reads_them(suffix: str, tmp_path: Path) -> None:
-    path = tmp_path / f"decay{suffix}"
-    path.write_bytes(b"\x00\x01")
-    maps = tmp_path / "map.toml"
-    maps.write_text(
-        '[columns.own.channels]\ntime = { column = "t", unit = "s" }\nangle = { column = "a", unit = "deg" }\n'
-    )
-    for columns in (None, maps):
-        with pytest.raises(DataError, match=r"pandas\..*to_csv\(") as refused:
-            read_recording(path, columns=columns)
-        assert "latin-1" not in str(refused.value)

@@ -60,41 +60,6 @@ def test_labview_with_a_header_and_decimal_commas(tmp_path: Path, name: str) -> 
     assert np.allclose(found["pressure_1"], 101325.0 + 2e5 * np.array([1.5, 1.6, 1.7]))
 
 
-def test_a_header_further_down_is_answered_with_what_to_skip(tmp_path: Path) -> None:
-    path = written(tmp_path, "test.txt", LVM)
-    with pytest.raises(
-        DataError, match=r'line 16 contains this name: give skip_lines = 15 and delimiter = "tab"'
-    ) as caught:
-        read_foreign(path, columns({"time": TIME, "pressure_1": DRUCK}, delimiter="tab", decimal="comma"))
-    assert "channels.time.column = 'X_Value'" in str(caught.value)
-
-
-def test_excel_with_semicolons_and_an_empty_column_at_the_end(tmp_path: Path) -> None:
-    text = "\ufeffZeit (s);p1 (bar);Weg\r\n0,0;1.234,5;auf\r\n0,1;1.235,5;ab;\r\n0,2;1.236,5;Auf\r\n"
-    path = written(tmp_path, "excel.csv", text)
-    chosen = columns(
-        {
-            "time": {"column": "Zeit (s)", "unit": "s"},
-            "pressure_1": {"column": "p1 (bar)", "unit": "mbar_a", "thousands": "point"},
-            "direction": {"column": "Weg"},
-        },
-        delimiter="semicolon",
-        decimal="comma",
-    )
-    found = read_foreign(path, chosen)
-    assert np.allclose(found["pressure_1"], [123450.0, 123550.0, 123650.0])
-    assert found["direction"].tolist() == [1.0, -1.0, 1.0]
-
-
-@pytest.mark.parametrize(
-    "words", [("up", "down"), ("AUF", "AB"), ("rising", "falling"), ("+", "-"), ("1", "-1"), ("steigend", "fallend")]
-)
-def test_words_for_directions(tmp_path: Path, words: tuple[str, str]) -> None:
-    path = written(tmp_path, "a.csv", f"t,way\n0,{words[0]}\n1,{words[1]}\n")
-    found = read_foreign(path, columns({"time": {"column": "t", "unit": "s"}, "direction": {"column": "way"}}))
-    assert found["direction"].tolist() == [1.0, -1.0]
-
-
 def test_words_of_ones_own_and_words_that_nobody_knows(tmp_path: Path) -> None:
     path = written(tmp_path, "a.csv", "t,way\n0,heave\n1,lower\n")
     direction: dict[str, Any] = {"column": "way"}
@@ -148,21 +113,6 @@ def test_a_condition_or_gas_that_contradicts_the_unit_is_refused(
         read_foreign(path, chosen, gas="air")
 
 
-@pytest.mark.parametrize("unit", ["L/min", "Nl/min", "slm", "SCFM", "m^3/h"])
-def test_a_volume_flow_without_its_condition_asks_for_it(tmp_path: Path, unit: str) -> None:
-    path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
-    chosen = columns({"time": {"column": "t", "unit": "s"}, "mass_flow": {"column": "Q", "unit": unit}})
-    with pytest.raises(DataError, match=r"channels\.mass_flow\.unit = .*at = 'ANR' and gas = 'air'"):
-        read_foreign(path, chosen)
-
-
-def test_a_condition_of_no_flow_is_named_with_its_key(tmp_path: Path) -> None:
-    path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
-    chosen = columns({"time": {"column": "t", "unit": "s"}, "torque": {"column": "Q", "unit": "N m", "at": "ANR"}})
-    with pytest.raises(DataError, match=r"channels\.torque\.unit .*are allowed only for a volume flow"):
-        read_foreign(path, chosen)
-
-
 def test_a_header_may_state_condition_and_gas(tmp_path: Path) -> None:
     path = written(tmp_path, "flow.csv", "time [s],mass_flow [L/min (ANR, air)],angle [deg]\n0,60,1\n1,60,2\n")
     assert np.allclose(read_recording(path)["mass_flow"], 1.185e-3)
@@ -184,15 +134,6 @@ def test_a_unit_with_the_delimiter_is_one_cell_through_a_map_too(tmp_path: Path,
     if lines:
         with pytest.raises(DataError, match=r"line 3 contains this name: give skip_lines = 2"):
             read_foreign(path, columns(channels))
-
-
-def test_brackets_around_several_columns_are_no_unit(tmp_path: Path) -> None:
-    path = written(tmp_path, "force.csv", "t,force [left,right],angle [deg\n0,1,10,3\n1,2,20,4\n")
-    channels = {"time": {"column": "t", "unit": "s"}, "torque": {"column": "right]", "unit": "N m"}}
-    assert read_foreign(path, columns(channels))["torque"].tolist() == [10.0, 20.0]
-    path = written(tmp_path, "open.csv", "time [s],angle [deg,torque [N m]\n0,1,2\n")
-    with pytest.raises(DataError, match=r"not as 'angle \[deg'"):
-        read_recording(path)
 
 
 def test_faults_of_several_columns_come_in_one_refusal(tmp_path: Path) -> None:
@@ -223,12 +164,6 @@ def test_a_txt_file_is_a_table_of_what_separates_its_columns(tmp_path: Path, mar
     found = read_recording(path)
     assert found.time.tolist() == [0.0, 0.01]
     assert np.allclose(found["pressure_1"], [251325.0, 261325.0])
-
-
-@pytest.mark.parametrize("header", ["time (s),angle (deg)", "Time,Angle", "t_s,phi"])
-def test_a_header_of_ones_own_names_the_option(tmp_path: Path, header: str) -> None:
-    with pytest.raises(DataError, match=r"columns='FILE\.toml:NAME'"):
-        read_recording(written(tmp_path, "a.csv", f"{header}\n0,1\n1,2\n"))
 
 
 SECONDS, PRESSURE = np.arange(5) * 0.01, np.array([1.0, 1.1, 1.2, 1.3, 1.4])

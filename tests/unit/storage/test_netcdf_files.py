@@ -1,6 +1,5 @@
 """Recordings as NetCDF."""
 
-import dataclasses
 from pathlib import Path
 
 import h5netcdf
@@ -8,7 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.signals import Channel, Recording, RecordingKind
+from ppafo.signals import Channel, Recording
 from ppafo.storage import dataset_of, write_netcdf
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.storage.netcdf_reading import read_netcdf
@@ -73,29 +72,6 @@ def changed(path: Path, variable: str, units: str) -> Path:
     with h5netcdf.File(path, "a") as file:
         file.variables[variable].attrs["units"] = units
     return path
-
-
-@pytest.mark.parametrize("kind", ["measured", "simulated", "synthetic"])
-def test_the_kind_of_a_recording_is_kept(tmp_path: Path, kind: RecordingKind) -> None:
-    path = write_netcdf(tmp_path / "bench.nc", dataclasses.replace(recording(), kind=kind))
-    assert read_netcdf(path).kind == kind
-
-
-def test_a_file_that_names_no_kind_was_measured(tmp_path: Path) -> None:
-    path = write_netcdf(tmp_path / "bench.nc", recording())
-    with h5netcdf.File(path, "a") as file:
-        del file.attrs["kind"]
-    assert read_netcdf(path).kind == "measured"
-
-
-def test_an_unknown_kind_is_refused_by_file_with_the_nearest(tmp_path: Path) -> None:
-    path = write_netcdf(tmp_path / "bench.nc", recording())
-    with h5netcdf.File(path, "a") as file:
-        file.attrs["kind"] = "simulatd"
-    with pytest.raises(
-        DataError, match=r"bench\.nc: 'simulatd' is not a kind of recording, did you mean 'simulated'\?"
-    ):
-        read_netcdf(path)
 
 
 def test_a_wrong_unit_is_refused_by_file_and_channel(tmp_path: Path) -> None:

@@ -34,12 +34,6 @@ def test_both_styles_of_header_are_read(tmp_path: Path, head: str, in_degrees: b
     assert found.in_degrees is in_degrees
 
 
-@pytest.mark.parametrize(("text", "said"), [("degrees", True), ("radians", False)])
-def test_the_sentence_of_the_inverse_kinematics_tool_says_the_unit(tmp_path: Path, text: str, said: bool) -> None:
-    head = NEW.replace("inDegrees=yes", f"Angles are in {text}.")
-    assert read_opensim(table(head + ROWS, tmp_path)).in_degrees is said
-
-
 def test_line_ends_of_every_system_are_read(tmp_path: Path) -> None:
     found = read_opensim(table((NEW + ROWS).replace("\n", "\r\n"), tmp_path))
     assert found.time.size == 3
@@ -81,14 +75,6 @@ def test_a_damaged_table_is_refused_with_line_and_column(tmp_path: Path, text: s
     assert str(refused.value).startswith(f"{path}: ")
     assert str(refused.value).count(str(path)) == 1
     assert message in str(refused.value)
-
-
-def test_an_empty_or_missing_file_is_refused_once_by_name(tmp_path: Path) -> None:
-    (tmp_path / "empty.sto").touch()
-    with pytest.raises(DataError, match=r"^[^:]*empty.sto: is empty$"):
-        read_opensim(tmp_path / "empty.sto")
-    with pytest.raises(DataError, match=r"^[^:]*none.sto: cannot be read: no such file or directory$"):
-        read_opensim(tmp_path / "none.sto")
 
 
 @pytest.fixture

@@ -45,29 +45,6 @@ def test_the_document_says_of_what_kind_the_recording_is(tmp_path: Path) -> None
     assert json.loads((folder / "run.json").read_text())["recording"]["kind"] == "simulated"
 
 
-def test_an_unknown_kind_in_the_document_is_refused_with_the_nearest(tmp_path: Path) -> None:
-    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
-    text = (folder / "run.json").read_text()
-    (folder / "run.json").write_text(text.replace('"simulated"', '"synthtic"'))
-    with pytest.raises(
-        DataError, match=r"run\.json: 'synthtic' is not a kind of recording, did you mean 'synthetic'\?"
-    ):
-        read_recording(folder / "recording.csv")
-
-
-def test_the_table_begins_with_its_header_so_that_any_program_can_read_it(tmp_path: Path) -> None:
-    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
-    assert (folder / "recording.csv").read_text().startswith("time [s],angle [rad]\n")
-
-
-def test_the_document_names_its_format_files_and_channels(tmp_path: Path) -> None:
-    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
-    document = json.loads((folder / "run.json").read_text())
-    assert (document["format"], document["schema_version"]) == ("ppafo result", 1)
-    assert document["files"] == names(folder)
-    assert document["recording"]["channels"] == {"angle": "rad"}
-
-
 def test_an_empty_folder_is_filled_and_an_earlier_result_is_replaced_whole(tmp_path: Path) -> None:
     folder = tmp_path / "task"
     folder.mkdir()

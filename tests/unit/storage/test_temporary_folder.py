@@ -40,14 +40,6 @@ def test_a_full_temporary_folder_is_said_in_one_line_by_all_that_build_in_one(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_temporary_folder_that_is_gone_is_said_in_the_same_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
-    with pytest.raises(DataError, match=r"^temporary files cannot be written: no such file or directory; "):
-        temporary_folder("ppafo")
-
-
 def test_files_lie_in_the_folder_by_path_as_long_as_it_is_needed() -> None:
     with temporary_folder("ppafo", {"sources/unit.c": b"int"}) as folder:
         assert Path(folder, "sources", "unit.c").read_bytes() == b"int"

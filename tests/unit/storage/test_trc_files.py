@@ -58,13 +58,6 @@ def test_a_damaged_table_is_refused_with_its_line(tmp_path: Path, text: str, mes
     assert "\n" not in str(refused.value)
 
 
-def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "walk.trc"
-    path.write_bytes(b"PathFileType\xff\xfe\n" * 8)
-    with pytest.raises(DataError, match="is not a text file in UTF-8"):
-        read_trc(path)
-
-
 def test_two_markers_of_one_name_have_their_numbers(tmp_path: Path) -> None:
     found = read_trc(table(HEAD.replace("R.Ankle", "RKNE") + ROWS, tmp_path))
     assert list(found.markers) == ["RKNE#1", "RKNE#2"]
