@@ -1,0 +1,378 @@
+"""Recordings that cannot be right are refused: file, column and number are named, and what to do."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.gait.plausible import moment_remarks
+from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.gait.recorded.mapping import (
+    load_map,
+)
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+
+Change = Callable[[dict[str, Floats]], dict[str, Floats]]
+SHANK, ANKLE, MOMENT, FORCE = "shank_angle [rad]", "ankle_angle [rad]", "ankle_moment [N m/kg]", "vertical_force [-]"
+FORWARD, UP = "knee_forward [m/s^2]", "knee_up [m/s^2]"
+
+
+def changed(name: str, change: Callable[[Floats], Floats], new: str = "") -> Change:
+    """One column changed, or given another header."""
+    return lambda columns: {
+        (new or key if key == name else key): (change(values) if key == name else values)
+        for key, values in columns.items()
+    }
+
+
+def exchanged(columns: dict[str, Floats]) -> dict[str, Floats]:
+    """Both accelerations of the knee in each other's place."""
+    return {**columns, FORWARD: columns[UP], UP: columns[FORWARD]}
+
+
+def scaled(names: tuple[str, ...], factor: float) -> Change:
+    """Columns times a factor."""
+    return lambda columns: columns | {name: factor * columns[name] for name in names}
+
+
+def held(names: tuple[str, ...], start: int, samples: int) -> Change:
+    """Columns that keep the value of a sample for many more, as a filled drop-out does; 200 samples a second."""
+
+    def filled(values: Floats) -> Floats:
+        kept = np.array(values)
+        kept[start : start + samples] = kept[start]
+        return kept
+
+    return lambda columns: columns | {name: filled(columns[name]) for name in names or columns}
+
+
+CASES: dict[str, tuple[Change, str]] = {
+    "degrees called radians": (
+        changed(SHANK, np.degrees),
+        "shank_angle has a range of 4.15e+03 deg (plausible in a stride: 25 to 120 deg); the numbers look like degrees",
+    ),
+    "radians called degrees": (
+        changed(ANKLE, lambda x: x, "ankle_angle [deg]"),
+        "ankle_angle has a range of 0.572 deg (plausible in a stride: 5 to 80 deg); the numbers look like radians",
+    ),
+    "shank counted the other way": (
+        changed(SHANK, np.negative),
+        "in mid-stance, so the shank would rotate backwards over the foot",
+    ),
+    "shank from the horizontal": (changed(SHANK, lambda x: x + 1.57), "shank_angle is 106 deg at heel strike and"),
+    "ankle counted the other way": (
+        changed(ANKLE, lambda x: np.pi - x),
+        "the sign is reversed; correct the sign in the file, or change ankle_angle.positive in a gait",
+    ),
+    "ankle with zero as neutral": (
+        changed(ANKLE, lambda x: x - np.pi / 2.0),
+        "implies a foot tilted by -85 deg in mid-stance (plausible: up to 20 deg)",
+    ),
+    "moment counted the other way": (changed(MOMENT, np.negative), "in dorsiflexion, so its sign is reversed"),
+    "moment of the body per kg": (changed(MOMENT, lambda x: 62.0 * x), "ankle_moment reaches 90.2 N m/kg (plausible"),
+    "moment of the other foot": (
+        changed(MOMENT, lambda x: np.roll(x, 104)),
+        "ankle_moment peaks at 98 % of the stride, but the foot is off the ground from 64 % on; the moment is of",
+    ),
+    "moment of the other foot, without a force": (
+        lambda columns: {
+            name: np.roll(values, 104) if name == MOMENT else values
+            for name, values in columns.items()
+            if name != FORCE
+        },
+        "on; toe-off is guessed without a vertical force: give one; or the moment is of the other foot",
+    ),
+    "moment on a later clock": (
+        changed(MOMENT, lambda x: np.roll(x, 21)),
+        "ankle_moment peaks at 58 % of the stride and is 0.57 N m/kg in swing, but the foot is off the ground from 64",
+    ),
+    "force of the other foot": (changed(FORCE, lambda x: np.roll(x, 104)), "choose the other side"),
+    "force in newton without a unit": (
+        changed(FORCE, lambda x: 608.0 * x),
+        "vertical_force reaches 619 body weights (plausible: 0.5 to 2.5); check the body mass",
+    ),
+    "force of both feet": (changed(FORCE, lambda x: x + 0.5), "no heel strikes were found"),
+    "force downwards": (changed(FORCE, np.negative), "below 0, so its sign is reversed; correct the sign in the file"),
+    "knee counted backwards": (changed(FORWARD, np.negative), "knee_forward is -10.1 m/s^2 around toe-off and 7.69"),
+    "knee counted down": (
+        changed(UP, np.negative),
+        "correct the sign in the file, or change the sign of knee.up in a gait map",
+    ),
+    "knee with gravity": (changed(UP, lambda x: x + 9.81), "subtract gravity from accelerometer data"),
+    "knee in millimetres": (
+        scaled((FORWARD, UP), 1000.0),
+        "knee_forward and knee_up are 1000 times too large: they differ by",
+    ),
+    "knee forward alone times g": (scaled((FORWARD,), 9.80665), "differ (knee_forward is 9.80665 times too large)"),
+    "knee times g": (scaled((FORWARD, UP), 9.80665), "divide both by 9.80665 in the file"),
+    "knee in centimetres": (
+        scaled((FORWARD, UP), 100.0),
+        "knee_forward has a range of 2.02e+03 m/s^2 per stride (plausible: 0.5 to 80 m/s^2); check the unit",
+    ),
+    "knee exchanged": (
+        exchanged,
+        "knee_forward and knee_up are exchanged: they differ by",
+    ),
+    "knee in g": (
+        scaled((FORWARD, UP), 1.0 / 9.80665),
+        "knee_forward and knee_up are in units of g: they differ by 79 % (42 % if corrected) from a "
+        "rotation of the knee about the resting ankle while the foot is flat; multiply both by 9.80665 in the file",
+    ),
+    "shank in noise": (
+        changed(SHANK, lambda x: x + np.random.default_rng(4).normal(0.0, 0.7, x.size)),
+        "RMS error of its Fourier series of",
+    ),
+    "unknown unit": (
+        changed(SHANK, lambda x: x, "shank_angle [turns]"),
+        "column 'shank_angle' [turns]: 'turns' is not a known",
+    ),
+    "unit of something else": (
+        changed(SHANK, lambda x: x, "shank_angle [m]"),
+        "column 'shank_angle' [m]: unit 'm' does not fit: an angle is needed",
+    ),
+    "misspelt column": (
+        changed(SHANK, lambda x: x, "shank_angel [rad]"),
+        "shank_angle: there is no column 'shank_angle', did you mean 'shank_angel'?",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_no_leg_does_is_refused_with_the_remedy(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], case: str
+) -> None:
+    change, message = CASES[case]
+    path = csv_of(change(columns))
+    with pytest.raises(DataError, match=re.escape(message)) as refused:
+        import_gait([path], ImportSettings(62.0))
+    assert str(path) in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_drop_out_in_all_strides_but_one_refuses_the_record(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    change = held((SHANK,), 150, 700)
+    with pytest.raises(DataError, match=r"column 'shank_angle' of shank_angle is constant from .* cut the file there"):
+        import_gait([csv_of(change(columns))], ImportSettings(62.0))
+
+
+@pytest.mark.parametrize(("start", "strides"), [(640, 4), (560, 3)])
+def test_a_stumble_is_left_out_and_named(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], start: int, strides: int
+) -> None:
+    stumbling = np.array(columns[ANKLE])
+    stumbling[start : start + 140] += np.radians(35.0) * np.sin(np.linspace(0.0, 6.0, 140)) ** 2
+    found = import_gait([csv_of({**columns, ANKLE: stumbling})], ImportSettings(62.0))
+    assert found.gait.strides == strides
+    remarks = [line for line in found.remarks if "left out" in line]
+    assert len(remarks) == 5 - strides
+    assert all(line.endswith("left out: ankle_angle differs from all other strides") for line in remarks)
+
+
+@pytest.mark.parametrize(("column", "value", "start", "samples"), [(ANKLE, 1.57, 755, 18), (MOMENT, 0.0, 730, 50)])
+def test_a_short_drop_out_in_one_stride_is_no_part_of_the_mean(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], column: str, value: float, start: int, samples: int
+) -> None:
+    """90 ms at toe-off, or a push-off that was lost: little of the stride, but far from all others there."""
+    damaged = np.array(columns[column])
+    damaged[start : start + samples] = value + 1e-4 * np.arange(samples)
+    found = import_gait([csv_of({**columns, column: damaged})], ImportSettings(62.0))
+    assert found.gait.strides == 4
+    assert any("differs from all other strides" in line for line in found.remarks)
+
+
+def test_what_is_wrong_at_several_stages_is_said_in_one_go(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    wrong = columns | {FORCE: -columns[FORCE], MOMENT: -columns[MOMENT], UP: columns[UP] + 9.81}
+    wrong = {name.replace("rad", "deg"): values for name, values in wrong.items()}
+    with pytest.raises(DataError) as refused:
+        import_gait([csv_of(wrong)], ImportSettings())
+    said = (
+        "does not state the body mass",
+        "vertical_force peaks at -0.999 body weights, below 0, so its sign is reversed",
+        "shank_angle has a range of .* look like radians",
+        "knee_up has a mean of 9.81 m/s\\^2",
+        "ankle_angle has a range of .* look like radians",
+        "ankle_moment peaks at -1 N m/kg, in dorsiflexion",
+    )
+    assert len(refused.value.parts) == len(said)
+    assert all(re.search(text, part) for text, part in zip(said, refused.value.parts, strict=True))
+
+
+def test_a_reversed_shank_without_a_force_is_named_as_what_it_is(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    reversed_shank = changed(SHANK, np.negative)({name: x for name, x in columns.items() if name != FORCE})
+    with pytest.raises(
+        DataError, match=r"if the sign of shank_angle, which determines the stance, is reversed: correct"
+    ) as refused:
+        import_gait([csv_of(reversed_shank)], ImportSettings(62.0))
+    assert "force" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("factor", "shown"), [(0.6, "0.278"), (0.9, "0.417"), (1.3, "0.602")])
+def test_a_force_that_is_not_half_the_weight_is_remarked(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], factor: float, shown: str
+) -> None:
+    (remark,) = import_gait([csv_of(scaled((FORCE,), factor)(columns))], ImportSettings(62.0)).remarks
+    assert remark.startswith(f"vertical_force has a mean of {shown} body weights, but each leg of a steady walk")
+    assert import_gait([csv_of(columns)], ImportSettings(62.0)).remarks == ()
+
+
+def test_a_time_in_milliseconds_is_refused(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording
+) -> None:
+    with pytest.raises(
+        DataError, match=r"the stride time is 1.04e\+03 s \(plausible: 0.5 to 3 s\); check the unit of time"
+    ):
+        import_gait([csv_of(columns, 1000.0 * walk.time)], ImportSettings(62.0))
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "said"),
+    [
+        (190, 390, "vertical_force has one heel strike only, at 1.04 s; a stride needs two"),
+        (
+            10,
+            200,
+            "the foot is on the ground at the start, and a heel strike follows a swing",
+        ),
+    ],
+)
+def test_a_record_of_one_heel_strike_has_the_right_column(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, first: int, last: int, said: str
+) -> None:
+    part = {name: values[first:last] for name, values in columns.items()}
+    with pytest.raises(DataError, match=said) as refused:
+        import_gait([csv_of(part, walk.time[first:last])], ImportSettings(62.0))
+    assert "least_strides" not in str(refused.value)
+
+
+def test_radians_called_degrees_are_a_unit_and_no_sign_without_a_force_too(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    called = changed(SHANK, lambda x: x, "shank_angle [deg]")({name: x for name, x in columns.items() if name != FORCE})
+    with pytest.raises(DataError, match=r"the numbers look like radians: give the unit 'rad'"):
+        import_gait([csv_of(called)], ImportSettings(62.0))
+
+
+def test_a_moment_file_without_a_whole_stride_is_named(opensim_files: dict[str, Path]) -> None:
+    path = opensim_files["id"]
+    lines = path.read_text().splitlines()
+    kept = [line if not line.startswith("nRows") else "nRows=150" for line in lines[: 6 + 150]]
+    path.write_text("\n".join(kept) + "\n")
+    with pytest.raises(DataError, match=r"walk_id.sto: ankle_moment, 0 to .* covers no whole stride .* omit the file"):
+        import_gait(list(opensim_files.values()), ImportSettings(62.0))
+
+
+def test_a_column_in_two_files_is_refused(opensim_files: dict[str, Path], tmp_path: Path) -> None:
+    twin = tmp_path / "twin.mot"
+    twin.write_text(opensim_files["grf"].read_text())
+    with pytest.raises(DataError, match=r"vertical_force: .* both have the column 'ground_force_vy'"):
+        import_gait([*opensim_files.values(), twin], ImportSettings(62.0))
+
+
+def test_files_of_different_forms_need_a_map(
+    opensim_files: dict[str, Path], csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    mixed = [csv_of(columns), opensim_files["grf"]]
+    with pytest.raises(DataError, match=r"different formats \(csv, opensim\); name the columns of all of them in a"):
+        import_gait(mixed, ImportSettings(62.0))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (ImportSettings(62000.0), "a body mass of 62000 kg is not plausible"),
+        (ImportSettings(float("nan")), "a body mass of nan kg is not plausible"),
+        (ImportSettings(62.0, walking_speed=50.0), "a walking speed of 50 m/s is not plausible"),
+        (ImportSettings(62.0, stature=175.0), "a stature of 175 m is not plausible; give it in m, such as '1.75 m'"),
+        (ImportSettings(62.0, low_pass=0.1), "a low pass at 0.1 Hz would remove the gait itself"),
+        (ImportSettings(62.0, low_pass=500.0), "has 200.3 samples per second; choose a cut-off frequency below"),
+        (ImportSettings(62.0, least_strides=0), "the minimum number of strides must be 1 or more, not 0"),
+        (ImportSettings(62.0, name="My gait"), "name 'My gait' must consist of lower-case letters"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], settings: ImportSettings, message: str
+) -> None:
+    with pytest.raises(DataError, match=re.escape(message)):
+        import_gait([csv_of(columns)], settings)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "[shank_angle]\nterms = ['s']\n[ankle_angle]\nterms = ['a']\npositive = 'up'\n",
+            "ankle_angle.positive = 'up' is not allowed; allowed: plantarflexion, dorsiflexion",
+        ),
+        (
+            "[shank_angle]\nknee = 'K'\n[ankle_angle]\nterms = ['a']\npositive = 'dorsiflexion'\n",
+            "give either terms, or",
+        ),
+        (
+            "[shank_angle]\nterms = ['s']\n[ankle_angle]\nterms = ['a']\npositive = 'dorsiflexion'\n"
+            "[knee]\nforward = ['x']\nup = ['y']\nthigh_length = '0.4 m'\n",
+            "thigh_length and thigh_unit are given without thigh; omit them or give thigh",
+        ),
+        ("[shank_angle]\nterm = ['s']\n", "unknown key 'shank_angle.term', did you mean 'terms'"),
+    ],
+)
+def test_a_wrong_map_is_refused_with_key_and_value(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "map.toml"
+    path.write_text(text)
+    with pytest.raises(DataError, match=re.escape(message)) as refused:
+        load_map(path)
+    assert str(refused.value).startswith(str(path))
+
+
+def test_a_hip_below_the_ground_is_a_sign_and_no_unit(opensim_files: dict[str, Path]) -> None:
+    top, _, body = opensim_files["ik"].read_text().partition("endheader\n")
+    labels, *lines = body.splitlines()
+    place = labels.split("\t").index("pelvis_ty")
+    cells = [line.split("\t") for line in lines]
+    for row in cells:
+        row[place] = repr(-float(row[place]))
+    table = "\n".join([labels, *("\t".join(row) for row in cells)])
+    opensim_files["ik"].write_text(f"{top}endheader\n{table}\n")
+    with pytest.raises(DataError) as caught:
+        import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=1.63))
+    assert re.search(r"the hip is -0\.87 m high \(pelvis_ty\), .* its sign is reversed", str(caught.value))
+
+
+def test_few_samples_and_a_scattering_plate_are_remarked(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording
+) -> None:
+    few = {name: values[::5] for name, values in columns.items()}
+    found = import_gait([csv_of(few, walk.time[::5])], ImportSettings(62.0))
+    (said,) = (line for line in found.remarks if "sampled at" in line)
+    assert said.endswith("sampled at 40 Hz; heel strikes and toe-offs are accurate to about 12 ms")
+    noise = np.random.default_rng(4).normal(0.0, 0.025, columns[FORCE].size)
+    found = import_gait([csv_of({**columns, FORCE: columns[FORCE] - 0.025 + noise})], ImportSettings(62.0))
+    assert any("vertical_force has noise of 0.0" in line for line in found.remarks)
+
+
+def test_a_moment_that_hardly_shows_its_sign_is_remarked() -> None:
+    curve = np.sin(np.linspace(0.0, 2.0 * np.pi, 101))
+    assert moment_remarks(np.maximum(curve, -0.1)) == []
+    (said,) = moment_remarks(np.maximum(curve, -0.8))
+    assert "1 N m/kg in plantarflexion and 0.8 N m/kg in dorsiflexion" in said
+
+
+def test_a_walker_who_turns_within_the_record_is_remarked(opensim_files: dict[str, Path]) -> None:
+    top, _, body = opensim_files["ik"].read_text().partition("endheader\n")
+    labels, *lines = body.splitlines()
+    for degrees, is_said in ((30.0, False), (80.0, True)):
+        turned = np.linspace(-0.5 * degrees, 0.5 * degrees, len(lines))
+        rows = [f"{line}\t{angle!r}\t0.0" for line, angle in zip(lines, turned.tolist(), strict=True)]
+        table = "\n".join([f"{labels}\tpelvis_rotation\tpelvis_tz", *rows])
+        opensim_files["ik"].write_text(f"{top}endheader\n{table}\n")
+        found = import_gait(list(opensim_files.values()), ImportSettings(62.0))
+        assert any("the walker turns by 80 deg (pelvis_rotation)" in line for line in found.remarks) is is_said
