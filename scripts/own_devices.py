@@ -38,7 +38,6 @@ LAWS = (
     "event_pid",
     "event_pid_feedforward",
     "event_sliding_mode",
-    "event_damped_learning",
     "event_feedback_linearisation",
 )
 FACTORS = (1.0, 0.125, 0.25, 0.5, 2.0, 4.0)

@@ -78,13 +78,9 @@ const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
   "clock.step_with_output": (duration = 0, period = 0, output = 0) => Math.min(stepUnlessGiven(duration, period), output),
   "clock.output_unless_given": (duration = 0, period = 0, step = 0) => duration / Math.max(1, nearestWhole(duration / dividingStep(period, step))),
   "motion.record_interval": (seconds = 0) => (seconds <= 61 ? 1e-3 : seconds <= 601 ? 5e-3 : 2e-2),
-  "law_signals.lag_of_sensor": (bandwidth = 0) => lagOfBandwidth(bandwidth),
-  "solenoid.no_dead_time": () => 0,
   "graph.itself": (number = 0) => number,
   "gas.critical_pressure_ratio": (k = 0) => criticalRatio(k),
   "nominal.always_zero": () => 0,
-  "proportional.dead_time": (_band = 0, delay = 0) => delay,
-  "torque_loop.learning_gain": (proportional = 0) => 0.5 * proportional,
   "wearer.shank_length_of": (stature = 0) => 0.246 * stature,
   "wearer.shank_mass_centre_of": (stature = 0) => 0.10642173913043478 * stature,
   "wearer.foot_mass_centre_of": (stature = 0) => 0.048130434782608686 * stature,
@@ -101,7 +97,6 @@ const INSIDE = 0.2;
 const SAMPLES_LATE = 1.5;
 const LEAST_TORQUE = 5e-4;
 const LARGEST_OPENING = 0.77;
-const USUAL_LEAD = 0.0185;
 
 /** What a rule of the torque loop may ask: a number of the device by its path, and whether it has one. */
 interface Numbers {
@@ -147,7 +142,6 @@ const LOOP_RULES: Readonly<Record<string, (loop: TorqueLoop, numbers: Numbers) =
   "default_gains.integral_gain_of_device": ({ late }, { setting }) => setting * (0.125 / late),
   "default_gains.boundary_layer_of_device": (loop) => 2 * torqueInDeadTime(loop),
   "default_gains.convergence_rate_of_device": ({ late }) => 0.5 / late,
-  "default_gains.lead_of_device": ({ late }) => USUAL_LEAD + late,
   "default_gains.torque_rate_of_device": ({ rate }) => rate,
   "default_gains.dead_time_of_device": ({ late }) => late,
   "default_gains.dead_zone_opening_of_device": (loop, { at, has, setting }) => {

@@ -7,7 +7,6 @@ from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.control.walking.timings import TIMINGS
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.controlled import CONTROLLED
@@ -51,8 +50,6 @@ def texts_of_kinds() -> list[str]:
         "device.valve": own_names(VALVES),
         "motion.kind": own_names(MOTIONS),
         "reference.of": [name for name in CONTROLLED if name != "torque"],
-        # The first is that of a file that names none.
-        "timing.kind": list(TIMINGS)[1:],
         "controller.kind": [*own_names(CONTROLLERS), *WALKING_CONTROLLERS],
         "reference.kind": own_names(PROFILES),
     }

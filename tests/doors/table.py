@@ -36,8 +36,6 @@ BASES: dict[str, Texts] = {
 """Overrides of each, with which a run of 100 steps moves all that is there."""
 WALKED = 1.0
 """Seconds of a walk, the shortest that there is: from heel strike through push-off, with 1000 samples."""
-TWO_STRIDES = 2.3
-"""Seconds of a walk whose controller learns from the first stride."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +43,12 @@ class Feature:
     """Overrides that turn one thing on.
 
     ``needs`` are words of which another feature of the same case has none: ``valve``, ``motion``, ``law``,
-    ``reference`` or ``clock``, where it has one of its own. ``base`` is the scenario that it needs, and ``seconds`` is
-    how long a walk with it lasts.
+    ``reference`` or ``clock``, where it has one of its own. ``base`` is the scenario that it needs.
     """
 
     texts: Texts
     needs: frozenset[str] = frozenset()
     base: str = ""
-    seconds: float = WALKED
 
     @property
     def paths(self) -> frozenset[str]:
@@ -65,8 +61,8 @@ class Feature:
         return is_one and self.paths.isdisjoint(other.paths) and self.needs.isdisjoint(other.needs)
 
 
-def _feature(*texts: str, needs: str = "", base: str = "", seconds: float = WALKED) -> Feature:
-    return Feature(texts, frozenset(needs.split()), base, seconds)
+def _feature(*texts: str, needs: str = "", base: str = "") -> Feature:
+    return Feature(texts, frozenset(needs.split()), base)
 
 
 _SOLENOID = ("device.valve=solenoid", "controller.kind=on_off", "controller.rate=200 Hz")
@@ -252,19 +248,16 @@ WALK_FEATURES: dict[str, Feature] = {
         "sensors.lost_share=0.2", "sensors.angle_lost_share=0.2", "sensors.pressure_lost_share=0.2"
     ),
     "samples between steps": _feature("controller.rate=330 Hz", "run.step=0.4 ms"),
-    "fractional timing": _feature("timing.kind=fractional", needs="timing"),
-    "estimated timing": _feature("timing.kind=estimated", needs="timing", seconds=TWO_STRIDES),
     "task sequence": _feature("task_sequence=first-steps"),
     "cylinder": _feature("device.set=cylinder-lever", needs="actuator"),
     "bladder": _feature(f"device.set={BLADDER}", needs="actuator area"),
     "muscle pair": _feature(f"device.set={MUSCLES}", needs="actuator"),
-    "off": _feature("controller.kind=off", needs="law timing"),
+    "off": _feature("controller.kind=off", needs="law"),
     "on_off law": _feature("controller.kind=event_on_off", needs="law"),
     "dead zone": _feature("controller.kind=event_on_off_dead_zone", needs="law"),
     "pid": _feature("controller.kind=event_pid", needs="law"),
     "feedforward": _feature("controller.kind=event_pid_feedforward", needs="law"),
     "sliding mode": _feature("controller.kind=event_sliding_mode", needs="law"),
-    "learning": _feature("controller.kind=event_damped_learning", needs="law", seconds=TWO_STRIDES),
     "feedback linearisation": _feature("controller.kind=event_feedback_linearisation", needs="law"),
     "damped": _feature("controller.kind=damped_proportional", needs="law"),
 }
@@ -275,15 +268,13 @@ WALK_FEATURES: dict[str, Feature] = {
 class Case:
     """A scenario as the doors are given it: a shipped scenario or walk, and overrides.
 
-    ``seconds`` is how long it walks; ``suite`` is ``short`` or ``long``. ``has_object`` puts an object of
-    Python in charge of the valve.
+    ``suite`` is ``short`` or ``long``. ``has_object`` puts an object of Python in charge of the valve.
     """
 
     name: str
     suite: str
     scenario: str
     texts: Texts = ()
-    seconds: float = WALKED
     has_object: bool = False
 
     @property
@@ -304,7 +295,7 @@ class Case:
     def load(self) -> Scenario:
         """The scenario."""
         scenario = load_scenario(self.scenario, self.texts)
-        scenario = with_duration(scenario, self.seconds) if self.walks else scenario
+        scenario = with_duration(scenario, WALKED) if self.walks else scenario
         return scenario.controlled_by(Integrating()) if self.has_object else scenario
 
 
@@ -337,7 +328,7 @@ def _joined(suite: str, base: str, features: Mapping[str, Feature]) -> Case:
     texts = tuple(dict.fromkeys((*kept, *given)))
     kind = "walk" if base == WALK_BASE else "vane"
     name = f"{kind}: {', '.join(features)}"
-    return Case(name, suite, scenario, texts, max(feature.seconds for feature in features.values()))
+    return Case(name, suite, scenario, texts)
 
 
 def _chosen(base: str, *names: str) -> Case:
@@ -366,7 +357,7 @@ SHORT = (
 
 SHIPPED = (
     *(Case(name, "long", name, ("run.duration=0.2 s",)) for name in list_scenarios() if name != SHORT[0].name),
-    *(Case(name, "long", name, seconds=TWO_STRIDES if "learning" in name else WALKED) for name in list_walks()),
+    *(Case(name, "long", name) for name in list_walks()),
 )
 
 _SEED = 72

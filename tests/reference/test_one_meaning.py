@@ -23,7 +23,7 @@ def test_columns_of_a_study_are_single_runs_with_the_same_words(name: str) -> No
 
 
 @needs_gcc
-@pytest.mark.parametrize("name", ["torque-task-slow-valve", "proportional-learning"])
+@pytest.mark.parametrize("name", ["torque-task-slow-valve", "proportional-regulators"])
 def test_settings_of_a_library_are_single_runs_with_the_same_words(name: str) -> None:
     found = at_library(name, 24, seed=13)
     assert found.differing == []

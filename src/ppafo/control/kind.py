@@ -12,9 +12,6 @@ from ppafo.model.declaration import Quantity
 OPEN_LOOP = "constant"
 """Name of the controller without a reference: its recordings have no reference, and so no tracking error."""
 
-VALVE_DELAY, FORCE_LAG = "dead time of the valve", "lag of the force sensors"
-"""Names, for ``Quantity.follows``, of the delays from which a setting may take its default."""
-
 
 def nominal_term(name: str) -> str:
     """Return the name of a device property from which a setting of a model-based law may take its default.

@@ -33,8 +33,6 @@ OPENING = "opening of the torque loop"
 DEAD_ZONE = "dead zone of the torque loop"
 RELEASE = "release of the torque loop"
 REACH = "torque reach of the device"
-LEARNING_GAIN = "learning gain of the torque loop"
-LEAD = "lead of the torque loop"
 """Names of the parameters of the loop from which a setting may take its default; the functions below compute them."""
 
 LEAST_TORQUE = 5.0e-4
@@ -48,9 +46,6 @@ DEAD_ZONE_SHARE, RELEASE_SHARE = 0.042, 0.0062
 
 Both are 0.21 N m and 0.031 N m for the 5 N m that the paper's actuator reaches at 50 psi_g.
 """
-
-USUAL_LEAD = 0.0185
-"""Lead of the learnt table in addition to the dead time [s], for the lag of the torque behind the command."""
 
 SAMPLES_LATE = 1.5
 """Delay of a sampled command in sample periods: one for the computation, half of one for the zero-order hold."""
@@ -122,11 +117,6 @@ def release(reach: float) -> float:
     return RELEASE_SHARE * reach
 
 
-def learning_gain(proportional: float) -> float:
-    """Learning gain [1/(N m)], command per mean torque error of a stride: half the proportional gain [1/(N m)]."""
-    return 0.5 * proportional
-
-
 def torque_rate(loop: TorqueLoop) -> float:
     """Rate R [N m/s] at which the torque rises with the valve fully open."""
     return loop.rate
@@ -135,8 +125,3 @@ def torque_rate(loop: TorqueLoop) -> float:
 def dead_time(loop: TorqueLoop) -> float:
     """Dead time theta [s] from a command to the measured torque."""
     return loop.dead_time
-
-
-def lead(loop: TorqueLoop) -> float:
-    """Lead [s] at which a learnt table is read: 18.5 ms plus the dead time."""
-    return USUAL_LEAD + loop.dead_time

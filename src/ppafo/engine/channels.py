@@ -22,7 +22,6 @@ TRACED_IN_WALKS: dict[str, str] = {
     "positive_push_off_work": "walk.positive_push_off_work",
     "net_push_off_work": "walk.net_push_off_work",
     "controller_phase": "controller_state.phase.phase",
-    "gait_fraction": "clock.fraction",
 }
 """Additional channels of a walk: end of the path of a state variable, which not every controller has."""
 REQUEST = "controller_state.request.torque"

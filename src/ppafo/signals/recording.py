@@ -81,12 +81,6 @@ CHANNELS: dict[str, ChannelKind] = {
         "gait phase detected by the controller: 0 swing, 1 landing, 2 mid-stance, 3 push-off",
         is_held=True,
     ),
-    "gait_fraction": ChannelKind(PLAIN_NUMBER, "stride fraction estimated by a predicting controller"),
-    "gait_event": ChannelKind(
-        PLAIN_NUMBER,
-        "last gait event known to the controller: 0 heel strike, 1 toes on, 2 heel off, 3 toes off",
-        is_held=True,
-    ),
     "heel_force": ChannelKind("N", "force under the heel, after the lag of the sensor"),
     "toe_force": ChannelKind("N", "force under the toes, after the lag of the sensor"),
     "dorsiflexor_moment": ChannelKind("N m", "moment of the dorsiflexor muscles, 0 or more"),

@@ -27,7 +27,6 @@ _OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
     torque_loop.INTEGRAL_RATE: torque_loop.integral_rate,
     torque_loop.BOUNDARY: torque_loop.boundary_layer,
     torque_loop.CONVERGENCE: torque_loop.convergence_rate,
-    torque_loop.LEAD: torque_loop.lead,
     RATE: torque_loop.torque_rate,
     DEAD_TIME: torque_loop.dead_time,
 }
@@ -53,9 +52,11 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
     angle_loop.REST_DISTANCE: angle_loop.rest_distance,
 }
 """Rule for each number that depends on torque loop and joint."""
-GAIN_TERMS = frozenset(
-    (*_OF_LOOP, *_OF_REACH, *_OF_JOINT, torque_loop.OPENING, torque_loop.INTEGRAL_GAIN, torque_loop.LEARNING_GAIN)
-) - {torque_loop.REACH, RATE, DEAD_TIME}
+GAIN_TERMS = frozenset((*_OF_LOOP, *_OF_REACH, *_OF_JOINT, torque_loop.OPENING, torque_loop.INTEGRAL_GAIN)) - {
+    torque_loop.REACH,
+    RATE,
+    DEAD_TIME,
+}
 """Names of the numbers that are gains of a controller, and not numbers of the device."""
 SLOPE_GAINS = ("derivative_gain", "damping")
 """Gains on the rate of the error, which are 0 by default for every device."""
@@ -193,9 +194,7 @@ def default_gain_terms(
     has_dead_band = any(quantity.name == "dead_band" for quantity in VALVES[device.valve.kind].quantities)
     opening = opening_beyond_band if has_dead_band else gain_with_setting
     terms[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
-    # An integral, and what is learnt, go with the proportional gain, also where that one is given.
+    # An integral goes with the proportional gain, also where that one is given.
     gain = next((quantity.name for quantity in law.quantities if torque_loop.PROPORTIONAL_GAIN in quantity.follows), "")
-    path = f"controller.{gain}"
-    terms[torque_loop.INTEGRAL_GAIN] = term(gain_with_setting, torque_loop.integral_gain, path)
-    terms[torque_loop.LEARNING_GAIN] = LinkFunction((path,), torque_loop.learning_gain)
+    terms[torque_loop.INTEGRAL_GAIN] = term(gain_with_setting, torque_loop.integral_gain, f"controller.{gain}")
     return terms

@@ -48,7 +48,7 @@ def override_document(
 ) -> OverriddenDocument:
     """Return a changed copy of a document; ``file`` is the document's name in messages.
 
-    Naming another kind of motion, controller, timing or profile drops the settings of the document that only the old
+    Naming another kind of motion, controller or profile drops the settings of the document that only the old
     kind has; giving a rate drops its period, and vice versa. A gain on the torque, or one of 0, may omit its unit.
     Raises ScenarioError for a path that is neither ``declared`` nor of the device, and for an override that another one
     makes useless.

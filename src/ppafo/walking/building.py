@@ -6,15 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ppafo.control.kind import FORCE_LAG, VALVE_DELAY
 from ppafo.control.walking.catalog import walking_controllers
-from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, refused_as
 from ppafo.gait import NORMATIVE, load_gait
-from ppafo.model.catalog import VALVES
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import Graph, LinkFunction
-from ppafo.parameters.plant import venting_valve
+from ppafo.parameters.graph import Graph
 from ppafo.simulation.assumptions import assumed_lines
 from ppafo.simulation.building import origin_of, read_gas_model, read_supply_line
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
@@ -22,7 +18,7 @@ from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.document import DocumentReader, ScenarioRequest, kind_at, value_at
 from ppafo.simulation.following import read_followers
 from ppafo.simulation.hardware import read_device, read_hardware
-from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH, lag_of_sensor
+from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
 from ppafo.simulation.motion_kind import MOTIONS, WALK
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument
@@ -36,7 +32,6 @@ from ppafo.walking.declaration import (
     SEED,
     STEP,
     WALK_SENSORS,
-    timing_of,
 )
 from ppafo.walking.motion import WalkMotion, duration_problems, record_interval, walk_of, with_duration
 from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
@@ -123,7 +118,6 @@ def _motion(
         motion_kind=MOTIONS[kind_at(reading.document, "motion") or WALK],
         gait=gait,
         wearer=read_wearer(reading, gait, is_named),
-        timing=timing_of(reading.document),
         forces={name: sensors[name] for name in FORCES},
         task_sequence=sequence,
         bottle=bottle,
@@ -154,32 +148,20 @@ def _named_by(
 
 
 def _control(reading: DocumentReader, device: Device, sensors: Mapping[str, float]) -> tuple[Control, Graph]:
-    """Return the controller with its settings and those of the phase estimator [SI], and the links between the numbers.
+    """Return the controller with its settings [SI], and the links between the numbers.
 
     Defaults may depend on valve, device and sensors; each such dependence is a link.
     """
     kind = kind_at(reading.document, "controller")
     law = walking_controllers()[kind]
-    timing = TIMINGS[timing_of(reading.document)]
-    with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
-        # A timing of a controller that uses no gait phase is refused.
-        with_timing(law, timing)
     rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
     seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
     if rate is not None:
         seconds = 1.0 / reading.number("controller.rate", RATE)
-    valve, delay = VALVES[device.valve.kind], venting_valve(device.valve).command_delay
-    paths = tuple(f"valve.{quantity.name}" for quantity in valve.quantities)
-    terms = {
-        VALVE_DELAY: LinkFunction(paths, delay, (valve.settings,)),
-        FORCE_LAG: LinkFunction(("sensors.force_bandwidth",), lag_of_sensor),
-        **nominal_terms(device),
-        **default_gain_terms(device, law, IN_WALK),
-    }
+    terms = nominal_terms(device) | default_gain_terms(device, law, IN_WALK)
     present = {f"sensors.{name}": number for name, number in sensors.items()}
     present[PERIOD_PATH] = seconds
-    sections = {"controller": law.quantities, "timing": timing.quantities}
-    numbers, links = read_followers(reading, sections, terms, device, present)
+    numbers, links = read_followers(reading, {"controller": law.quantities}, terms, device, present)
     settings = {path.partition(".")[2]: number for path, number in numbers.items()}
     # A law that is named by its module keeps this name; a law of the catalogue has the name that it has in walking.
     return Control(kind if ":" in kind else law.name, settings, seconds), links

@@ -8,7 +8,6 @@ from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS, load_walking_controller, walking_controllers
-from ppafo.control.walking.timings import TIMINGS
 from ppafo.documents.models import REFERENCE, make_schema, one_of, optional, table
 from ppafo.documents.problems import quote
 from ppafo.errors import KindError, ScenarioError, refused_as
@@ -24,9 +23,6 @@ from ppafo.walking.wearer import WEARER
 
 SUMMARY = "the device on a leg that walks along a prescribed gait"
 """Description of the motion of a walk."""
-
-THRESHOLDS = next(iter(TIMINGS))
-"""Default gait phase estimator of a walk file."""
 
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
 STEP = Quantity("step", "s", "largest step; 1 ms unless given", 1.0e-3, 1.0e-6, 0.01)
@@ -56,13 +52,12 @@ FORCES = tuple(quantity.name for quantity in WALK_SENSORS if quantity not in SEN
 """Sensor settings that exist in a walk only: force sensors."""
 
 
-def sections(controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
-    """Return the declarations of a walk's numbers by section, for named controller and phase estimator."""
+def sections(controller: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
+    """Return the declarations of a walk's numbers by section, for a named controller."""
     laws = walking_controllers()
     return {
         "wearer": (*WEARER, PERSON),
         "controller": (RATE, PERIOD, *(laws[controller].quantities if controller in laws else ())),
-        "timing": TIMINGS[timing].quantities if timing in TIMINGS else (),
         "sensors": (*WALK_SENSORS, SEED),
         "run": (DURATION, STEP),
         "gas_model": THERMAL_GAS if gas == THERMAL else (),
@@ -72,11 +67,6 @@ def sections(controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity
 def by_path(declared: Mapping[str, Iterable[Quantity]]) -> dict[str, Quantity]:
     """Return declarations grouped by section as a flat mapping, keyed by dotted path."""
     return {f"{section}.{quantity.name}": quantity for section, items in declared.items() for quantity in items}
-
-
-def timing_of(document: Mapping[str, Any]) -> str:
-    """Return the name of the gait phase estimator in a document."""
-    return kind_at(document, "timing") or THRESHOLDS
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
@@ -108,15 +98,14 @@ def _check_motion(kind: object, place: str) -> None:
 
 def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of all text values that a document may contain."""
-    kinds = ("controller.kind", "timing.kind", "gas_model.kind")
-    return (*TEXTS, "motion.kind", "gait", "task_sequence", BOTTLE_NAME, *kinds)
+    return (*TEXTS, "motion.kind", "gait", "task_sequence", BOTTLE_NAME, "controller.kind", "gas_model.kind")
 
 
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
-    """Return the declaration of every number that a document with its controller and estimator may contain, by path."""
+    """Return the declaration of every number that a document with its controller may contain, by path."""
     find_kinds(document, "the file of a walk")
     controller, gas = kind_at(document, "controller"), kind_at(document, "gas_model")
-    declared = by_path(sections(controller, timing_of(document), gas) | {BOTTLE: BOTTLE_NUMBERS})
+    declared = by_path(sections(controller, gas) | {BOTTLE: BOTTLE_NUMBERS})
     return declared | line_paths()
 
 
@@ -150,10 +139,6 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             str, "name of a task sequence, or the path of its file; equal strides unless one is given"
         ),
     }
-    timings = [
-        table(f"{model_name(name)}Timing", kind_field(name, timing.summary) | _optional_numbers(timing.quantities))
-        for name, timing in TIMINGS.items()
-    ]
     bottle = {
         "name": optional(str, "name of a bottle, or the path of its file"),
         **_optional_numbers(BOTTLE_NUMBERS),
@@ -168,7 +153,6 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             controller_table(walking_controllers(), "Walking"),
             Field(description="controller of the valve"),
         ),
-        "timing": optional(one_of(timings), "how the controller estimates the gait phase; thresholds unless given"),
         "wearer": optional(
             table("Wearer", quantity_fields((*WEARER, PERSON))),
             "wearer; default: the subject of the named gait, else the paper's subject",

@@ -34,7 +34,7 @@ def list_walks() -> tuple[str, ...]:
 
     >>> import ppafo
     >>> ppafo.list_walks()[:3]
-    ('off', 'proportional', 'proportional-learning')
+    ('off', 'proportional', 'proportional-regulators')
     """
     return FILE.names()
 

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ppafo.control.walking.timings import TIMINGS
 from ppafo.gait import Gait
 from ppafo.gait.plausible_angles import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
@@ -32,7 +31,6 @@ class WalkMotion:
     - ``motion_kind``: functions of this type of motion
     - ``gait``: prescribed gait
     - ``wearer``: leg of the wearer
-    - ``timing``: name of the gait phase estimator
     - ``forces``: settings [SI] of the force sensors, by name
     - ``task_sequence``: task sequence, None for equal strides
     - ``bottle``: gas bottle, None for an unlimited supply
@@ -43,7 +41,6 @@ class WalkMotion:
     motion_kind: MotionKind[Scenario] = field(compare=False)
     gait: Gait
     wearer: Wearer
-    timing: str
     forces: Mapping[str, Any]
     task_sequence: TaskSequence | None = None
     bottle: BottleSupply | None = None
@@ -64,7 +61,7 @@ class WalkMotion:
 
 
 def walk_of(scenario: Scenario) -> WalkMotion:
-    """Return the motion of a walk scenario, with gait, wearer and phase estimator."""
+    """Return the motion of a walk scenario, with gait and wearer."""
     motion = scenario.motion
     assert isinstance(motion, WalkMotion), "only walks come here"
     return motion
@@ -87,11 +84,6 @@ LONGEST_MINUTES = 60.0
 PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{quantity.name}": ("motion", "wearer", quantity.name) for quantity in WEARER},
     f"wearer.{PERSON.name}": ("motion", PERSON.name),
-    **{
-        f"timing.{quantity.name}": ("controller", "settings", quantity.name)
-        for kind in TIMINGS.values()
-        for quantity in kind.quantities
-    },
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
 }
 """Attributes or keys that lead to the numbers of a walk that other scenarios do not have, by path."""
@@ -99,10 +91,7 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a walk except those of the device, by path."""
-    motion, control = walk_of(scenario), scenario.controller
-    declared = sections(control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
-    # An object in charge has no settings, and a timing is one of a controller that has some.
-    declared["timing"] = tuple(quantity for quantity in declared["timing"] if quantity.name in control.settings)
+    declared = sections(scenario.controller.kind, "" if scenario.gas_model is None else THERMAL)
     return by_path(declared) | ({} if scenario.supply_lines is None else line_paths())
 
 

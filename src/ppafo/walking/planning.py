@@ -9,7 +9,6 @@ import numpy as np
 from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import walking_controllers
-from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import of_each
@@ -233,13 +232,13 @@ def noise(scenario: Scenario) -> Any:
 
 
 def law_of(scenario: Scenario) -> ControllerKind:
-    """Return the controller of a walk with its gait phase estimator, for scalar arithmetic.
+    """Return the controller of a walk.
 
     The controller with a constant command occurs only in an exported plant, not in a walk file.
     """
     if scenario.controller.kind == switching.CONSTANT.name:
         return switching.CONSTANT
-    return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
+    return walking_controllers()[scenario.controller.kind]
 
 
 def requests_torque(law: ControllerKind) -> bool:

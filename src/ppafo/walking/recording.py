@@ -19,11 +19,10 @@ from ppafo.walking.bottle.course import UNITS, SupplyCourse
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.inverse_dynamics import dorsiflexor_moment, swing_knee_torque
 from ppafo.walking.motion import walk_of
-from ppafo.walking.stride_events import EVENT_ROW, FRACTION_ROW, PHASE_ROW, clock_row
 from ppafo.walking.task_sequence_plan import pace_in_time
 
-_REQUEST_ROW = "controller_state.request.torque"
-"""Path of the row for the requested torque of a torque-following controller."""
+_PHASE_ROW, _REQUEST_ROW = "controller_state.phase.phase", "controller_state.request.torque"
+"""Paths of the rows for gait phase and requested torque of a controller that has them."""
 
 
 def recording_of_walk(
@@ -64,13 +63,10 @@ def recording_of_walk(
         for name, values in supply.values.items():
             channels[name] = (np.interp(time, supply.times, values), UNITS[name])
         channels["bottle_mass"] = (supply.first.mass - record["line_state.regulated_mass"], "kg")
-    if PHASE_ROW in record:
-        channels["controller_phase"] = (record[PHASE_ROW], "-")
+    if _PHASE_ROW in record:
+        channels["controller_phase"] = (record[_PHASE_ROW], "-")
     if _REQUEST_ROW in record:
         channels["reference"] = (record[_REQUEST_ROW], "N m")
-    fraction, event = clock_row(record, FRACTION_ROW), clock_row(record, EVENT_ROW)
-    if fraction is not None and event is not None:
-        channels |= {"gait_fraction": (fraction, "-"), "gait_event": (event, "-")}
     if pace is not None:
         _, frequency, stride = pace
         channels["stride_frequency"] = (frequency, "Hz")

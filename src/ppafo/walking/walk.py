@@ -25,7 +25,6 @@ from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle
 from ppafo.walking.bottle.course import WALKED
 from ppafo.walking.contradictions import check_no_bottle
-from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.evaluation import result_of_walk
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
@@ -230,10 +229,10 @@ def without_device(configuration: Scenario) -> Scenario:
         name=f"{configuration.name}-without",
         device=replace(device, actuator=stops, friction=free, foot_plate=massless, effects={}, links={}),
         controller=control,
-        motion=replace(walk_of(configuration), bottle=None, timing=THRESHOLDS),
+        motion=replace(walk_of(configuration), bottle=None),
         supply_line=None,
         # Links to numbers that are left out go too.
-        links=outside(configuration.links, "controller", "timing", "supply_line"),
+        links=outside(configuration.links, "controller", "supply_line"),
     )
 
 

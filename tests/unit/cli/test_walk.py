@@ -100,9 +100,9 @@ def test_tables_and_recordings_say_the_same_and_that_they_are_simulated(walked: 
 def test_the_list_names_every_walk_and_every_task_sequence(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["walk", "--list"]) == 0
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
-    proportional = ("proportional", "proportional-learning", "proportional-regulators")
-    assert names[:6] == ["off", *proportional, "solenoid", "solenoid-regulators"]
-    assert names[6:] == ["corridor", "first-steps", "six-minutes", "stairs"]
+    proportional = ("proportional", "proportional-regulators")
+    assert names[:5] == ["off", *proportional, "solenoid", "solenoid-regulators"]
+    assert names[5:] == ["corridor", "first-steps", "six-minutes", "stairs"]
     assert main(["walk", "--list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["walks"]
     assert [item["kind"] for item in listed] == ["walk"] * 6 + ["task sequence"] * 4

@@ -5,10 +5,10 @@ import sys
 from typing import Any
 
 import pytest
+from ppafo.control.walking.timing import TimingParts, threshold_time
 
 from ppafo.control.controllers import pid, switching
 from ppafo.control.walking import assistance
-from ppafo.control.walking.timing import TimingParts, threshold_time
 from ppafo.engine.package_key import package_key
 from ppafo.golden_bits import plain_batch
 from ppafo.model.binding import made_of

@@ -35,7 +35,7 @@ THERMAL = (
     *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"),
     "gas_model.wall_area_per_volume=100 1/m",
 )
-SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
+SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s")
 EVERYTHING = (*SEEN, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
 ACTUATORS = Path(__file__).parents[2] / "actuators"
 OF_ANOTHER_KIND = (

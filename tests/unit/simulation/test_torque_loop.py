@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.control.torque_loop import TorqueLoop, lead, proportional_gain
+from ppafo.control.torque_loop import TorqueLoop, proportional_gain
 from ppafo.loading import load_scenario
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import torque_reach
@@ -27,7 +27,6 @@ LAWS = {
     "pid": "proportional_gain",
     "pid_feedforward": "proportional_gain",
     "damped_proportional": "proportional_gain",
-    "event_damped_learning": "proportional_gain",
 }
 
 
@@ -61,9 +60,6 @@ def test_the_other_words_for_the_same_bandwidth() -> None:
     assert sliding.controller.surface_slope == pytest.approx(0.125 / theta)
     inverted = load_walk("proportional", ["controller.kind=feedback_linearisation", *SMALL_AIR])
     assert inverted.controller.convergence_rate == pytest.approx(0.5 / theta)
-    learning = load_walk("proportional", ["controller.kind=event_damped_learning", *SMALL_AIR]).controller
-    assert learning.lead == pytest.approx(0.02 + theta - 0.0015)
-    assert (learning.learning_gain, learning.damping) == (0.5 * learning.proportional_gain, 0.0)
     zone = load_walk("proportional", ["controller.kind=on_off_dead_zone", "valve.dead_band=0.1", *SMALL_AIR])
     assert zone.controller.opening == pytest.approx(0.1 + 0.9 * min(0.77, zone.controller.dead_zone / (rate * theta)))
     assert load_walk("proportional", ["controller.kind=on_off_dead_zone"]).controller.opening == 0.77
@@ -130,7 +126,6 @@ def test_late_sensors_are_dead_time_too() -> None:
 
 def test_no_flow_leaves_a_gain_that_is_finite() -> None:
     assert proportional_gain(TorqueLoop(0.0, 1.5e-3)) == 1000.0
-    assert lead(TorqueLoop(85.0, 1.5e-3)) == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize("file", ["torque-task-cylinder.toml", "torque-task-measured-bladder.toml"])

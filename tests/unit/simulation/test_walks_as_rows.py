@@ -21,10 +21,9 @@ WALKS: dict[str, tuple[str, tuple[str, ...]]] = {
     "solenoid": ("solenoid", ()),
     "off": ("off", ()),
     "proportional": ("proportional", ()),
-    "learning": ("proportional-learning", ()),
     "lines": ("proportional-regulators", ()),
     "lines, slow": ("solenoid-regulators", ("controller.rate=500 Hz",)),
-    "timed": ("proportional", ("timing.kind=estimated", "sensors.pressure_bandwidth=40 Hz")),
+    "slow sensors": ("proportional", ("sensors.pressure_bandwidth=40 Hz",)),
     "task_sequence": ("proportional", ("task_sequence=first-steps",)),
     "thermal": ("proportional", (*THERMAL, "gas_model.wall_area_per_volume=100 1/m", "sensors.force_noise=2 N")),
 }

@@ -319,7 +319,7 @@ def test_what_c_would_compute_otherwise_is_refused_with_file_and_line(
 @needs_gcc
 @pytest.mark.parametrize("language", ["-std=c99", "-xc++"])
 def test_programs_compile_without_a_warning(language: str, tmp_path: Path) -> None:
-    walk = plan_walk(with_duration(load_walk("solenoid", ["timing.kind=estimated"]), 4.0)).program
+    walk = plan_walk(with_duration(load_walk("solenoid"), 4.0)).program
     for number, program in enumerate([*drawn_programs(3), walk]):
         written = tmp_path / f"{number}.c"
         written.write_text(program_source(program), encoding="utf-8")

@@ -69,7 +69,7 @@ def test_a_torque_profile_that_contradicts_itself_is_refused(overrides: str) -> 
 
 
 def test_shipped_walks_load_and_contradict_nothing() -> None:
-    proportional = ("proportional", "proportional-learning", "proportional-regulators")
+    proportional = ("proportional", "proportional-regulators")
     solenoid = ("solenoid", "solenoid-regulators")
     assert list_walks() == ("off", *proportional, *solenoid)
     assert [load_walk(name).name for name in list_walks()] == list(list_walks())

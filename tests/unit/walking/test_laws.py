@@ -1,15 +1,12 @@
 """Every law on a walking leg: it follows its torque, leaves the foot free in mid-stance, and lifts the toes."""
 
-import itertools
 from collections.abc import Callable
 from functools import lru_cache
 
-import numpy as np
 import pytest
 
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.metrics.strides import SETTLING
-from ppafo.model.helping import MID_STANCE, PUSH_OFF
+from ppafo.model.helping import MID_STANCE
 from ppafo.model.valves.kind import VENT
 from ppafo.walking import WalkResult, load_walk, walk
 
@@ -20,7 +17,6 @@ LARGEST_ERROR = {
     "event_pid": 0.25,
     "event_pid_feedforward": 0.25,
     "event_sliding_mode": 0.25,
-    "event_damped_learning": 0.15,
     "event_feedback_linearisation": 0.15,
 }
 """RMS torque error in push-off [N m] that a law keeps below, of a peak of 5 N m."""
@@ -77,22 +73,3 @@ def test_the_dead_zone_works_on_solenoid_valves(zone: list[str]) -> None:
     assert result.status.is_completed
     assert result.metrics["net_push_off_work"].value > 0.8
     assert result.metrics["toe_landing"].value == 0.0
-
-
-def test_the_error_of_the_learning_law_falls_from_stride_to_stride(walked: Callable[[str], WalkResult]) -> None:
-    result = walked("event_damped_learning")
-    errors = push_off_errors(result)
-    assert errors[-3:].mean() < 0.7 * errors[0]
-    overrides = ["controller.kind=event_damped_learning", "controller.learning_gain=0 1/(N m)"]
-    without = walk(load_walk("proportional", overrides), minutes=MINUTES)
-    assert without.metrics["push_off_error"].value > 1.2 * result.metrics["push_off_error"].value
-    assert np.ptp(push_off_errors(without)[SETTLING:]) < 0.02, "nothing is learnt without a gain"
-
-
-def push_off_errors(result: WalkResult) -> np.ndarray:
-    """RMS torque error in push-off [N m] of each stride."""
-    recording, starts = result.recording, result.starts
-    error = recording["reference"] - recording["torque"]
-    pushes = recording["controller_phase"] == PUSH_OFF
-    strides = [slice(first, last) for first, last in itertools.pairwise(starts)]
-    return np.array([np.sqrt(np.mean(error[stride][pushes[stride]] ** 2)) for stride in strides])

@@ -2,15 +2,14 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ppafo.analyses.reproduce.claim import Verdict
-from ppafo.analyses.reproduce.event_times import WEARERS, event_error, uneven_task_sequence
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import fields_of
 from ppafo.documents.toml_text import label
@@ -84,26 +83,12 @@ def dorsiflexor_share() -> float:
     return worn.metrics["dorsiflexor_moment"].value / healthy_metrics(worn.scenario)["dorsiflexor_moment"].value
 
 
-def event_reduction(wearer: str) -> float:
-    """Relative reduction of the event time error by state estimation instead of thresholds, for one wearer [-]."""
-    configuration = load_walk(PAIR, WEARERS[wearer])
-    # Two steps a stride.
-    sequence = uneven_task_sequence(2.0 / walk_of(configuration).gait.stride_time)
-    errors = []
-    for timing in ("thresholds", "estimated"):
-        walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}"))
-        errors.append(event_error(replace(walked, motion=replace(walk_of(walked), task_sequence=sequence))))
-    return 1.0 - errors[1] / errors[0]
-
-
 _OF_PRESSURE = {"pressure": "Pa_a"}
 COMPUTATIONS: dict[str, _Computation] = {
     "held_torque": _Computation("N m", _OF_PRESSURE, held_torque),
     "share_of_healthy_moment": _Computation("1", _OF_PRESSURE, share_of_healthy_moment),
     "walking_torque": _Computation("N m", _OF_PRESSURE, walking_torque),
     "dorsiflexor_share": _Computation("1", {}, dorsiflexor_share),
-    "healthy_event_reduction": _Computation("1", {}, partial(event_reduction, "healthy")),
-    "impaired_event_reduction": _Computation("1", {}, partial(event_reduction, "impaired")),
 }
 
 

@@ -28,7 +28,7 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "device": plain(scenario.device),
         "gait": plain(motion.gait),
         "wearer": plain(motion.wearer),
-        **fields_of(motion, "wearer_origin", "timing"),
+        "wearer_origin": motion.wearer_origin,
         "task_sequence": plain(motion.task_sequence),
         "controller": control.kind,
         "settings": plain(control.settings),

@@ -91,15 +91,12 @@ def damped_update(
     return beyond_dead_band(opening, parameters.dead_band), _DampedProportionalState(state.elapsed + period, course)
 
 
-GAIN_QUANTITIES = quantities_of(DampedGains)
-"""Fields of ``DampedGains`` in order."""
-
 DAMPED_PROPORTIONAL = ControllerKind(
     name="damped_proportional",
     summary="Proportional control with damping injection and a feed-forward table that iterative learning fills.",
     source="Zhang, Cheah and Collins 2015, Experimental comparison of torque control methods on an ankle exoskeleton",
     quantities=(
-        *GAIN_QUANTITIES,
+        *quantities_of(DampedGains),
         Quantity("knot_spacing", "s", "time between two knots of the table", 0.1, 1.0e-3, 1.0e3),
         *(
             Quantity(f"knot_{number}", "", f"learnt command at knot {number}", 0.0, -1.0, 1.0)

@@ -12,9 +12,8 @@ from typing import Any, NamedTuple
 from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseState
-from ppafo.control.walking.timing import GaitTime, TimingParts
 from ppafo.model.declaration import Quantity
-from ppafo.model.helping import MID_STANCE, PUSH_OFF
+from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
@@ -123,10 +122,6 @@ class _Assessment(NamedTuple):
     """Evaluation of a sample by a walking controller, before the law computes the command."""
 
     phase: PhaseState
-    clock: Any
-    """State of the gait phase estimator; its class depends on the estimator."""
-    time: GaitTime
-    """Gait phase as time since the heel strike."""
     request: TorqueRequest
     continues: float
     """1 where the task of the previous sample continues, 0 where another task starts."""
@@ -146,16 +141,16 @@ LARGEST_PRESS = 0.7
 """Largest torque in plantarflexion [N m] requested in the swing: about the weight of a foot with its shoe."""
 
 
-def requested_torque(rules: Assistance, phase: PhaseState, time: GaitTime, angle: float, rate: float) -> float:
+def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: float) -> float:
     """Requested torque [N m], positive in plantarflexion, at an angle q [rad] and its rate [rad/s]; 0 in mid-stance.
 
     Landing and swing: stiffness (swing_angle - q) - damping dq/dt, minus the profile of the phase. Push-off: its
     profile.
     """
-    fraction = time.since_strike / phase.stride_time
+    fraction = phase.since_strike / phase.stride_time
     hold = rules.stiffness * (rules.swing_angle - angle) - rules.damping * rate
     landing, swing = profile_torque(rules.landing, fraction), profile_torque(rules.swing, fraction)
-    lands = time.lands > 0.5
+    lands = phase.phase == LANDING
     # Profiles of landing and swing are given as torques in dorsiflexion, hence the minus.
     lifted = hold - (landing if lands else swing)
     # On the heel nothing presses the toes down, and in the air little: an angle that is read too low asks for it.
@@ -170,38 +165,20 @@ def same_task(before: float, after: float) -> bool:
     return phases.lifts(before) == phases.lifts(after) and (before == PUSH_OFF) == (after == PUSH_OFF)
 
 
-def timed_phase(
-    parameters: Any,
-    phase: PhaseState,
-    clock: Any,
-    measurement: GaitMeasurement,
-    period: float,
-    *,
-    parts: TimingParts,
-) -> tuple[PhaseState, Any, GaitTime]:
-    """Return phase, clock and gait time after a sample of ``period`` [s], from the gait phase estimator."""
-    passed = parts.gait_time(parameters.timing, clock, phase).since_strike + period
-    heel, toe = measurement.heel_force, measurement.toe_force
-    after = phases.timed_phase_state(parameters.phases, phase, heel, toe, passed, period)
-    followed = parts.follow(parameters.timing, parameters.phases, clock, phase, after, measurement, period)
-    return after, followed, parts.gait_time(parameters.timing, followed, after)
-
-
-def assess(
-    parameters: Any, state: Any, measurement: GaitMeasurement, period: float, *, parts: TimingParts
-) -> _Assessment:
+def assess(parameters: Any, state: Any, measurement: GaitMeasurement, period: float) -> _Assessment:
     """Assess a sample taken every ``period`` [s]: gait phase, requested torque [N m], and permission to act.
 
     ``parameters`` and ``state`` are rows with the fields of ``LawParameters`` and ``LawState`` (``frame.py``).
     """
-    phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period, parts=parts)
+    heel, toe = measurement.heel_force, measurement.toe_force
+    phase = phases.next_phase_state(parameters.phases, state.phase, heel, toe, period)
     rules: Assistance = parameters.assistance
     last: TorqueRequest = state.request
     # An angle of 0 marks that there was no sample before.
     turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
     # A filter of first order, with an implicit step: stable for any time constant.
     rate = last.rate + (turned - period * last.rate) / (period + rules.rate_filter)
-    torque = requested_torque(rules, phase, time, measurement.angle, rate)
+    torque = requested_torque(rules, phase, measurement.angle, rate)
     # A foot that lands on its toes turns far, and gas left in the chamber would then push on a loaded heel: the law
     # takes it off. A stance that began on the toes has been in mid-stance since its strike: it had no landing.
     on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
@@ -209,8 +186,6 @@ def assess(
     has_task = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or is_eased
     return _Assessment(
         phase=phase,
-        clock=clock,
-        time=time,
         request=TorqueRequest(measurement.angle, rate, torque),
         continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
         acts=1.0 if has_task and not phases.lacks_event(phase) else 0.0,

@@ -11,7 +11,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers import model_based, pid, switching
 from ppafo.control.kind import BelievedBand, ControllerKind
 from ppafo.control.torque_loop import INTEGRAL_GAIN, PROPORTIONAL_GAIN, beyond_dead_band
-from ppafo.control.walking import event_on_off, learning
+from ppafo.control.walking import event_on_off
 from ppafo.control.walking.frame import shared_settings, walking_law
 from ppafo.kinds import Kinds
 from ppafo.model.controlled import TORQUE
@@ -97,7 +97,6 @@ _COMPETING = (
     _EVENT_BASED[pid.PID],
     _EVENT_BASED[model_based.PID_FEEDFORWARD],
     _EVENT_BASED[switching.SLIDING_MODE],
-    learning.KIND,
     _EVENT_BASED[model_based.FEEDBACK_LINEARISATION],
     event_on_off.OFF,
 )

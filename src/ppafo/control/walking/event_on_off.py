@@ -10,20 +10,15 @@ from typing import Annotated, NamedTuple
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases
-from ppafo.control.walking.assistance import timed_phase
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts
 from ppafo.model.declaration import EmptyRow, Number, quantities_of
-from ppafo.model.helping import PUSH_OFF
+from ppafo.model.helping import LANDING, PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
 
 class _EventOnOffParameters(NamedTuple):
-    """Angle of the lifted foot and band about it [rad], end of push-off [turns], largest torque [N m].
-
-    ``phases`` and ``timing`` are the rules of phases and timing.
-    """
+    """Angle of the lifted foot and band about it [rad], end of push-off [turns], largest torque [N m], phase rules."""
 
     swing_angle: Annotated[float, Number("rad", "ankle angle to which the foot is lifted in swing", 1.68, 0.5, 2.5)]
     band: Annotated[
@@ -49,20 +44,14 @@ class _EventOnOffParameters(NamedTuple):
         ),
     ]
     phases: PhaseRules
-    timing: EmptyRow
 
 
 class _EventOnOffState(NamedTuple):
-    """Phase and clock; ``lifting`` is 1 for a lifted foot, ``resting`` is 1 while excess torque is vented."""
+    """Phase; ``lifting`` is 1 for a lifted foot, ``resting`` is 1 while excess torque is vented."""
 
     phase: PhaseState = PhaseState()
-    clock: EmptyRow = EmptyRow()
     lifting: float = 0.0
     resting: float = 0.0
-
-
-USUAL_CLOCK = ClockParts(AT_THRESHOLDS, _EventOnOffState)
-"""State class and timing functions of the law with the default gait phase estimator."""
 
 
 def update(
@@ -71,20 +60,19 @@ def update(
     reference: float,
     measurement: GaitMeasurement,
     period: float,
-    *,
-    parts: ClockParts = USUAL_CLOCK,
 ) -> tuple[float, _EventOnOffState]:
     """Command [-]: 1 plantarflexion, -1 dorsiflexion, ``VENT`` for free motion; the reference is not used."""
-    phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period, parts=parts.timing)
+    heel, toe = measurement.heel_force, measurement.toe_force
+    phase = phases.next_phase_state(parameters.phases, state.phase, heel, toe, period)
     above = measurement.angle > parameters.swing_angle + parameters.band
     below = measurement.angle < parameters.swing_angle - parameters.band
     # Hysteresis: between both limits the valve stays as it is.
     lifting = 0.0 if below else (1.0 if above else state.lifting)
     held = phases.lifts(phase.phase)
-    command = -1.0 if lifting > 0.5 or time.lands > 0.5 else VENT
+    command = -1.0 if lifting > 0.5 or phase.phase == LANDING else VENT
     command = command if held else VENT
     # Vented before toe-off, so that the gas does not hold the foot down in the swing.
-    in_time = time.since_strike < parameters.push_off_end * phase.stride_time
+    in_time = phase.since_strike < parameters.push_off_end * phase.stride_time
     command = 1.0 if phase.phase == PUSH_OFF and in_time else command
     # A torque is let go from the largest one on, until half of it is left; of what the valve feeds alone: a torque
     # against it is the wearer's.
@@ -92,9 +80,7 @@ def update(
     rests = abs(measurement.torque) > (0.5 * largest if state.resting > 0.5 else largest)
     command = VENT if rests and command * measurement.torque > 0.0 else command
     command = VENT if phases.lacks_event(phase) else command
-    following: _EventOnOffState = parts.state(
-        phase=phase, clock=clock, lifting=lifting if held else 0.0, resting=1.0 if rests else 0.0
-    )
+    following = _EventOnOffState(phase=phase, lifting=lifting if held else 0.0, resting=1.0 if rests else 0.0)
     return command, following
 
 

@@ -13,40 +13,36 @@ from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, phases
 from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest, assess
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.timing import AT_THRESHOLDS, TimingParts
 from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
 from ppafo.model.controlled import TORQUE
-from ppafo.model.declaration import EmptyRow, row_with
+from ppafo.model.declaration import row_with
 from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
 class LawParameters(NamedTuple):
-    """Parameters of law, assistance, phases and timing; ``row_with`` makes a class for each law."""
+    """Parameters of law, assistance and phases; ``row_with`` makes a class for each law."""
 
     law: Any
     assistance: Assistance
     phases: PhaseRules
-    timing: Any
 
 
 class LawState(NamedTuple):
-    """Phase, clock, torque request, and state of the law; ``row_with`` makes a class for each law."""
+    """Phase, torque request, and state of the law; ``row_with`` makes a class for each law."""
 
     phase: PhaseState
-    clock: Any
     request: TorqueRequest
     law: Any
 
 
 class _WalkingParts(NamedTuple):
-    """Functions that make up a walking torque law: gait phase estimation and law, with the class of the state.
+    """Functions of a torque law that walks, with the class of the state.
 
     ``update`` returns command [-] and next state. ``restart(state, requested, continues)`` returns the state at a
     requested torque [N m]; ``continues`` is 0 where another task starts.
     """
 
-    timing: TimingParts
     state: Callable[..., Any]
     update: Callable[[Any, Any, float, Any, float], tuple[float, Any]]
     restart: Callable[[Any, float, float], Any]
@@ -78,7 +74,7 @@ def law_that_walks_update(
     parts: _WalkingParts,
 ) -> tuple[float, LawState]:
     """Command from -1 to 1, or ``VENT``, and the next state; the reference is not used."""
-    assessment = assess(parameters, state, measurement, period, parts=parts.timing)
+    assessment = assess(parameters, state, measurement, period)
     requested = assessment.request.torque
     # Before the update: what the law remembers of another task must not act on this one.
     law = parts.restart(state.law, requested, assessment.continues)
@@ -90,9 +86,7 @@ def law_that_walks_update(
     )
     command, law = parts.update(parameters.law, law, requested, sample, period)
     command = assistance.valve_command(assessment, command)
-    following: LawState = parts.state(
-        phase=assessment.phase, clock=assessment.clock, request=assessment.request, law=law
-    )
+    following: LawState = parts.state(phase=assessment.phase, request=assessment.request, law=law)
     return command, following
 
 
@@ -116,11 +110,11 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
         )
     # One class for each law, named after it: exported C has structs of these names.
     title = "".join(part.capitalize() for part in name.split("_"))
-    parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=EmptyRow)
-    state = row_with(f"{title}State", LawState, law=type(law.initial), clock=EmptyRow)
+    parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters)
+    state = row_with(f"{title}State", LawState, law=type(law.initial))
     # A law without a state has nothing to begin anew, and its empty NamedTuple no literal in C.
     anew = made_of(restart_anew, f"restart_{name}", _InitialStateParts(law.initial)) if len(law.initial) else keep_state
-    parts = _WalkingParts(timing=AT_THRESHOLDS, state=state, update=law.update, restart=law.restart or anew)
+    parts = _WalkingParts(state=state, update=law.update, restart=law.restart or anew)
     return replace(
         law,
         name=name,
@@ -128,7 +122,7 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
         source=f"the paper, figure 1A (phases); {law.source}",
         quantities=(*law.quantities, *ASSISTING_QUANTITIES),
         parameters=parameters,
-        initial=state(phases.START, EmptyRow(), assistance.START, law.initial),
+        initial=state(phases.START, assistance.START, law.initial),
         update=made_of(law_that_walks_update, f"update_{name}", parts),
         restart=None,
         controls=(TORQUE,),

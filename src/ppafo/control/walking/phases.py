@@ -90,18 +90,15 @@ def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float, pa
     return after_push_off if phase == PUSH_OFF else following
 
 
-def timed_phase_state(
-    rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, passed: float, period: float
+def next_phase_state(
+    rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, period: float
 ) -> PhaseState:
-    """Phase state after a sample of both forces [N], taken every ``period`` [s].
-
-    ``passed`` is the estimated time since the heel strike [s], which decides when the push-off may start.
-    """
+    """Phase state after a sample of both forces [N], taken every ``period`` [s]."""
     heel = next_sensor(rules, state.heel, heel_force, period)
     toe = next_sensor(rules, state.toe, toe_force, period)
     since_strike = state.since_strike + period
     stride_time = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
-    phase = next_phase(rules, state._replace(stride_time=stride_time), heel.loaded, toe.loaded, passed)
+    phase = next_phase(rules, state._replace(stride_time=stride_time), heel.loaded, toe.loaded, since_strike)
     # A foot that lands on its toes, or with a lost heel sensor, begins a stride too.
     strikes = state.phase == SWING and phase != SWING
     # Times outside of half and twice the mean are stops or missed strikes.

@@ -6,7 +6,6 @@ planning reads as mappings are structs in C; therefore Python runs only the func
 
 from typing import Any
 
-from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
@@ -93,14 +92,8 @@ def settings_of_walk(configuration: Scenario) -> tuple[ExportParameter, ...]:
 
 
 def _control(configuration: Scenario) -> dict[str, Quantity]:
-    """Return the settings of controller and timing by path, in the order of the controller's parameters."""
-    control = law_of(configuration)
-    law = walking_controllers().get(configuration.controller.kind, control)
-    own = {quantity.name for quantity in law.quantities}
-    return {
-        f"{'controller' if quantity.name in own else 'timing'}.{quantity.name}": quantity
-        for quantity in control.quantities
-    }
+    """Return the settings of the controller by path, in the order of its parameters."""
+    return {f"controller.{quantity.name}": quantity for quantity in law_of(configuration).quantities}
 
 
 def links_of_walk(configuration: Scenario) -> Graph:

@@ -10,9 +10,7 @@ from ppafo.control.walking import assistance
 from ppafo.control.walking.assistance import Assistance, TorqueProfile, profile_torque
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import DebouncedSensor, PhaseState
-from ppafo.control.walking.timing import threshold_time
 from ppafo.engine.rows import rebuilt
-from ppafo.model.declaration import EmptyRow
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
@@ -33,7 +31,7 @@ FOLLOWING = [
 
 
 def wanted(phase: PhaseState, angle: float, rate: float, rules: Assistance = RULES) -> float:
-    return assistance.requested_torque(rules, phase, threshold_time(EmptyRow(), EmptyRow(), phase), angle, rate)
+    return assistance.requested_torque(rules, phase, angle, rate)
 
 
 def at(phase: float, share: float) -> PhaseState:
@@ -87,11 +85,10 @@ def test_landing_and_swing_are_one_task_and_the_others_are_not() -> None:
 def test_the_rate_of_the_angle_is_filtered_and_has_no_kick_at_the_start() -> None:
     kind = WALKING_CONTROLLERS["event_pid"]
     parameters, state = default_parameters("event_pid"), kind.initial
-    timing = kind.update.__kwdefaults__["parts"].timing
-    first = assistance.assess(parameters, state, seen(1.6, 0.0, 0.0, 0.0), PERIOD, parts=timing)
+    first = assistance.assess(parameters, state, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
     assert first.request.rate == 0.0
     _, state = kind.update(parameters, state, 0.0, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
-    second = assistance.assess(parameters, state, seen(1.601, 0.0, 0.0, 0.0), PERIOD, parts=timing)
+    second = assistance.assess(parameters, state, seen(1.601, 0.0, 0.0, 0.0), PERIOD)
     filter_time = parameters.assistance.rate_filter
     assert second.request.rate == pytest.approx(0.001 / (PERIOD + filter_time))
 
