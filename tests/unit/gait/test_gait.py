@@ -109,18 +109,10 @@ def turned(amplitudes: tuple[float, ...]) -> tuple[float, ...]:
 
 
 IMPLAUSIBLE = {
-    "shank": ({"shank_angle": negative}, "in mid-stance, so the shank would rotate backwards over the foot"),
     "ankle": (
         {"ankle_angle": lambda c: dataclasses.replace(negative(c), mean=math.pi - c.mean)},
         "the sign is reversed; write mean, cosine and sine with the opposite sign about 90 deg",
     ),
-    "zero of the ankle": (
-        {"ankle_angle": lambda c: dataclasses.replace(c, mean=c.mean - math.pi / 2)},
-        "correct the mean so that the angle is 90 deg with the foot perpendicular to the shank",
-    ),
-    "moment": ({"ankle_moment": negative}, "its sign is reversed; write mean, cosine and sine with the opposite sign"),
-    "unit of the shank": ({"shank_angle": lambda c: c.scale(math.radians(1.0))}, "the numbers look like radians"),
-    "force in newton": ({"vertical_force": lambda c: c.scale(608.0)}, "check the body mass and the unit"),
     "moment of the other foot": (
         {"ankle_moment": lambda c: dataclasses.replace(c, cosines=turned(c.cosines), sines=turned(c.sines))},
         "peaks at 98 % of the stride, but the foot is off the ground from 64 % on; give the moment of the same foot",
@@ -128,23 +120,6 @@ IMPLAUSIBLE = {
     "knee in g": (
         {"knee_forward": lambda c: c.scale(1.0 / 9.80665), "knee_up": lambda c: c.scale(1.0 / 9.80665)},
         "are in units of g: they differ by",
-    ),
-    "knee forward": (
-        {"knee_forward": negative},
-        "knee_forward is -10.5 m/s^2 around toe-off and 7.82 m/s^2 in mid-swing, while walking has the "
-        "opposite pattern",
-    ),
-    "knee up": (
-        {"knee_up": negative},
-        "the sign is reversed, or the data are of the other knee; write mean, cosine and sine with the opposite sign",
-    ),
-    "knee with gravity": (
-        {"knee_up": lambda c: dataclasses.replace(c, mean=9.81)},
-        "knee_up has a mean of 9.81 m/s^2, but must average to 0 over a stride",
-    ),
-    "knee in another unit": (
-        {"knee_forward": lambda c: c.scale(100.0)},
-        "knee_forward has a range of 2.02e+03 m/s^2 per stride (plausible: 0.5 to 80 m/s^2); check the unit",
     ),
 }
 

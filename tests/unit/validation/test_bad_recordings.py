@@ -46,20 +46,12 @@ def written(folder: Path, *lines: str) -> Path:
     ("lines", "words"),
     [
         ([HEADER.replace("pressure_1 [psi_g]", "pressure_1 [psi]"), *ROWS], ["pressure_1 [psi]", "psi_g"]),
-        ([HEADER.replace("angle [deg]", "angle [s]"), *ROWS], ["angle [s]", "an angle is needed"]),
         ([HEADER.replace("angle [deg]", "angel [deg]"), *ROWS], ["'angel' is unknown", "did you mean 'angle'"]),
         (
             [HEADER.replace("command [-]", "valve [-]"), *ROWS],
             ["no channel 'command'", "available: valve, angle", 'command = { constant = "1" }'],
         ),
-        (
-            [HEADER, *ROWS[:5], ROWS[5].replace(",1,", ",nan,"), *ROWS[6:]],
-            ["line 7, column 'command [-]': 'nan' is not a finite number"],
-        ),
-        ([HEADER, *ROWS[:5], ROWS[4], *ROWS[6:]], ["line 7, column 'time': the clock stands still"]),
-        ([HEADER, *ROWS[:5], "0.0045,1,,3,4", *ROWS[6:]], ["line 7", "not a finite number"]),
         ([HEADER, ROWS[0]], ["has 1 sample;"]),
-        ([HEADER], ["no samples"]),
         ([HEADER, *ROWS[:20], *(f"9{row}" for row in ROWS[20:])], ["gap of 90 s after 0.019 s (sample 20)"]),
         ([HEADER, *(row.replace(",1,", ",12,") for row in ROWS)], ["'command' is 12 at 0 s (sample 1)"]),
         (
@@ -72,14 +64,9 @@ def written(folder: Path, *lines: str) -> Path:
     ],
     ids=[
         "psi without gauge",
-        "wrong unit",
         "misspelt channel",
         "no command",
-        "NaN",
-        "clock goes back",
-        "empty cell",
         "one sample",
-        "no sample",
         "gap",
         "command in volts",
         "constant channels",
