@@ -14,10 +14,8 @@ from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.model.sensors import Measurement
 from ppafo.processor.controller import FIXED_LAWS
 from ppafo.processor.fixed_point import (
-    COMMAND_STEPS,
     FRACTION_BITS,
     LARGEST_FRACTION,
-    SETTINGS,
     ConverterCounts,
     ConverterLimits,
     beyond_band,
@@ -25,7 +23,6 @@ from ppafo.processor.fixed_point import (
     count_of,
     fraction_of,
     gain_of,
-    limited,
     read,
     shifted,
 )
@@ -86,10 +83,6 @@ def test_a_gain_has_fifteen_bits(factor: float) -> None:
     fraction, places = gain_of(factor)
     assert fraction <= LARGEST_FRACTION
     assert fraction / 2.0**places == pytest.approx(factor, rel=2.0**-14)
-
-
-def test_limits_hold_to_both_sides() -> None:
-    assert [limited(value, 5) for value in (-9, -5, 0, 5, 9)] == [-5, -5, 0, 5, 5]
 
 
 def test_the_converter_rounds_and_stays_in_its_range() -> None:
@@ -187,8 +180,3 @@ def test_a_gain_beyond_its_number_is_told_from_one_within() -> None:
     assert largest_pid(settings, PERIOD, STEPS.torque_step) < 1.0
     assert largest_pid(settings | {"derivative_gain": 10.0}, PERIOD, STEPS.torque_step) > 1.0
     assert largest_pid(settings | {"anti_windup": 1001.0}, PERIOD, STEPS.torque_step) > 1.0
-
-
-def test_a_full_command_is_as_many_steps_as_the_pulse_has_to_each_side() -> None:
-    assert COMMAND_STEPS == 1000
-    assert [item.name for item in SETTINGS] == ["converter_bits", "converter_range"]

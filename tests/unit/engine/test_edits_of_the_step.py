@@ -16,8 +16,7 @@ from ppafo.engine.step.lane import Lane
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library import c_library
 from ppafo.model.declaration import PlainFunction
-from ppafo.model.plant import BlendedPort, PlantParameters, single_ports
-from ppafo.model.valves.vent_valve import connect_ideal
+from ppafo.model.plant import PlantParameters
 from ppafo.simulation import plan
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -89,36 +88,6 @@ def test_a_gas_with_a_parameter_and_a_group_that_is_set_and_read_does_what_it_sa
     records = [run_batch(batch_of(with_gas_of_mine(of_plant))).record for of_plant in (all_of_it, half_of_it)]
     assert np.array_equal(records[0], usual)
     assert not np.array_equal(records[1], usual)
-
-
-def unannotated(plant, shown):  # type: ignore[no-untyped-def]
-    """Ports of a valve that does not say which."""
-    return single_ports(plant, shown)
-
-
-@BACKENDS
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        ({"port": BlendedPort}, r"plant\.py:\d+: single_ports returns tuple.*, but the valve has ports BlendedPort"),
-        (
-            {"connect": unannotated},
-            r"test_edits_of_the_step\.py:\d+: unannotated\(plant, shown\) must be annotated with float and tuple\[Sing",
-        ),
-        (
-            {"shown": Mine, "connect": connect_ideal},
-            r"vent_valve\.py:\d+: connect_ideal takes a VentedOpening, but .* shows a Mine",
-        ),
-    ],
-)
-def test_a_valve_whose_function_says_another_thing_than_the_valve_is_refused(
-    changed: dict[str, Any], said: str, backend: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PPAFO_BACKEND", backend)
-    run = plan_run(load_scenario("step-response", ("run.duration=20 ms",)))
-    batch = batch_of(replace(run, program=replace(run.program, valve=replace(run.program.valve, **changed))))
-    with pytest.raises(ProgramError, match=said):
-        run_batch(batch)
 
 
 def unmade(parts: Program, lane: Lane) -> None:

@@ -2,8 +2,6 @@
 
 import ast
 import inspect
-import math
-import random
 import textwrap
 from collections.abc import Callable, Iterable
 from typing import Annotated, Any, TypeAlias, get_type_hints
@@ -58,30 +56,20 @@ def scaled(rows: Table, found: Vector, factor: float, first: int) -> None:
         found[row] = factor * total
 
 
-def library(x: Vector, y: Vector, found: Table) -> None:
-    """What the C library computes."""
-    for place in range(x.shape[0]):
-        found[0, place] = math.exp(y[place])
-        found[1, place] = math.log(x[place])
-        found[2, place] = x[place] ** y[place]
-        found[3, place] = math.exp(-2.5) * x[place]
-
-
 @pytest.mark.parametrize("is_packed", [False, True])
 def test_every_compiler_has_all_entries_of_a_module(is_packed: bool) -> None:
     rows, expected = np.arange(6.0).reshape(3, 2), np.zeros(3)
     scaled(rows, expected, 0.5, 1)
-    for name, module in modules_of(array_module([scaled, library])).items():
+    for name, module in modules_of(array_module([scaled])).items():
         found = np.zeros(3)
         call: Callable[..., None] = with_arrays(module.scaled, rows, found) if is_packed else module.scaled
         for first in (1, 2):  # what is packed once is used twice
             call(*(() if is_packed else (rows, found)), 0.5, first)
         assert found.tolist() == expected.tolist(), name
-        assert callable(module.library)
 
 
 def test_what_is_packed_is_read_and_written_where_it_lies() -> None:
-    for module in modules_of(array_module([scaled, library])).values():
+    for module in modules_of(array_module([scaled])).values():
         rows, found = np.ones((3, 2)), np.zeros(3)
         call = with_arrays(module.scaled, rows, found)
         rows[:] = 4.0
@@ -101,21 +89,9 @@ def test_what_is_packed_is_read_and_written_where_it_lies() -> None:
     ids=["other numbers", "other dimensions", "columns first", "with gaps", "read-only"],
 )
 def test_an_array_that_c_would_misread_is_refused(wrong: Any) -> None:
-    for module in modules_of(array_module([scaled, library])).values():
+    for module in modules_of(array_module([scaled])).values():
         with pytest.raises(TypeError):
             module.scaled(wrong, np.zeros(3), 1.0, 0)
         if isinstance(module.scaled, NativeEntry):
             with pytest.raises(TypeError):
                 with_arrays(module.scaled, wrong, np.zeros(3))
-
-
-def test_functions_of_the_c_library_have_one_value_by_every_compiler() -> None:
-    draw = random.Random(5)
-    x = np.array([draw.uniform(1e-3, 9.0) for _ in range(2000)])
-    y = np.array([draw.uniform(-5.0, 5.0) for _ in range(2000)])
-    expected = np.zeros((4, 2000))
-    library(x, y, expected)
-    for name, module in modules_of(array_module([scaled, library])).items():
-        found = np.zeros((4, 2000))
-        module.library(x, y, found)
-        assert found.tobytes() == expected.tobytes(), name

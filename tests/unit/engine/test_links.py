@@ -6,7 +6,6 @@ from typing import Annotated, Any, NamedTuple
 import pytest
 
 from ppafo.engine import linking
-from ppafo.engine.generator import StepText
 from ppafo.engine.linking import link_effects, link_program
 from ppafo.engine.source_text import Replacements, SourceCollector, composed_lines
 from ppafo.errors import ProgramError
@@ -195,22 +194,3 @@ def test_a_spring_in_equation_1_is_refused_with_the_place_where_friction_knows_i
     monkeypatch.setattr(linking, "net_torque", sprung)
     with pytest.raises(ProgramError, match=r"test_links\.py:\d+: net_torque subtracts 1 N m at rest, .*load_torque"):
         link_program(program, Replacements())
-
-
-def sets_more(parts: Any, lane: Any) -> None:
-    """A group that no component has."""
-    lane.more = lane.state.angle
-
-
-def asks_for_more(parts: Any, lane: Any) -> None:
-    """A later phase."""
-    lane.before = lane.more
-
-
-def test_a_group_that_nobody_hands_on_is_refused_whatever_the_loop_is() -> None:
-    step = StepText(plan_run(load_scenario("step-response")).program, SourceCollector("@inline"))
-    step.phase(sets_more)
-    with pytest.raises(
-        ProgramError, match=r"test_links\.py:\d+: 'lane\.more', set at .*test_links\.py:\d+, is local to that phase"
-    ):
-        step.phase(asks_for_more)

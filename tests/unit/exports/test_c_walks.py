@@ -1,4 +1,4 @@
-"""A walk as a library in C: from settings to the numbers of a run, and every sample of it, with the bits of Python."""
+"""A walk as a library in C: from settings to the numbers of a run, with the bits of Python."""
 
 import ctypes
 import functools
@@ -25,7 +25,7 @@ from tests.built_once import shared_library
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
-DRAWS, RUNS = 5, 1
+DRAWS = 5
 SPREAD = (0.9, 1.1)
 """Smallest and largest factor on a setting of a draw; one that is 0 stays 0, as another program would be needed."""
 Values = dict[str, float]

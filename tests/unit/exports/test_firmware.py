@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-import ppafo.cli
 from ppafo.errors import ProgramError, ScenarioError, SimulationError
 from ppafo.processor.controller import FIXED_LAWS, PythonProcessor, fixed_point_controller
 from ppafo.processor.firmware import firmware
@@ -157,17 +156,6 @@ def test_numbers_stand_in_a_header_with_range_and_origin() -> None:
     assert "proportional_gain 0.095 1/(N m) (controller.proportional_gain)" in header
     assert "#define CONTROLLER_TICKS 8u" in header
     assert '#error "CONTROLLER_PROPORTIONAL is beyond its range"' in header
-
-
-def test_gains_that_nobody_gives_are_the_devices_in_firmware_too(tmp_path: Path) -> None:
-    plain = tmp_path / "plain.toml"
-    plain.write_text((Path(ppafo.cli.__file__).parent / "templates" / "scenario.toml").read_text(encoding="utf-8"))
-    texts = ("controller.kind=pid_fixed_point", "valve.delay=20 ms", "actuator.torque_constant=9 cm^3")
-    shipped, own = (load_scenario(str(plain), texts[:count]) for count in (2, 3))
-    gain = own.controller.proportional_gain
-    assert gain != pytest.approx(shipped.controller.proportional_gain, rel=0.1)
-    header = firmware(own)["parameters.h"].decode()
-    assert f"proportional_gain {gain:.9g} 1/(N m) (controller.proportional_gain)" in header
 
 
 @pytest.mark.parametrize(
