@@ -1,13 +1,11 @@
 """Results state the values that overrides changed: in the text, on the page and in JSON."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 import ppafo
-from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.report.finding import REPORT, Finding, files_of
 
 TASK, STUDY = "torque-task-proportional", "torque-task-uncertainty"
@@ -40,19 +38,3 @@ def test_an_answer_about_values_as_they_are_states_no_change() -> None:
     finding = ppafo.compare(BOTH)
     assert "values changed" not in str(finding)
     assert "overrides" not in finding.to_dict()
-
-
-def test_a_change_of_one_configuration_names_it() -> None:
-    changes = [SHORT, "torque-task-solenoid:valve.area=9 mm^2"]
-    assert f"values changed: {SHORT}, {changes[1]}\n" in str(ppafo.compare(BOTH, overrides=changes))
-    loaded = {"slow": ppafo.load_scenario(TASK, [SHORT, "reference.ramp_time=0.5 s"]), "fast": TASK}
-    compared = ppafo.compare(loaded, overrides=["reference.level=3 N m"])
-    words = f"slow:{SHORT}, slow:reference.ramp_time=0.5 s, reference.level=3 N m"
-    assert f"values changed: {words}\n" in str(compared)
-
-
-def test_results_of_a_study_state_its_changes_when_they_are_read_again(tmp_path: Path) -> None:
-    study = ppafo.load_study(STUDY, [SHORT, "solenoid:sensors.delay=3 ms"], draws=2)
-    ppafo.sweep(study, out=tmp_path / "study")
-    read = str(load_study_results(tmp_path / "study"))
-    assert f"values changed: {SHORT}, solenoid:sensors.delay=3 ms\n" in read

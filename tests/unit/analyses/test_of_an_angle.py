@@ -1,6 +1,5 @@
 """Find, compare, sweep, tune and linear models take a loop of an angle or a pressure as they take one of a torque."""
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -26,17 +25,6 @@ def test_the_lowest_supply_that_holds_an_angle_or_a_pressure(
     assert "torque error" not in str(outcome)
 
 
-def test_servos_are_compared_by_the_error_of_their_angle() -> None:
-    stiffness = ppafo.load_scenario(SERVO).controller.settings["angle_stiffness"]
-    servos = {
-        name: ppafo.load_scenario(SERVO, {"controller.angle_stiffness": factor * stiffness, "run.duration": 0.5})
-        for name, factor in (("soft", 0.5), ("as it is", 1.0))
-    }
-    text = str(ppafo.compare(servos))
-    assert "RMS angle error (deg)" in text
-    assert "RMS error" not in text
-
-
 def test_a_stiffness_is_tuned_for_the_error_of_an_angle() -> None:
     tuning: dict[str, Any] = {
         "schema_version": 1,
@@ -51,20 +39,6 @@ def test_a_stiffness_is_tuned_for_the_error_of_an_angle() -> None:
     before, after = (case.result.metrics["rms_angle_error"].value for case in (tuned.before, tuned.after))
     assert after <= before
     assert tuned.after.result.tracking is None
-
-
-def test_a_study_has_the_error_of_an_angle_in_its_rows(tmp_path: Path) -> None:
-    study: dict[str, Any] = {
-        "schema_version": 1,
-        "name": "servos",
-        "configurations": [{"name": "servo", "scenario": SERVO, "overrides": SHORT}],
-        "vary": [{"path": "supply.pressure", "kind": "uniform", "minimum": "4 bar_g", "maximum": "6 bar_g"}],
-        "sample": {"method": "random", "runs": 4},
-        "outputs": {"metrics": ["rms_angle_error"], "bands": ["reference_angle"], "every": "50 ms"},
-    }
-    results = ppafo.sweep(study, out=tmp_path / "servos")
-    assert "rms_angle_error" in str(results)
-    assert len(results.plot().axes) >= 2
 
 
 @pytest.mark.parametrize("scenario", [SERVO, "pressure-loop"])

@@ -55,14 +55,6 @@ def test_no_claim_rests_on_a_synthetic_measurement(reproduction: Reproduction) -
     assert resting == []
 
 
-def test_what_the_rig_records_is_marked_synthetic(reproduction: Reproduction) -> None:
-    evidence = reproduction.synthetic
-    assert isinstance(evidence, SyntheticEvidence)
-    recordings = (evidence.solenoid, evidence.proportional, evidence.step)
-    assert {recording.kind for recording in recordings} == {"synthetic"}
-    assert {evidence.torque.kind, evidence.decay.kind} == {"synthetic"}
-
-
 @pytest.fixture(scope="module")
 def changed() -> Reproduction:
     """The experiments with other values of task, device, valve, controller and gas than the paper's."""

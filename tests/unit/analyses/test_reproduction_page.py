@@ -14,7 +14,6 @@ from ppafo.analyses.reproduce.page import (
 )
 from ppafo.analyses.reproduce.result import Reproduction, holding_torque
 from ppafo.analyses.reproduce.step_response import SupplyLevels
-from ppafo.page.html import bundled, digest
 from ppafo.report.style import drawn_at
 from ppafo.report.writing import typeset
 from tests.unit.report.test_width_of_figures import texts_of
@@ -91,9 +90,3 @@ def test_the_page_holds_its_three_figures_and_fetches_nothing(page: str) -> None
     outside = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL).replace("http-equiv", "")
     assert "http" not in outside
     assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []
-
-
-def test_the_only_script_of_the_page_is_the_one_that_its_policy_names(page: str) -> None:
-    assert page.count("<script>") == 1
-    assert digest(bundled("loader.js")) in page.split("</head>", maxsplit=1)[0]
-    assert 'id="workbench"' in page

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.draws import choose_configuration, drawn_in, study_of, uncertainty_in, uncertainty_of
 from ppafo.studies.intervals import effective_sample_size, fraction_interval, replicates_interval
@@ -153,15 +152,3 @@ def test_what_is_drawn_in_a_configuration_has_the_noise_and_can_leave_correlatio
     assert (study.name, base.name) == ("torque-task-uncertainty", "proportional")
     assert uncertainty.scores is not None
     assert drawn_in(study, (), "proportional", independent=True)[2].scores is None
-
-
-def test_gains_that_follow_a_varied_value_are_named_with_the_nominal_ones_and_given_ones_are_not() -> None:
-    scenario = load_scenario("torque-task-proportional", ["controller.kind=sliding_mode"])
-    remark = remark_on_following_gains(scenario, ["valve.area"])
-    assert "surface_slope, boundary_layer are recomputed from the varied values" in remark
-    assert "overrides=['controller.surface_slope=83.3333333 1/s'" in remark
-    assert remark_on_following_gains(scenario, ["sensors.seed"]) == ""
-    # What a controller knows of its valve follows as well.
-    known = load_scenario("torque-task-proportional", ["controller.kind=pid", "valve.dead_band=0.02"])
-    assert "dead_band is recomputed" in remark_on_following_gains(known, ["valve.dead_band"])
-    assert remark_on_following_gains(load_scenario("torque-task-proportional"), ["valve.area"]) == ""

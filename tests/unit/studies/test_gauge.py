@@ -12,9 +12,7 @@ import ppafo
 from ppafo.analyses.find import solve as find_module
 from ppafo.errors import StudyError
 from ppafo.simulation.ensemble.columns import check_columns
-from ppafo.simulation.loading import load_scenario
 from ppafo.studies.draws import uncertainty_of
-from ppafo.studies.limits import atmosphere_of, level_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.study import Study
 from ppafo.study.blocks import drawn_values, varied_columns
@@ -120,19 +118,6 @@ HIGH_UP = (f"{ATMOSPHERE}=80 kPa_a", "supply.pressure=400 kPa_a")
 REFUSED = rf"50 kPa_g'.*: must not be a gauge pressure, because {ATMOSPHERE} varies; give an absolute pressure"
 
 
-def high_study(path: str, minimum: str, maximum: str) -> dict[str, Any]:
-    """A study high above the sea in which one path is drawn."""
-    overrides = [text for text in HIGH_UP if not text.startswith(path)]
-    return {
-        "schema_version": 1,
-        "name": "high-up",
-        "configurations": [{"name": "high-up", "scenario": TASK, "overrides": overrides}],
-        "sample": {"method": "random", "runs": 8, "seed": 1},
-        "vary": [{"path": path, "kind": "uniform", "minimum": minimum, "maximum": maximum}],
-        "outputs": {"metrics": [METRIC]},
-    }
-
-
 def tuning(path: str, minimum: str, maximum: str) -> dict[str, Any]:
     """A tuning high above the sea that searches one path under a limit on the pressure."""
     return {
@@ -144,17 +129,6 @@ def tuning(path: str, minimum: str, maximum: str) -> dict[str, Any]:
         "objective": [{"metric": "rms_error"}],
         "constraints": [{"metric": METRIC, "at_most": "50 kPa_g"}],
     }
-
-
-def test_a_level_counts_from_the_atmosphere_that_it_is_given_and_an_absolute_one_from_none() -> None:
-    assert level_of("50 kPa_g", METRIC, "limit", 80.0e3) == pytest.approx(130.0e3)
-    assert level_of("130 kPa_a", METRIC, "limit", None) == pytest.approx(130.0e3)
-    assert level_of("3 N m", "rms_error", "limit", None) == 3.0
-    scenario = load_scenario(TASK, HIGH_UP)
-    assert atmosphere_of(scenario, ["supply.pressure"]) == pytest.approx(80.0e3)
-    assert atmosphere_of(scenario, [ATMOSPHERE]) is None
-    with pytest.raises(StudyError, match=f"'{REFUSED}"):
-        level_of("50 kPa_g", METRIC, "'50 kPa_g'", None)
 
 
 def test_a_condition_of_find_counts_from_the_atmosphere_of_the_scenario(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,6 @@ import pytest
 
 import ppafo
 from ppafo.analyses.compare.question import compare
-from ppafo.errors import StudyError
 from ppafo.studies.draws import uncertainty_of
 from ppafo.studies.intervals import noise_interval
 from ppafo.studies.loading import load_study
@@ -82,26 +81,6 @@ def test_a_seed_varies_as_whole_numbers() -> None:
     assert set(values) == {3.0, 4.0, 5.0}
     document["vary"][-1] = {"path": NOISE, "kind": "list", "values": [1, 2]}
     assert set(drawn_values(load_study(document), np.arange(128))[NOISE]) == {1.0, 2.0}
-
-
-@pytest.mark.parametrize(
-    ("item", "text"),
-    [
-        (
-            {"path": NOISE, "kind": "uniform", "minimum": 1, "maximum": 9},
-            "does not give whole numbers, which 'sensors.seed' needs",
-        ),
-        ({"path": NOISE, "kind": "list", "values": [1, 2.5]}, "2.5 must be a whole number"),
-        ({"path": NOISE, "kind": "grid", "first": 1, "last": 4, "count": 3}, "2.5 must be a whole number"),
-        ({"path": NOISE, "kind": "whole_numbers", "minimum": 9, "maximum": 3}, "must be less than maximum"),
-        ({"path": "valve.area", "kind": "whole_numbers"}, "is only for sensors.seed and wearer.person"),
-    ],
-)
-def test_a_seed_that_is_no_whole_number_is_one_line(item: dict[str, Any], text: str) -> None:
-    with pytest.raises(StudyError) as caught:
-        load_study(changed(configurations=DOCUMENT["configurations"][:1], vary=[item]))
-    assert text in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_the_share_of_noise_is_the_planted_one_and_its_interval_holds() -> None:

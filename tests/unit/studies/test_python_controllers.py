@@ -1,7 +1,6 @@
 """Python objects as controllers where many runs are made: slow, one after the other, and with the same numbers."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -81,30 +80,6 @@ def test_it_is_compared_over_an_uncertain_device_with_progress_and_overrides() -
     assert {case.scenario.reference.level for case in task.cases} == {2.0}
     with pytest.raises(StudyError, match=r"gain=1': scenario '.*' has a Python controller"):
         ppafo.compare(pair, overrides=["controller.proportional_gain=1"])
-
-
-def test_it_is_swept_chunk_by_chunk(tmp_path: Path) -> None:
-    vary = {"path": "supply.pressure", "kind": "uniform", "minimum": "40 psi_g", "maximum": "50 psi_g"}
-    study = ppafo.load_study(
-        {
-            "schema_version": 1,
-            "name": "mine",
-            "configurations": [{"name": "mine", "scenario": TASK, "overrides": list(SHORT)}],
-            "sample": {"method": "random", "runs": 70, "seed": 1},
-            "vary": [vary],
-            "outputs": {"metrics": ["rms_error"]},
-        }
-    )
-    (configuration,) = study.configurations
-    own = replace(configuration, scenario=configuration.scenario.controlled_by(Integral()))
-    heard: list[Progress] = []
-    results = ppafo.sweep(replace(study, configurations=(own,)), out=tmp_path / "out", progress=heard.append).found
-    assert heard[-1].done == 70
-    assert results.document["chunks"] == 2
-    table = results.table()
-    pressure, error = float(table["supply.pressure"][69]), float(table["rms_error"][69])
-    alone = ppafo.load_scenario(TASK, (*SHORT, f"supply.pressure={pressure!r} Pa_a")).controlled_by(Integral())
-    assert error == pytest.approx(ppafo.simulate(alone).metrics["rms_error"].value, rel=1e-9)
 
 
 def test_the_device_around_it_is_tuned_and_gains_that_it_does_not_declare_are_refused_in_a_line() -> None:

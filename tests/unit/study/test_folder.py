@@ -1,7 +1,6 @@
 """The folder of a study's results."""
 
 import os
-import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -40,18 +39,3 @@ def test_what_another_process_may_be_writing_stays_and_what_is_left_from_days_ag
     folder.tidy()
     assert list(tmp_path.iterdir()) == [now_written]
     assert folder.names() == frozenset()
-
-
-def test_a_disk_says_how_much_is_free(tmp_path: Path) -> None:
-    free = study_folder(tmp_path / "not" / "yet").free_bytes()
-    assert free > 0
-
-
-def test_a_small_document_takes_little_memory(folder: StudyFolder) -> None:
-    folder.write("one.json", b'{"runs": 3}')
-    tracemalloc.start()
-    document = folder.read_document("one.json")
-    _, most = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert document == {"runs": 3}
-    assert most < 10_000_000

@@ -11,8 +11,7 @@ from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
-from ppafo.study.blocks import runs_at_once
-from ppafo.study.runs import FAILED, Rows, RunCounter, Runs, excess, scenario_runs, settled, with_companions
+from ppafo.study.runs import FAILED, RunCounter, Runs, excess, scenario_runs, settled, with_companions
 from tests.model_runs import model_runs
 
 SHORT = ("run.duration=0.2 s",)
@@ -71,21 +70,6 @@ def test_a_study_that_resumes_counts_on_from_what_is_there() -> None:
     assert [(item.done, item.failed, item.earlier) for item in seen] == [(70, 3, 70), (100, 3, 70)]
 
 
-def test_runs_are_counted_while_their_part_is_under_way_at_most_every_second(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen: list[Progress] = []
-    now: list[float] = [100.0]
-    monkeypatch.setattr("ppafo.study.runs.time.monotonic", lambda: now[0])
-    tally = RunCounter(100, seen.append)
-    tally.add(0, 0)
-    for _ in range(6):
-        now[0] += 0.4
-        tally.count_ended(10)
-    # The first 50 of them are a part; 10 of the next have ended.
-    tally.add(50, 0)
-    assert [(item.done, round(item.elapsed, 6)) for item in seen] == [(0, 0.0), (30, 0.0), (60, 1.2), (60, 1.2)]
-    assert seen[-1].earlier == 30, "the first count may have waited for a compiler"
-
-
 def test_every_run_of_an_ensemble_is_counted_once_with_one_thread_and_with_several() -> None:
     base = load_scenario("torque-task-proportional", SHORT)
     columns = {"valve.area": np.linspace(10e-6, 12e-6, 100)}
@@ -112,34 +96,6 @@ def test_the_table_has_all_rows_with_the_values_that_made_them() -> None:
     assert (runs.count, runs.failures, runs.reason) == (3, 1, "diverged")
 
 
-def test_the_first_count_comes_before_the_first_run_and_slow_runs_are_counted_in_fewer_at_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    now: list[float] = [0.0]
-    sizes: list[int] = []
-    seen: list[Progress] = []
-
-    def slow(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
-        assert seen, "a count is there before anything is computed"
-        sizes.append(columns["x"].size)
-        now[0] += 0.01 * columns["x"].size
-        return {"y": columns["x"], FAILED: np.zeros(columns["x"].size, dtype=np.bool_)}, ""
-
-    monkeypatch.setattr("ppafo.study.runs.time.monotonic", lambda: now[0])
-    rows = Runs(slow, ["y"], RunCounter(2000, seen.append), 16_384).run({"x": np.arange(2000.0)})
-    assert rows["y"].tolist() == np.arange(2000.0).tolist()
-    assert (seen[0].done, sizes[0]) == (0, 1024)
-    assert max(sizes[1:]) == 300, "3 s at 10 ms each"
-
-
-def test_progress_grows_where_there_are_more_runs_than_were_thought() -> None:
-    seen: list[Progress] = []
-    tally = RunCounter(100, seen.append)
-    for runs in (100, 100, 200):
-        tally.add(runs, 1)
-    assert [(item.total, item.done, item.failed) for item in seen] == [(100, 100, 1), (200, 200, 2), (400, 400, 3)]
-
-
 def test_only_a_loop_that_swings_in_the_settled_part_has_its_last_error_replaced() -> None:
     rows = {
         "final_error": np.array([0.1, 0.1, 0.5]),
@@ -148,10 +104,3 @@ def test_only_a_loop_that_swings_in_the_settled_part_has_its_last_error_replaced
     }
     assert settled(rows, "final_error").tolist() == [0.4, 0.1, 0.5]
     assert settled(rows, "settled_error") is rows["settled_error"]
-
-
-def test_runs_of_an_hour_are_reported_long_before_many_thousands_are_made() -> None:
-    short, hour = (load_scenario("torque-task-solenoid", [f"run.duration={text}"]) for text in ("0.1 s", "1 h"))
-    assert runs_at_once(short, 65_536) == 65_536
-    assert runs_at_once(hour, 65_536) == 512
-    assert runs_at_once(hour, 100) == 100

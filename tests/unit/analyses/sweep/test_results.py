@@ -1,15 +1,13 @@
 """Results of a study: statistics of what is too large for the memory, tables and columns, bands, the figure."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.analyses.sweep.results import StudyResults
 from ppafo.analyses.sweep.solve import describe, sorted_quantiles, sweep
-from ppafo.errors import DataError, PpafoError, StudyError, UnitError
+from ppafo.errors import PpafoError, UnitError
 
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.777, 0.95, 1.0)
 RANDOM = np.random.default_rng(6)
@@ -42,12 +40,6 @@ def test_nothing_has_a_count_only() -> None:
     assert describe([], SHARES) == {"count": 0}
 
 
-def test_statistics_have_the_same_bits_for_any_division_into_parts() -> None:
-    values = RANDOM.normal(1.0, 0.1, 100_003)
-    whole, *divided = (describe(np.array_split(values, number), SHARES) for number in (1, 2, 7, 1_000))
-    assert divided == [whole] * 3
-
-
 def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: StudyResults) -> None:
     whole = small_results.by_configuration("rms_error")
     for most, step in ((1000, 1), (11, 3), (7, 5)):
@@ -67,25 +59,6 @@ def test_rows_are_a_data_frame_in_si_or_in_units(small_results: StudyResults) ->
         small_results.to_dataframe({"rms_error": "psi_g"})
     with pytest.raises(PpafoError, match="rms_eror"):
         small_results.to_dataframe({"rms_eror": "N m"})
-
-
-def test_results_load_again_from_their_folder(small_results: StudyResults) -> None:
-    again = load_study_results(small_results.folder.path).found
-    assert again.summary == small_results.summary
-    assert again.name == "small"
-    assert again.configurations == ("proportional", "solenoid")
-    assert again.varied == ("reference.level", "supply.pressure", "actuator.leak.area")
-    assert "32 runs: 32 completed, 0 diverged, 0 refused" in repr(again)
-
-
-def test_a_channel_that_was_not_kept_is_named_with_the_nearest(small_results: StudyResults) -> None:
-    with pytest.raises(StudyError, match=r"the study stores no trajectories of 'torqe', did you mean 'torque'\?"):
-        small_results.trajectories("torqe")
-
-
-def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="contains no study results"):
-        load_study_results(tmp_path)
 
 
 BAND_SHARES = (0.0, 0.05, 0.25, 0.5, 0.9, 1.0)
@@ -122,9 +95,6 @@ def study(*vary: dict[str, Any], names: tuple[str, ...] = ("proportional",), **o
     if DRAWN in vary:
         found["sample"] = {"method": "random", "runs": 12}
     return found
-
-
-BOTH = ("proportional", "solenoid")
 
 
 def test_a_map_shows_the_mean_over_the_draws_where_it_belongs() -> None:

@@ -155,22 +155,6 @@ def stopped_after(chunks: int) -> Callable[[Progress], None]:
     return watch
 
 
-def test_runs_are_counted_within_a_chunk_and_the_stored_bytes_stay(
-    small_results: StudyResults, small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # As if every block of runs took a second: a chunk of a large study has thousands.
-    monkeypatch.setattr("ppafo.study.runs._BETWEEN_COUNTS", 0.0)
-    told: list[Progress] = []
-    sweep(small, out=tmp_path / "out", threads=1, progress=told.append)
-    done = [progress.done for progress in told]
-    chunks = len(list((tmp_path / "out" / "finished").iterdir()))
-    assert done == sorted(done)
-    assert done[-1] == 32
-    assert len(set(done) - {0}) == chunks
-    assert len(done) >= 2 * chunks, "each chunk once as its runs end, and once as it is written"
-    assert contents(tmp_path / "out") == contents(small_results.folder.path)
-
-
 @pytest.mark.parametrize("chunks", [1, 4, 8])
 def test_a_stopped_study_goes_on_to_the_same_bytes(
     small_results: StudyResults, small: Any, tmp_path: Path, chunks: int
@@ -292,13 +276,6 @@ def test_a_study_whose_draws_were_changed_in_python_is_refused(small_results: St
     other = dataclasses.replace(study, sample=dataclasses.replace(study.sample, seed=study.sample.seed + 1))
     with pytest.raises(StudyError, match=r"drawn\.sample\.seed was 3 and is now 4"):
         sweep(other, out=small_results.folder.path)
-
-
-def test_a_foreign_or_newer_manifest_is_refused(small: Any, tmp_path: Path) -> None:
-    for text, expected in (("{}", "does not describe a study; choose the folder of a study"), ("{", "cannot be read")):
-        (tmp_path / "study.json").write_text(text, encoding="utf-8")
-        with pytest.raises(DataError, match=expected):
-            sweep(small, out=tmp_path)
 
 
 def test_more_disk_than_there_is_is_refused_before_anything_is_written(

@@ -72,13 +72,6 @@ def test_a_study_is_run_printed_and_written(study: Path, tmp_path: Path, capsys:
     (out / "figure.svg").unlink()
     assert main(["export", "figure", str(out)]) == 0
     assert (out / "figure.svg").read_bytes() == drawn
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert "A few runs." in page
-    assert "The numbers are in summary.json" in page
-    assert str(out) not in page + (out / "summary.txt").read_text(encoding="utf-8")
-    assert "reference.level" in page
-    assert "a usual rate for a proportional valve" in page
-    assert "<script" not in page
 
 
 def test_json_has_the_summary(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -87,21 +80,6 @@ def test_json_has_the_summary(study: Path, tmp_path: Path, capsys: pytest.Captur
     assert document["completed"] == 3
     assert document["configurations"]["base"]["rms_error"]["count"] == 3
     assert document["folder"] == str(tmp_path / "out")
-
-
-def test_failed_runs_are_told_and_only_all_of_them_are_a_failure(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    text = study.read_text(encoding="utf-8")
-    vary = '[[vary]]\npath = "actuator.angle_min"\nkind = "list"\nvalues = ["20 deg", "140 deg"]\n[outputs]'
-    study.write_text(text.replace("[outputs]", vary), encoding="utf-8")
-    assert swept(study, tmp_path / "some") == 0
-    said = capsys.readouterr()
-    assert "12 runs: 6 completed, 6 refused" in said.out
-    assert "\n6 of 12 runs failed and have no metrics; the first is run 6: " in said.out
-    study.write_text(study.read_text(encoding="utf-8").replace('"20 deg", ', ""), encoding="utf-8")
-    assert swept(study, tmp_path / "none") == 1
-    assert "6 runs: 6 refused" in capsys.readouterr().out
 
 
 def test_an_interruption_says_that_the_command_goes_on(

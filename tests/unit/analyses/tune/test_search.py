@@ -97,19 +97,6 @@ def test_two_minima_that_are_as_good_are_told_apart() -> None:
     assert agreement(starts) == pytest.approx(0.8, abs=0.02)
 
 
-def test_every_generation_is_asked_at_once() -> None:
-    asked: list[int] = []
-
-    def costs(shares: Floats) -> Floats:
-        asked.append(len(shares))
-        return np.asarray(np.sum(shares, axis=1))
-
-    search(costs, [0.5, 0.5], SearchEffort(starts=1, generations=4, candidates_per_gain=10, seed=1))
-    generations = [count for count in asked if count > 1]
-    assert set(generations) == {20}
-    assert len(generations) <= 5
-
-
 def test_a_flat_valley_that_is_not_along_an_axis_is_followed_to_its_end() -> None:
     """A few generations of Rosenbrock's valley end a hundredth above the least cost, which is 1."""
 

@@ -2,7 +2,6 @@
 
 import copy
 import re
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,16 +10,11 @@ import jsonschema
 import pytest
 
 import ppafo
-from ppafo.analyses.tune import solve
-from ppafo.analyses.tune.answer import verdict
 from ppafo.analyses.tune.problem import json_schema, list_tunings, load_tuning
 from ppafo.analyses.tune.question import tune
 from ppafo.analyses.tune.result import Tuned
 from ppafo.errors import StudyError
-from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.simulate import simulate_many
 from ppafo.simulation.tracking.settled import settled_task
-from ppafo.studies.varying import value_at
 
 DOCUMENT: dict[str, Any] = {
     "schema_version": 1,
@@ -59,16 +53,7 @@ def test_gains_are_found_that_are_better_and_can_be_pasted() -> None:
     assert tuning.before.result.metrics["rms_error"].value == pytest.approx(tuning.before.values["rms_error"], rel=1e-9)
     assert tuning.bounds_reached["controller.proportional_gain"] == "maximum"  # no delay: any gain is taken
     assert tune(DOCUMENT).found.lines == tuning.lines
-    figure = finding.plot("search", width="84 mm")
-    figure.canvas.draw()
-    costs, places = figure.axes
-    legend = costs.get_legend()
-    assert legend is not None
-    assert legend.get_window_extent().x1 <= figure.bbox.x1
-    # Four steps from 0 to 10 would be of 2.5 generations.
-    costs.locator_params(axis="x", nbins=4)
-    assert all(tick == round(tick) for tick in costs.xaxis.get_major_locator().tick_values(0.0, 10.0))
-    assert [label.get_text() for label in places.get_yticklabels()] == ["Proportional gain", "Integral gain"]
+    assert len(finding.plot("search").axes) == 2
 
 
 def test_a_constraint_is_kept_or_said_to_be_out_of_reach() -> None:
@@ -124,42 +109,6 @@ def test_a_goal_above_the_ceiling_of_some_draws_is_missed_and_the_ceiling_is_nam
     assert CEILING not in always.verdict
 
 
-def test_gains_that_follow_in_most_draws_are_said_to_miss_in_the_share_of_the_others(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(solve, "FRESH_DRAWS", 8)
-    gains = ["controller.proportional_gain=0.1 1/(N m)", "controller.integral_gain=0.2 1/(N m s)"]
-    document = changed(
-        overrides=["reference.level=4 N m", "run.duration=2 s", "reference.ramp_time=0.5 s"],
-        robust={"study": "torque-task-uncertainty", "draws": 16},
-        effort={"starts": 1, "generations": 1, "candidates_per_gain": 4},
-    )
-    problem = load_tuning(document, gains)
-    assert problem.spread is not None
-    drawn = problem.spread.uncertainty.random_columns(0, 24, problem.spread.seed)
-    draws = [{path: float(column[row]) for path, column in drawn.items()} for row in range(24)]
-    runs = simulate_many([with_numbers(problem.scenario, draw) for draw in draws])
-    missed = sum(run.tracking is not None and run.tracking.is_useless for run in runs)
-    assert missed == 1
-    finding = tune(problem)
-    before, after = finding.found.before, finding.found.after
-    assert (before.share_off, after.share_off) == (missed / 24, 0.0)
-    assert "with the previous gains it did not in 4.2 % of the draws" in finding.found.verdict
-    assert finding.to_dict()["before"]["share_off"] == before.share_off
-    assert f"values changed: {gains[0]}, {gains[1]}" in str(finding)
-    beyond = replace(after, off=0.3, share_off=0.25)
-    assert verdict(problem, before, beyond).endswith("tracking limits are exceeded by 30 % in 25 % of the draws")
-
-
-def test_what_only_the_draws_of_the_search_keep_is_not_kept() -> None:
-    found = held_by("3.5 N m", 0.9)
-    lucky = replace(found.after, violation=0.0, fresh_violation=0.02)
-    assert lucky.is_feasible_in_search
-    assert not lucky.is_feasible
-    said = verdict(found.problem, found.before, lucky)
-    assert "over the draws of the search, but not over 1,024 fresh draws" in said
-
-
 def test_noise_is_drawn_for_every_candidate_alike_and_judged_on_fresh_draws() -> None:
     overrides = [*DOCUMENT["overrides"], "sensors.pressure_noise=3 kPa_d"]
     quick = {"starts": 1, "generations": 1, "candidates_per_gain": 4}
@@ -187,30 +136,15 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"search": []}, "search"),
-        ({"objective": []}, "objective"),
         ({"surch": []}, "unknown key 'surch', did you mean 'search'"),
-        ({"scenario": "torque-task-proportionel"}, "did you mean 'torque-task-proportional'"),
         ({"search": [DOCUMENT["search"][0]] * 2}, "'controller.proportional_gain' appears in two [[search]] tables"),
-        ({"search": [DOCUMENT["search"][0] | {"path": "controller.proportional"}]}, "did you mean"),
         ({"search": [DOCUMENT["search"][0] | {"minimum": "2 1/(N m)"}]}, "must be less than maximum"),
-        ({"search": [DOCUMENT["search"][0] | {"minimum": "2 kg"}]}, "search 'controller.proportional_gain'"),
         ({"search": [DOCUMENT["search"][0] | {"minimum": "0 1/(N m)", "spacing": "logarithmic"}]}, "a minimum above 0"),
         ({"search": [DOCUMENT["search"][0] | {"maximum": "1e9 1/(N m)"}]}, "at most 1000 1/(N m)"),
-        (
-            {"search": [{"path": "controller.integral_gain"}]},
-            "tuning: 'search.0.minimum' and 'search.0.maximum' are missing",
-        ),
-        ({"objective": [{"metric": "rms_eror"}]}, "no metric 'rms_eror', did you mean 'rms_error'"),
         ({"objective": [{"metric": "rms_error", "weight": 0.0}]}, "weight = 0 has no effect"),
         ({"objective": [{"metric": "rms_error", "scale": "2 g"}]}, "objective 'rms_error': scale = '2 g'"),
-        ({"objective": [{"metric": "rms_error", "scale": "0 N m"}]}, "must be above 0"),
         ({"constraints": [{"metric": "rms_error"}]}, "has neither of at_most and at_least; give one of them"),
         ({"constraints": [{"metric": "rms_error", "at_most": "2 g"}]}, "constraint 'rms_error' = '2 g'"),
-        (
-            {"robust": {"study": "torque-task-uncertain"}},
-            "robust: there is no study 'torque-task-uncertain', did you mean",
-        ),
         (
             {
                 "robust": {"study": "torque-task-uncertainty"},
@@ -233,13 +167,6 @@ def test_a_goal_that_is_zero_before_needs_a_scale() -> None:
         tune(document)
 
 
-def test_an_objective_that_was_zero_has_no_percentage() -> None:
-    found = tune(DOCUMENT).found
-    before = replace(found.before, objective=0.0, off=0.0)
-    after = replace(found.after, objective=-0.5)
-    assert verdict(found.problem, before, after).endswith("objective 0 before, -0.5 after")
-
-
 def test_a_scenario_of_a_file_is_pasted_by_its_file(tmp_path: Path) -> None:
     file = tmp_path / "my ankle.toml"
     file.write_bytes((Path(ppafo.__file__).parent / "scenarios" / "torque-task-proportional.toml").read_bytes())
@@ -247,24 +174,6 @@ def test_a_scenario_of_a_file_is_pasted_by_its_file(tmp_path: Path) -> None:
     pasted = finding.files["overrides.txt"]().decode()
     assert f"ppafo.simulate({str(file)!r}, [" in pasted
     assert f"ppafo simulate '{file}' --set" in str(finding)
-
-
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        ("controller.rate", 1000.0),
-        ("controller.period", 0.001),
-        ("controller.integral_gain", 0.25),
-        ("reference.ramp_time", 1.0),
-        ("motion.angle", 1.30899693899),
-        ("valve.discharge_coefficient", 0.113),
-        ("sensors.angle_resolution", 0.0),
-        ("run.duration", 3.0),
-        ("initial.pressure_1", 101325.0),
-    ],
-)
-def test_present_values_are_found(path: str, value: float) -> None:
-    assert value_at(path, ppafo.load_scenario("torque-task-proportional")) == pytest.approx(value)
 
 
 def test_a_value_that_is_not_there_yet_is_said() -> None:

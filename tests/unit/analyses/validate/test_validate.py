@@ -60,28 +60,6 @@ def test_agreement_is_printed_and_written(bench: Path, tmp_path: Path, capsys: p
     assert recording["channels"]["angle"]["rms_share"] < 0.01
     assert len(recording["sha256"]) == 64
     assert read_csv(out / "step-replayed.csv").kind == "simulated"
-    page = (out / "report.html").read_text()
-    assert "synthetic measurement" in page
-    assert "Not everything here was measured" in page
-    assert page.count("<img") == 1
-    assert "http" not in page
-
-
-def test_the_supply_that_was_used_is_said_where_none_was_recorded(
-    bench: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    main([*SET, str(bench / "step.csv")])
-    printed = capsys.readouterr().out
-    assert "note: the supply pressure was not recorded; supply.pressure = 55 psi_g was used\n" in printed
-
-
-def test_a_fault_of_a_column_map_names_the_file_of_the_map(
-    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    columns = 'time = { column = 1, unit = "s" }\npressure_1 = { column = 3, unit = "bar" }\n'
-    (tmp_path / "rig.toml").write_text(f"[columns.a.channels]\n{columns}")
-    assert main([*SET, str(bench / "step.csv"), "--columns", f"{tmp_path / 'rig.toml'}:a"]) == 2
-    assert "rig.toml:a: channels.pressure_1.unit = 'bar': 'bar'" in capsys.readouterr().err
 
 
 def test_several_recordings_of_any_format_are_compared_at_once(
@@ -180,19 +158,6 @@ def test_bad_input_is_one_line_and_nothing_is_written(
     assert words in lines[0]
     assert printed.out == ""
     assert not (tmp_path / "out").exists()
-
-
-def test_a_recording_given_twice_is_refused_under_another_name_too(
-    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    copy = tmp_path / "copy.csv"
-    copy.write_bytes((bench / "step.csv").read_bytes())
-    for second in (copy, bench / "step.csv"):
-        assert main([*SET, str(bench / "step.csv"), str(second)]) == 2
-        said = capsys.readouterr().err
-        assert (
-            said == f"ppafo: {second}: is the same recording as {bench / 'step.csv'}; give every recording only once\n"
-        )
 
 
 def test_a_small_residual_of_which_no_cause_is_known_is_a_remark_and_a_large_one_is_not(tmp_path: Path) -> None:
