@@ -79,14 +79,6 @@ def test_without_its_guests_the_package_works(bare: Path, tmp_path: Path, argume
     assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
 
 
-def test_a_report_says_in_one_line_that_the_page_is_not_installed(bare: Path, tmp_path: Path) -> None:
-    done = called(bare, tmp_path, "simulate", "torque-task-proportional", "--set", "run.duration=0.2s", "--out", "run")
-    assert done.returncode == 0, done.stderr
-    report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
-    assert report.count("is part of ppafo.page, which is not installed.</p>") == 1
-    assert "<script" not in report
-
-
 @pytest.mark.parametrize(
     ("arguments", "room"),
     [

@@ -120,18 +120,6 @@ def test_own_earlier_result_is_replaced_whole_and_holds_nothing_else(
     assert contents(out) == before
 
 
-def test_smaller_result_leaves_nothing_of_a_larger_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = tmp_path / "out"
-    assert main(["sets", "audit", "ppafo2011", "--out", str(out)]) == 0
-    assert main(["sets", "audit", "ppafo2011-printed", "--out", str(out)]) == 1
-    assert {path.name for path in out.iterdir()} == {
-        MARK,
-        "audit-ppafo2011-printed.txt",
-        "audit-ppafo2011-printed.json",
-        "report.html",
-    }
-
-
 def test_rig_adds_an_experiment_and_replaces_nothing_of_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,7 +1,6 @@
 """Kinds of other packages: found by entry point or by module and object, refused in one line."""
 
 import logging
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,7 +12,6 @@ from ppafo import plugins
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import KindError, ScenarioError
-from ppafo.kinds import Kinds
 from ppafo.metrics import METRICS
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 
@@ -140,21 +138,3 @@ def test_profiles_and_metrics_are_found_too(install: Install) -> None:
     assert scenario_from_dict(document).reference.kind == "wave"
     assert "mine" in METRICS
     assert "nothing" not in METRICS
-
-
-def test_a_kind_of_a_room_that_is_not_installed_is_not_listed_and_says_so() -> None:
-    laws: Kinds[object] = Kinds("ppafo.laws", "law", object, {"here": "ppafo.kinds:Kind", "there": "ppafo.absent:LAW"})
-    assert list(laws) == ["here"]
-    laws.load_own()
-    with pytest.raises(KindError, match=r"law 'there' is part of ppafo\.absent, which is not installed"):
-        laws["there"]
-
-
-def test_child_processes_know_what_was_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "my_law.py").write_text(LAW.format(name="on_off", call="anything"))
-    monkeypatch.setattr(plugins, "_named", {})
-    monkeypatch.setenv(plugins.VARIABLE, "")
-    plugins.name_plugins(tmp_path / "my_law.py")
-    code = "from ppafo.control.catalog import CONTROLLERS\nprint(CONTROLLERS['my_law:KIND'].name)"
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
-    assert (done.stdout, done.stderr) == ("anything\n", "")

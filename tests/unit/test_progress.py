@@ -2,25 +2,12 @@
 
 import io
 
-import pytest
-
-from ppafo.progress import Progress, ProgressLine, time_text
+from ppafo.progress import Progress, ProgressLine
 
 
 def test_the_line_has_share_rate_time_left_and_failures() -> None:
     line = Progress(total=1_000_000, done=300_000, earlier=100_000, failed=12, elapsed=8.0).line()
     assert line == "300,000 of 1,000,000 runs (30 %), 25,000 runs/s, 28 s left, 12 failed"
-
-
-def test_before_the_first_chunk_there_is_no_rate() -> None:
-    assert Progress("", 0, 10).line() == "0 of 10 runs (0 %)"
-
-
-@pytest.mark.parametrize(
-    ("seconds", "told"), [(0.4, "0 s"), (59.4, "59 s"), (190.0, "3 min 10 s"), (19_210.0, "5 h 20 min")]
-)
-def test_times_are_told_in_the_units_that_matter(seconds: float, told: str) -> None:
-    assert time_text(seconds) == told
 
 
 class Terminal(io.StringIO):

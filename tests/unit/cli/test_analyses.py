@@ -70,25 +70,6 @@ def test_each_command_prints_one_json_document_the_same_every_time(
     assert printed[0] == printed[1]
 
 
-def test_a_comparison_says_the_change_and_how_probable_it_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["compare", "--study", STUDY, "--baseline", "solenoid", "--draws", "64", "--json"]
-    assert (
-        main([*words, "--task", "slow:reference.ramp_time=2 s, run.duration=2.5 s, reference.level=4 N m", *SHORT]) == 0
-    )
-    document = json.loads(capsys.readouterr().out)
-    task = document["tasks"][0]
-    assert (task["task"], task["overrides"]) == (
-        "slow",
-        ["reference.ramp_time=2 s", "run.duration=2.5 s", "reference.level=4 N m"],
-    )
-    assert task["pareto_front"] == ["proportional"]
-    gas = next(item for item in task["pairs"]["proportional"] if item["metric"] == "gas_supplied")
-    assert gas["change_high"] < 0.0
-    assert gas["better"]["low"] > 0.9
-
-
 def test_a_goal_that_no_gains_can_keep_is_exit_code_1_and_says_why(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

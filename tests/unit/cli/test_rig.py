@@ -10,13 +10,6 @@ from ppafo.cli.main import main
 from ppafo.storage import read_csv
 
 
-def test_the_list_names_the_presets_too(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["rig", "simulate", "--list"]) == 0
-    printed = capsys.readouterr().out
-    assert "synthetic" in printed
-    assert all(name in printed for name in ("ideal-laboratory", "paper-bench", "worn-seals"))
-
-
 def test_recordings_of_one_bench_share_a_folder_and_its_truth(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -34,14 +27,6 @@ def test_recordings_of_one_bench_share_a_folder_and_its_truth(
     assert read_csv(tmp_path / "valve-map.csv").kind == "synthetic"
 
 
-def test_the_same_command_gives_the_same_bytes(tmp_path: Path) -> None:
-    words = ["rig", "simulate", "step-response", "--preset", "worn-seals", "--seed", "3", "--out"]
-    for folder in ("one", "two"):
-        assert main([*words, str(tmp_path / folder)]) == 0
-    for name in ("step-response.csv", "rig.json"):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
-
-
 def test_the_command_that_compares_a_recording_names_its_motion_and_the_motion_is_found_without_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -54,13 +39,3 @@ def test_the_command_that_compares_a_recording_names_its_motion_and_the_motion_i
     assert main(words[:-2]) == 1
     verdict = capsys.readouterr().out.splitlines()[0]
     assert "; the vane seems to be coupled to a leg (--motion leg); " in verdict
-
-
-def test_device_and_overrides_reach_the_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["--device", "ppafo2011", "--valve", "solenoid", "--set", "valve.area=10mm^2"]
-    words += ["--set", "rig.flow_sensor.noise=0 kg/s", "--json", "--out", str(tmp_path)]
-    assert main(["rig", "simulate", "open-valve-flow", *words]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["device"]["valve"]["area"] == pytest.approx(1e-5)
-    assert document["preset"]["values"]["flow_sensor.noise"] == 0.0
-    assert document["files"] == ["open-valve-flow.csv", "rig.json"]

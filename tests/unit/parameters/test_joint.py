@@ -1,6 +1,5 @@
 """A set says what its actuator turns: the joint and its two directions, in tables, figures and reports."""
 
-import json
 from importlib import resources
 from pathlib import Path
 
@@ -11,10 +10,6 @@ from ppafo.errors import ParameterError
 from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.joint import JointNames
 from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
-from ppafo.report.stored_figure import draw_stored_result
-from ppafo.running import simulate
-from ppafo.simulation.loading import load_scenario
-from ppafo.storage import read_stored
 
 CYLINDER = (resources.files("ppafo.parameters") / "sets" / "cylinder-lever.toml").read_text(encoding="utf-8")
 ELBOW = '\n[joint]\nname = "elbow"\npositive = "flexion"\n'
@@ -50,17 +45,3 @@ def test_a_set_names_its_joint_and_the_opposite_is_known(elbow: Path) -> None:
 def test_words_that_cannot_be_are_refused(joint: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         parse_parameter_set(f"{CYLINDER}\n[joint]\n{joint}\n".encode(), "elbow.toml")
-
-
-def test_figures_and_recordings_speak_of_the_joint(elbow: Path, tmp_path: Path) -> None:
-    result = simulate(load_scenario("cylinder-servo", [f"device.set={elbow}", "run.duration=0.1 s"]))
-    titles = [axes.get_title() + axes.get_title(loc="left") + axes.get_ylabel() for axes in result.plot().axes]
-    assert any("Elbow angle" in title for title in titles)
-    assert not any("nkle" in title for title in titles)
-    assert result.dataset()["angle"].attrs["long_name"] == "elbow angle, growing in flexion"
-    folder = result.save(tmp_path / "out")
-    assert json.loads((folder / "run.json").read_text())["scenario"]["device"]["joint"]["name"] == "elbow"
-    drawn = draw_stored_result(read_stored(folder))
-    assert any(
-        "Elbow angle" in axes.get_title() + axes.get_title(loc="left") + axes.get_ylabel() for axes in drawn.axes
-    )

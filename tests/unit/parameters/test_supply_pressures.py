@@ -77,16 +77,3 @@ def test_audit_finds_an_orifice_in_two_forms_and_says_what_each_valve_passes(tmp
     assert "area, discharge_coefficient, critical_ratio, sonic_conductance" in found["forms-of-solenoid"].paragraph
     assert "open-flow-of-solenoid" not in found
     assert found["open-flow-of-proportional"].severity == "note"
-
-
-def test_audit_prints_the_flow_of_a_valve_in_the_gas_of_the_set() -> None:
-    overrides = ["valve.sonic_conductance=1 dm^3/(s bar)", "valve.critical_ratio=0.3", "gas.temperature=293.15 K"]
-    flows = {}
-    for gas in ("air", "CO2"):
-        changed = apply_overrides(load_parameter_set("ppafo2011"), [*overrides, f"gas.species={gas}"], valve="solenoid")
-        found = {finding.id: finding for finding in findings_of(changed)}["open-flow-of-solenoid"]
-        assert "counts for air" in found.paragraph
-        flows[gas] = found.sides[0].value
-    supply = psi(50.0) / 1e5
-    assert flows["air"] == pytest.approx(1.185e-3 * supply, rel=2e-3)  # C p rho_0; the air of ISO 6358 is moist
-    assert flows["CO2"] / flows["air"] == pytest.approx((44.0095 / 28.965) ** 0.5, rel=2e-3)

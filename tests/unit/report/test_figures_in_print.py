@@ -7,13 +7,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-import ppafo
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import COLOURS, DASHES
 
-COLUMN = 84.0 / 25.4
-"""Width of a column [inches]."""
 TIMES = np.linspace(0.0, 1.0, 5)
 
 
@@ -35,14 +32,6 @@ def test_lines_of_two_colours_that_are_one_grey_differ_by_their_dashes() -> None
         assert all(abs(one - other) > 0.2 or dashes != others for other, others in looks[number + 1 :])
     drawn = draw_panels([lines_of(list(COLOURS))]).axes[0].lines
     assert len({line.get_linestyle() if line.get_linestyle() == "-" else str(line._dash_pattern) for line in drawn}) > 4  # type: ignore[attr-defined]
-
-
-def test_a_line_alone_is_solid_and_a_look_of_its_own_stays() -> None:
-    (alone,) = draw_panels([lines_of(["#D55E00"])]).axes[0].lines
-    assert alone.get_linestyle() == "-"
-    assert {line.get_linestyle() for line in draw_panels([lines_of(list(COLOURS), linestyle=":")]).axes[0].lines} == {
-        ":"
-    }
 
 
 def test_no_axis_has_an_offset_or_a_power_of_ten() -> None:
@@ -91,45 +80,3 @@ def test_titles_legends_and_labels_cover_nothing(words: str, names: list[str], a
     panel = Panel(Kind("Time", "s"), Kind(words), marks, shares_x=True)
     size = (5.4 if across == 1 else 3.0, 1.8)
     assert overlaps(draw_panels([panel, replace(panel, legend="")] * 2, across, size, title="A run")) == []
-
-
-def test_the_text_of_a_figure_can_be_read_at_the_width_of_a_column() -> None:
-    result = ppafo.simulate("torque-task-proportional", overrides=["run.duration=0.4 s"])
-    figure = result.plot()
-    smallest = min(float(label.get_fontsize()) for axes in figure.axes for label in axes.get_xticklabels())
-    assert smallest * COLUMN / figure.get_figwidth() > 5.5
-    assert overlaps(figure) == []
-
-
-def test_a_logarithmic_axis_has_plain_numbers_or_powers_and_never_both() -> None:
-    small = Mark("line", TIMES, 10.0 ** (-7.0 + 5.0 * TIMES))
-    figure = draw_panels([Panel(Kind(), Kind(), [small], then=lambda axes: axes.set_yscale("log"))])
-    figure.canvas.draw()
-    texts = [label.get_text() for label in figure.axes[0].get_yticklabels()]
-    assert texts
-    assert all("10^{" in text for text in texts)
-
-
-def test_a_panel_alone_in_its_row_takes_the_whole_row_and_all_titles_have_one_size() -> None:
-    line = Mark("line", TIMES, TIMES)
-    long, short, empty = Kind("A level with a title that is a long one"), Kind("Level"), ()
-    panels = [Panel(Kind("Time"), long, [line], shares_x=True) for _ in range(2)]
-    panels += [Panel(Kind("Time"), short, [line], shares_x=True), Panel(Kind(), Kind(), empty)]
-    figure = draw_panels(panels, across=2, size=(3.0, 2.0))
-    figure.canvas.draw()
-    left, right, below, _ = figure.axes
-    assert below.get_position().width > 1.9 * left.get_position().width
-    assert left.get_xlabel() == right.get_xlabel() == below.get_xlabel() == "Time"
-    assert len({axes._left_title.get_fontsize() for axes in (left, right, below)}) == 1  # type: ignore[attr-defined]
-
-
-def test_mathematics_in_a_legend_stays_whole_where_words_are_wrapped() -> None:
-    entries = [
-        "$-\\beta\\omega/I - T_c/I + \\beta\\omega/I - T_c/I$",
-        "a name of many words that is wrapped in its panel",
-    ]
-    marks = [Mark("line", TIMES, TIMES, label=entry) for entry in entries]
-    figure = draw_panels([Panel(Kind("Time"), Kind("Level"), marks, legend="inside")], across=3)
-    shown = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert shown[0] == entries[0]
-    assert "\n" in shown[1]

@@ -47,18 +47,6 @@ def test_there_is_a_panel_for_each_quantity_that_was_recorded_and_no_other() -> 
     assert len(whole.axes) == 6
 
 
-def test_an_ankle_that_a_simulation_holds_is_in_the_title_and_no_flat_panel() -> None:
-    figure = recording_figure(recording("simulated", torque=1.0, angle=np.pi / 2.0), "task")
-    assert titles(figure) == ["Actuator torque (N m)"]
-    assert "task, ankle at 90 deg" in texts(figure)
-    assert titles(recording_figure(recording("simulated", angle=1.0))) == ["Ankle angle (deg)"]
-
-
-@pytest.mark.parametrize(("command", "words"), [(1.0, "(-1 to 1)"), (2.0, "(-1 to 1; 2 vents both chambers)")])
-def test_a_command_that_vents_is_explained_where_it_is_given(command: float, words: str) -> None:
-    assert titles(recording_figure(recording(command=command))) == [f"Valve command {words}"]
-
-
 def test_angles_are_drawn_in_degrees_and_gas_in_grams() -> None:
     figure = recording_figure(recording(angle=np.pi / 2.0, supplied_mass=4e-4))
     assert drawn(figure, 0)[0][0] == pytest.approx(90.0)
@@ -85,32 +73,9 @@ def test_the_command_axis_reaches_both_ends_unless_the_command_would_be_flat() -
     assert 0.07 < highest < 0.3
 
 
-def test_a_panel_with_two_lines_names_them() -> None:
-    figure = recording_figure(recording(pressure_1=2e5, pressure_2=1e5))
-    legend = figure.axes[0].get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["chamber 1", "chamber 2"]
-
-
 @pytest.mark.parametrize("kind", ["simulated", "synthetic"])
 def test_what_nobody_measured_says_so_in_the_corner(kind: RecordingKind) -> None:
     assert kind in texts(recording_figure(recording(kind, angle=1.0)))
-
-
-def test_a_measurement_needs_no_word_in_the_corner() -> None:
-    assert not {"measured", "simulated", "synthetic"} & set(texts(recording_figure(recording("measured", angle=1.0))))
-
-
-def test_a_remark_stands_whole_below_the_panels() -> None:
-    remark = "diverged at t = 0.5 s; " * 12
-    shown = recording_figure(recording(angle=1.0), "title", remark)
-    assert remark.split() in [text.split() for text in texts(shown)]
-    assert "title" in texts(shown)
-
-
-def test_one_sample_can_be_drawn() -> None:
-    single = Recording("task", np.array([0.0]), {"angle": Channel(np.array([1.0]), "rad")})
-    assert render_figure(recording_figure(single), ("png",))["png"].startswith(b"\x89PNG")
 
 
 def test_a_recording_with_nothing_to_draw_is_refused() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ppafo.report.writing import format_reported_quantity, quantity, sentence, typeset, with_paths_as_code
+from ppafo.report.writing import quantity, sentence, typeset, with_paths_as_code
 
 SPACE, TIMES, MINUS = "\N{NO-BREAK SPACE}", "\N{MULTIPLICATION SIGN}", "\N{MINUS SIGN}"
 APOSTROPHE, DASH = "\N{RIGHT SINGLE QUOTATION MARK}", "\N{EN DASH}"
@@ -40,40 +40,11 @@ def test_a_sentence_begins_with_a_capital_and_ends_with_a_stop() -> None:
     assert sentence("  ") == ""
 
 
-def test_a_path_or_a_symbol_at_the_beginning_stays_as_it_is() -> None:
-    assert sentence("valve.area is large") == "valve.area is large."
-    assert sentence("k_p") == "k_p."
-
-
-@pytest.mark.parametrize(
-    ("text", "title"),
-    [
-        ("knoechel does not agree with 2 recordings.", "knoechel against 2 recordings"),
-        ("co2-40oz: a cylinder of 40 oz.", "Parts"),
-        ("ppafo2011 agrees.", ""),
-        ("solenoid: 20 wearers.", "20 wearers with solenoid"),
-        ("pid-gains: objective 1 before.", "pid-gains"),
-    ],
-)
-def test_a_name_at_the_beginning_stays_as_it_is(text: str, title: str) -> None:
-    assert sentence(text, title) == text
-
-
-def test_a_word_that_is_no_name_gets_its_capital_whatever_the_title_says() -> None:
-    assert sentence("with it the run follows", "20 wearers with solenoid") == "With it the run follows."
-    assert sentence("gas use: a recording", "Endurance") == "Gas use: a recording."
-
-
 def test_a_quantity_keeps_its_digits_and_a_missing_one_is_a_dash() -> None:
     assert quantity(1.0, "N m", 3) == "1.00 N m"
     assert quantity(10.0, "-", 3) == "10"
     assert quantity(0.0, "J", 3) == "0 J"
     assert quantity(None, "g") == DASH
-
-
-def test_a_printed_number_gets_no_digits_that_were_not_printed() -> None:
-    assert format_reported_quantity(15.0, "%") == "15 %"
-    assert format_reported_quantity(0.113, "-") == "0.113"
 
 
 def test_paths_become_code_and_everything_else_is_escaped() -> None:

@@ -8,15 +8,12 @@ import pytest
 
 import ppafo
 from ppafo.analyses.stored_figures import draw_folder, names_in
-from ppafo.arguments.reading import quantity, units_given
 from ppafo.parameters.parameter_set import written_units
-from ppafo.rig.experiments import record
-from ppafo.rig.folder import write_rig_recording
 from ppafo.running import gains
 from ppafo.simulation.gains import remark_on_following_gains
 from ppafo.studies.loading import load_study
 from ppafo.studies.varying import given_in, varied_path
-from ppafo.units.shown import shown_in, shown_text, written_text
+from ppafo.units.shown import shown_in, shown_text
 from ppafo.walking import load_walk
 
 PSI = 6894.757293168361
@@ -58,21 +55,6 @@ def test_the_unit_in_which_a_number_is_given_goes_before_that_of_the_set(in_bar:
     assert "psi" not in text
 
 
-def test_numbers_of_a_scenario_say_in_which_units_its_runs_are_read(in_bar: str, tmp_path: Path) -> None:
-    text = str(ppafo.simulate(TASK, overrides=[SHORT, "reference.level=400 N cm", "initial.pressure_1=0 kPa_g"]))
-    assert re.search(r"peak_torque +[\d.]+ N cm", text)
-    assert re.search(r"largest_pressure +[\d.]+ kPa_g", text)
-    # The file of a scenario says it too; the package's own unit is no choice against a set's.
-    file = tmp_path / "task.toml"
-    shipped = resources.files("ppafo.scenarios").joinpath(f"{TASK}.toml").read_text(encoding="utf-8")
-    file.write_text(shipped.replace('level = "6 N m"', 'level = "4000 N mm"'), encoding="utf-8")
-    assert ppafo.load_scenario(file).device.shown["N m"] == "N mm"
-    assert ppafo.load_scenario(TASK, overrides=[f"device.set={in_bar}"]).device.shown["N m"] == "N cm"
-    assert ppafo.load_scenario(TASK, overrides=[f"device.set={in_bar}", "reference.level=4 N m"]).device.shown[
-        "N m"
-    ] == ("N m")
-
-
 def test_the_unit_of_a_controller_setting_or_a_sensor_is_of_that_number_alone(tmp_path: Path) -> None:
     # 0.5 deg is pi / 360 rad; the least noise that a person would set is in any unit.
     words = ["controller.tolerance=0.00872665 rad", "sensors.angle_noise=0.0001 rad", "sensors.pressure_noise=1 kPa_d"]
@@ -107,26 +89,6 @@ def test_the_unit_of_a_controller_setting_or_a_sensor_is_of_that_number_alone(tm
     configurations = [{"name": "foot", "scenario": "swing-foot-angle"}]
     study = load_study({"schema_version": 1, "name": "foot", "configurations": configurations, "vary": [varied]})
     assert study.shown_for(study.configurations[0].scenario)["rad"] == "deg"
-
-
-def test_axes_and_tables_of_a_study_are_in_the_units_of_its_file(tmp_path: Path) -> None:
-    varied = [
-        {"path": "supply.pressure", "kind": "list", "values": ["3 bar_g", "4 bar_g"]},
-        {"path": "actuator.leak.area", "kind": "grid", "first": "0.001 cm^2", "last": "0.003 cm^2", "count": 2},
-    ]
-    study = {
-        "schema_version": 1,
-        "name": "in-bar",
-        "configurations": [{"name": "task", "scenario": TASK, "overrides": [SHORT]}],
-        "vary": varied,
-        "outputs": {"metrics": ["largest_pressure"]},
-    }
-    finding = ppafo.sweep(study, out=tmp_path / "out")
-    assert re.search(r"largest_pressure +bar_g ", str(finding))
-    labels = [text for axes in finding.plot().axes for text in (axes.get_xlabel(), axes.get_ylabel())]
-    assert {"Supply pressure (bar gauge)", "Leak area (cm$^2$)"} <= set(labels)
-    again = ppafo.load_study_results(tmp_path / "out")
-    assert again.found.document["varied"]["actuator.leak.area"]["given"] == "cm^2"
 
 
 def test_find_answers_in_the_units_of_its_range_and_condition() -> None:
@@ -178,34 +140,6 @@ def test_a_unit_that_needs_a_power_of_ten_is_not_the_one_in_which_a_number_is_sa
     assert given_in(varied, [text]).quote(1.451e-5) == shown
 
 
-def test_a_command_to_paste_has_the_units_in_which_its_numbers_were_given() -> None:
-    with shown_in(BAR):
-        assert written_text(401325.0, "Pa_a") == "3 bar_g"
-        assert written_text(3.929e-9, "m^3/(s Pa)") == "0.3929 L/(s bar)"
-        assert written_text(3.0e5, "Pa_d") == "3 bar_d"
-    assert written_text(2.19e-3, "s", unit="ms") == "2.19 ms"
-    assert units_given({"Pa_a": quantity("Pa_a")("3 bar_g"), "N m": 2.5}) == {"Pa_a": "bar_g", "Pa_d": "bar_d"}
-
-
-def test_a_run_is_said_and_drawn_in_the_units_of_its_set(in_bar: str, tmp_path: Path) -> None:
-    result = ppafo.simulate(TASK, overrides=[f"device.set={in_bar}", SHORT])
-    text = str(result)
-    assert "psi" not in text
-    assert "N m" not in text
-    assert re.search(r"largest_pressure +\d\.\d+ bar_g", text)
-    assert "psi" not in result.error().sentence
-    assert " bar " in result.error().sentence
-    assert " bar_g" in result._repr_html_()
-    titles = [axes.get_title(loc="left") for axes in result.plot().axes]
-    assert "Pressure (bar gauge)" in titles
-    assert "Actuator torque (N cm)" in titles
-    # The numbers themselves stay in SI.
-    assert result.metrics["largest_pressure"].unit == "Pa"
-    result.save(tmp_path / "run")
-    stored = draw_folder(tmp_path / "run", names_in(tmp_path / "run"))["figure"]
-    assert [axes.get_title(loc="left") for axes in stored.axes] == titles
-
-
 def test_every_table_of_an_analysis_is_in_the_units_of_the_set(in_bar: str, tmp_path: Path) -> None:
     changes = [f"device.set={in_bar}", SHORT]
     compared = ppafo.compare([TASK, "torque-task-solenoid"], overrides=changes)
@@ -229,53 +163,6 @@ def linear_axes(finding: object) -> list[str]:
     """Return what the axes of a finding's first figure say."""
     figure = finding.plot()  # type: ignore[attr-defined]
     return [text for axes in figure.axes for text in (axes.get_ylabel(), axes.get_title(loc="left"))]
-
-
-def test_results_of_a_study_are_in_the_units_of_its_set_when_they_are_read_again(in_bar: str, tmp_path: Path) -> None:
-    ppafo.sweep("torque-task-uncertainty", draws=4, out=tmp_path / "study", overrides=[f"device.set={in_bar}", SHORT])
-    again = str(ppafo.load_study_results(tmp_path / "study"))
-    assert re.search(r"rms_error +N cm", again)
-    manifest = tmp_path / "study" / "study.json"
-    manifest.write_text(manifest.read_text().replace('"bar_g"', '"furlong"'))
-    with pytest.raises(ppafo.DataError, match="furlong"):
-        ppafo.load_study_results(tmp_path / "study")
-
-
-def test_the_audit_has_pressures_and_torques_as_the_set(in_bar: str) -> None:
-    text = "\n".join(f"{finding.title} {finding.paragraph}" for finding in ppafo.audit(in_bar))
-    assert "N cm/bar" in text
-    assert "the supply allows at most 550 N cm" in text
-    assert "psi" not in text
-    assert not re.search(r"[0-9] N m\b(?! s)", text)
-
-
-def test_a_bottle_has_the_units_of_what_takes_its_gas_else_its_own(in_bar: str, tmp_path: Path) -> None:
-    run = ppafo.simulate(TASK, overrides=[f"device.set={in_bar}", SHORT]).save(tmp_path / "run")
-    assert re.search(r"pressure at the end +\d\.\d\d bar_g", str(ppafo.bottle(run)))
-    assert "pressure at the end              64.4 psi_g" in str(ppafo.bottle(gas_per_stride="0.3 g"))
-    assert any("(bar gauge)" in label for label in linear_axes(ppafo.bottle(run)))
-
-
-def test_recordings_of_the_simulated_bench_are_drawn_in_the_units_of_the_set(in_bar: str, tmp_path: Path) -> None:
-    write_rig_recording(tmp_path / "rig", record("static-torque", device=in_bar))
-    figure = draw_folder(tmp_path / "rig", names_in(tmp_path / "rig"))["static-torque"]
-    titles = [axes.get_title(loc="left") for axes in figure.axes]
-    assert titles == ["Pressure in chamber 1 less chamber 2 (bar)", "Actuator torque (N cm)"]
-
-
-def test_a_size_is_drawn_within_the_axes_whatever_the_unit(in_bar: str, tmp_path: Path) -> None:
-    file = tmp_path / "push.toml"
-    text = resources.files("ppafo.analyses.design.library").joinpath("push-off.toml").read_text(encoding="utf-8")
-    text = re.sub(r'scenario = "(.*?)".*', rf'scenario = "\1"\noverrides = ["device.set={in_bar}"]', text)
-    text = re.sub(r"\[valves\.festo.*?(?=\[pressure\])", "", text, flags=re.DOTALL)
-    file.write_text(text, encoding="utf-8")
-    design = ppafo.design(file)
-    errors = design.plot("profile").axes[0]
-    drawn = [line.get_ydata() for line in errors.lines if len(line.get_ydata()) > 2]
-    assert drawn
-    assert min(errors.get_ylim()) <= min(drawn[0]) <= max(errors.get_ylim())
-    labels = [entry.get_text() for entry in design.plot("torque").axes[0].get_legend().get_texts()]
-    assert re.search(r"at \d\.\d+ bar gauge", " ".join(labels))
 
 
 def test_gauge_pressures_count_from_the_atmosphere_of_the_set_in_every_answer(in_bar: str, tmp_path: Path) -> None:

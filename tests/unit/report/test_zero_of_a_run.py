@@ -6,7 +6,6 @@ from ppafo.metrics import Metric
 from ppafo.report.display_units import display_value, metric_change, metric_text, metrics_lines
 from ppafo.report.kind import ConfidenceInterval, of_metric
 from ppafo.simulation.check import ErrorEstimate
-from ppafo.units import without_exponent
 from ppafo.units.shown import shown_in
 
 ROUNDING = {
@@ -43,7 +42,3 @@ def test_zero_has_neither_sign_nor_exponent() -> None:
     assert ErrorEstimate(0.0, 0.3, {}).sentence.startswith(
         "Estimated error of the time steps: at most 0 deg and 4.4e-05 psi"
     )
-
-
-def test_thousands_of_per_cent_have_no_power_of_ten() -> None:
-    assert without_exponent(18_600.0, "+.3g") == "+18600"

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from ppafo.errors import ProgramError, ScenarioError
-from ppafo.exports.c_library import c_library
+from ppafo.errors import ScenarioError
 from ppafo.model.sensors import Measurement
-from ppafo.processor.controller import FixedPointController, PythonProcessor, fixed_point_controller, integer_form
+from ppafo.processor.controller import FixedPointController, PythonProcessor, fixed_point_controller
 from ppafo.processor.fixed_point import read
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
@@ -77,23 +76,3 @@ def test_a_converter_without_whole_numbers_is_refused() -> None:
     content["controller"] = {**content["controller"], "converter_bits": 10}
     with pytest.raises(ScenarioError, match=r"unknown key 'controller.converter_bits'"):
         scenario_from_dict(content)
-
-
-def test_a_processor_takes_the_integer_form_of_a_controller_with_its_gains() -> None:
-    scenario = load_scenario("torque-task-proportional", ("controller.proportional_gain=0.1 1/(N m)",))
-    named = load_scenario("torque-task-proportional", (FIXED, "controller.proportional_gain=0.1 1/(N m)"))
-    assert integer_form(scenario).controller == named.controller
-    assert fixed_point_controller(scenario).numbers == fixed_point_controller(named).numbers
-
-
-def test_the_converter_shows_more_than_the_supply_of_any_device() -> None:
-    """A reading at the end of the range counts as a broken wire, and shuts the valve for good."""
-    supply = [f"supply.{name}=12 bar_g" for name in ("pressure", "dorsiflexion_pressure")]
-    scenario = load_scenario("torque-task-proportional", [FIXED, *supply, "reference.level=4 N m"])
-    assert scenario.controller.settings["converter_range"] == 1.25 * scenario.device.supply.pressure
-    assert simulate(scenario).metrics["final_error"].value < 0.2
-
-
-def test_whole_numbers_have_no_exported_library() -> None:
-    with pytest.raises(ProgramError, match="cannot be exported as a C library; use 'ppafo export firmware'"):
-        c_library(load_scenario("torque-task-solenoid", ("controller.kind=on_off_fixed_point",)))

@@ -5,10 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ppafo.errors import DataError, ParameterError
-from ppafo.parameters import apply_overrides, load_device, load_parameter_set
+from ppafo.errors import DataError
+from ppafo.parameters import load_device
 from ppafo.signals.recording import Channel, Recording
-from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.clock import regular_interval, sample_period
 from ppafo.simulation.recorded.inputs import (
@@ -79,19 +78,6 @@ def test_an_angle_slightly_beyond_a_stop_is_the_stop_and_one_far_beyond_is_refus
     assert between_stops(np.array([lowest - 0.01]), device, "bench.csv").tolist() == [lowest]
     with pytest.raises(DataError, match=r"bench\.csv: 'angle' is .* beyond the stops of ppafo2011.* another zero"):
         between_stops(np.array([device.actuator.angle_max + 1.0]), device, "bench.csv")
-
-
-def test_a_scenario_runs_on_another_set_with_what_it_changes_in_its_own() -> None:
-    other = apply_overrides(
-        load_parameter_set("ppafo2011"), ["foot_plate.inertia=12 g m^2", "supply.pressure=20 psi_g"]
-    )
-    scenario = load_scenario("step-response", parameter_set=other)
-    assert scenario.device.foot_plate.inertia == pytest.approx(0.012)
-    own = load_scenario("step-response")
-    assert scenario.device.supply.pressure == own.device.supply.pressure
-    without = dataclasses.replace(other, valve_kinds={"main": "proportional"}, default_valve="main")
-    with pytest.raises(ParameterError, match="there is no valve 'proportional'"):
-        load_scenario("step-response", parameter_set=without)
 
 
 def test_an_input_is_held_or_runs_straight_at_the_steps_of_a_run_as_its_channel_declares() -> None:

@@ -12,7 +12,6 @@ import ppafo
 from ppafo import read_result
 from ppafo.cli.main import main
 from ppafo.documents.json_text import plain
-from ppafo.errors import DataError
 from ppafo.metrics import Metric
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario, scenario_document
@@ -110,32 +109,3 @@ def test_the_ten_reversals_of_the_torque_task_switch_each_valve_of_the_pair_ten_
     result = ppafo.simulate("torque-task-solenoid")
     assert np.count_nonzero(np.diff(np.sign(result.recording["command"]))) == 10
     assert result.metrics["switchings"].value == 20.0
-
-
-@pytest.mark.parametrize(
-    ("name", "near"),
-    [("switching", "switchings"), ("gas_suplied", "gas_supplied"), ("rms", "rms_error"), ("gas", "gas_supplied")],
-)
-def test_a_metric_that_is_not_there_is_answered_with_the_nearest(name: str, near: str) -> None:
-    metrics = ppafo.simulate("torque-task-proportional", ["run.duration=0.02 s"]).metrics
-    with pytest.raises(DataError, match=rf"there is no metric '{name}', did you mean '{near}'\?; available: "):
-        metrics[name]
-    assert metrics.get(name) is None
-    assert name not in metrics
-
-
-def test_times_and_units_are_at_hand(result: Result) -> None:
-    assert result["time"].tolist() == [0.0, 0.1]
-    assert result._ipython_key_completions_()[0] == "time"
-    assert Metric(4.2e-4, "kg", "gas").in_unit("g") == pytest.approx(0.42)
-    assert Metric(301325.0, "Pa", "pressure").in_unit("bar_g") == pytest.approx(2.0)
-    # The unit that a metric states is one that it takes.
-    for unit in ("Pa", "-", "kg", "J/kg"):
-        assert Metric(3.0, unit, "").in_unit(unit) == 3.0
-    assert (Metric(3.0, "-", "").in_unit(""), Metric(0.3, "-", "").in_unit("%")) == (3.0, 30.0)
-    with pytest.raises(ppafo.ArgumentError, match=r"units='psi_g': must be units by channel"):
-        result.to_dataframe("psi_g")  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match=r"plot\(\) got an unexpected keyword argument 'ax'"):
-        result.plot(ax=None)  # type: ignore[call-arg]
-    with pytest.raises(DataError, match=r"log: 'torque' must be a Channel, such as Channel\(values, 'N m'\)"):
-        Recording("log", np.array([0.0, 1.0]), {"torque": [1.0, 2.0]})  # type: ignore[dict-item]

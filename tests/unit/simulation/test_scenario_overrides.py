@@ -3,17 +3,15 @@
 import itertools
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import ppafo
-from ppafo.errors import ParameterError, PpafoError, ScenarioError
+from ppafo.errors import PpafoError, ScenarioError
 from ppafo.loading import reloaded
 from ppafo.simulation.declaration import OF_A_VANE
-from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overrides import device_paths
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice
 
@@ -81,13 +79,6 @@ def test_a_gain_of_0_needs_no_unit_whatever_is_controlled() -> None:
 @pytest.mark.parametrize("override", ["motion.angle=80", "run.duration=2", "reference.level=5", "sensors.delay=1"])
 def test_any_other_value_must_say_its_unit(override: str) -> None:
     assert "a number without a unit" in problem_of(override)
-
-
-def test_an_assumption_that_was_replaced_says_so() -> None:
-    assumptions = {item.path: item for item in load_scenario(TASK, ["motion.angle=80 deg"]).assumptions}
-    assert assumptions["motion.angle"].value == "80 deg"
-    assert assumptions["motion.angle"].note.startswith("set by an override; the scenario has 75 deg: not reported")
-    assert "override" not in assumptions["reference.level"].note
 
 
 @pytest.mark.parametrize(
@@ -162,40 +153,8 @@ def test_a_value_of_a_valve_beside_the_choice_of_another_is_refused_with_both_in
     assert load_scenario(TASK, ["device.valve=solenoid", "valves.solenoid.area=5 mm^2"]).device.valve_name == "solenoid"
 
 
-def test_a_file_that_chooses_a_valve_and_changes_another_is_refused_with_both() -> None:
-    content = dict(load_scenario(TASK).origin.content)
-    content["device"] = {"set": "ppafo2011", "valve": "solenoid", "overrides": ["valves.proportional.area=5 mm^2"]}
-    with pytest.raises(
-        ParameterError, match=r"'valves\.proportional\.area=5 mm\^2' has no effect with device\.valve = "
-    ):
-        scenario_from_dict(content)
-
-
 def test_the_choice_of_a_valve_drops_what_a_layer_below_gives_of_another() -> None:
     below = load_scenario(TASK, ["valves.proportional.area=5 mm^2", "run.duration=1 s"])
     chosen = reloaded(below, ["device.valve=solenoid"])
     assert chosen.origin.overrides == ("run.duration=1 s", "device.valve=solenoid")
     assert chosen.device == load_scenario(TASK, ["device.valve=solenoid"]).device
-
-
-def test_numbers_that_a_newly_chosen_kind_keeps_are_said(tmp_path: Path) -> None:
-    def kept(*overrides: str, scenario: str = TASK) -> str:
-        return load_scenario(scenario, overrides).origin.replaced
-
-    wave = ("reference.kind=sine", "reference.amplitude=2 N m")
-    # The file has the hold at 6 N m, the vane locked at 75 deg, and gains; a pair of valves has none of them.
-    assert kept(*wave) == "kept from ramp_hold for sine: reference.level=6 N m (mean level)"
-    assert (
-        kept(*wave, "reference.level=3 N m") == kept("controller.kind=on_off") == kept("reference.kind=ramp_hold") == ""
-    )
-    assert kept("motion.kind=free", *wave).startswith("kept from locked for free: motion.angle=75 deg; kept from ramp")
-    gains = "controller.proportional_gain=0.095 1/(N m), controller.integral_gain=0.25 1/(N m s)"
-    assert kept("controller.kind=pid_feedforward").startswith(f"kept from pid for pid_feedforward: {gains}, ")
-    own = tmp_path / "own.toml"
-    text = (Path(ppafo.__file__).parent / "scenarios" / f"{TASK}.toml").read_text(encoding="utf-8")
-    own.write_text(text.replace("[run]", 'overrides = ["valve.area=9 mm^2"]\n\n[run]', 1), encoding="utf-8")
-    assert kept(scenario=str(own)) == ""
-    said = kept("device.valve=solenoid", scenario=str(own))
-    # The printed orifice of a solenoid valve is 12.6 mm^2.
-    assert said.startswith("values of the scenario replace values of valve 'solenoid': valve.area=9 mm^2; ")
-    assert "valve.area=12.6 mm^2" in said

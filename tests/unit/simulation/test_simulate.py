@@ -108,18 +108,6 @@ def test_a_python_controller_beyond_the_range_of_commands_is_limited_and_a_line_
     ]
 
 
-@pytest.mark.parametrize("answer", [math.nan, None, "open", math.inf, True])
-def test_python_controller_that_returns_no_finite_number_is_refused_with_the_time(
-    torque_task: Callable[[str], Scenario], answer: object
-) -> None:
-    class Broken(Proportional):
-        def update(self, time: float, reference: float, measurement: Measurement) -> float:
-            return answer if time > 0.0105 else 0.0  # type: ignore[return-value]
-
-    with pytest.raises(SimulationError, match=r"Broken.update returned .* at t = 0.011 s"):
-        simulate(torque_task("proportional").controlled_by(Broken()))
-
-
 def test_diverging_run_is_a_status_with_time_state_and_remedy(step_response: Scenario) -> None:
     run = plan_run(step_response)
     batch = batch_of(run)
@@ -190,18 +178,6 @@ def test_restitution_makes_the_vane_rebound() -> None:
 
     assert largest_backward_speed(0.0) < 0.5
     assert largest_backward_speed(0.5) > 1.0
-
-
-def test_a_vane_led_close_to_its_stops_fifty_times_a_second_is_followed_at_steps_of_a_millisecond() -> None:
-    sine = {
-        "motion.profile.level": "75 deg",
-        "motion.profile.amplitude": "54.9 deg",
-        "motion.profile.frequency": "50 Hz",
-    }
-    overrides = [f"{path}={value}" for path, value in sine.items()]
-    run = plan_run(load_scenario("torque-task-moving-ankle", [*overrides, "run.duration=0.1 s"]))
-    assert run.step == 1e-3
-    assert compare_with_reference(run).worst_pressure <= 1e-3
 
 
 def test_a_step_that_is_not_done_in_the_most_parts_ends_the_run_with_time_and_remedy(

@@ -73,15 +73,3 @@ def test_a_free_joint_that_friction_holds_for_the_whole_run_is_said_to_stand_sti
     free = simulate("torque-task-proportional", [*HELD, "friction.static_torque=1 N m"])
     assert np.ptp(free.recording["angle"]) > 0.01
     assert "does not move" not in " ".join(free.warnings)
-
-
-def test_friction_is_not_to_be_reduced_where_nothing_turns_the_joint_or_the_reference_is_beyond_reach() -> None:
-    friction = "friction.static_torque=20 N m"
-    shut = simulate("torque-task-proportional", [*HELD, friction, "controller.kind=constant", "controller.command=0"])
-    assert shut.recording["torque"].max() == 0.0
-    assert "does not move" not in " ".join(shut.warnings)
-    # The paper's actuator gives 5 N m; the reference, not the friction, is at fault.
-    beyond = simulate("torque-task-proportional", [*HELD[:-1], friction, "reference.level=9 N m"])
-    (still,) = [said for said in beyond.warnings if "does not move" in said]
-    assert still.endswith("static friction of 20 N m exceeds the largest torque of actuator and load, 5 N m")
-    assert any("actuator gives at most 5 N m" in said for said in beyond.warnings)

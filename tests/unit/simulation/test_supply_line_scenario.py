@@ -22,14 +22,6 @@ WARM = (
     "gas_model.wall_area_per_volume=100 1/m",
 )
 SHORT = ("run.duration=0.5 s",)
-STIFF = (
-    "supply_line.plantarflexion.droop=1e3 Pa s/kg",
-    "supply_line.plantarflexion.largest_flow=1 kg/s",
-    "supply_line.plantarflexion.volume=1e-3 m^3",
-    "supply_line.dorsiflexion.droop=1e3 Pa s/kg",
-    "supply_line.dorsiflexion.largest_flow=1 kg/s",
-    "supply_line.dorsiflexion.volume=1e-3 m^3",
-)
 
 
 def test_a_scenario_takes_the_section_of_a_walk_file_and_lists_what_it_leaves_to_the_package() -> None:
@@ -103,15 +95,6 @@ def test_a_filling_behind_lines_is_that_of_an_ode_solver() -> None:
     pressures = exact.y * plant.gas_product / np.array([[volume_1], [volume_2], [fed.volume_1]])
     found = np.array([result.recording[name] for name in ("pressure_1", "pressure_2", "line_pressure_1")])
     assert np.abs(found - pressures).max() < 1e-3 * (plant.supply_pressure - plant.atmospheric_pressure)
-
-
-def test_wide_lines_with_hardly_any_droop_are_a_constant_relieving_supply() -> None:
-    lined = simulate("torque-task-proportional", [*SHORT, *STIFF])
-    plain = simulate("torque-task-proportional", [*SHORT, "supply.relieving=true"])
-    for name in ("pressure_1", "pressure_2"):
-        assert np.abs(lined.recording[name] - plain.recording[name]).max() < 300.0
-    drooping = simulate("torque-task-proportional", [*SHORT, "supply_line.plantarflexion.droop=3e8 Pa s/kg"])
-    assert np.abs(drooping.recording["pressure_1"] - plain.recording["pressure_1"]).max() > 3.0e3
 
 
 def test_an_ensemble_over_the_droop_is_its_runs_to_the_last_bit_and_refuses_a_second_regulator_above_the_first() -> (

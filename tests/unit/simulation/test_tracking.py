@@ -3,12 +3,10 @@
 import ast
 import math
 import re
-from typing import Any
 
 import numpy as np
 import pytest
 
-from ppafo.errors import PpafoError
 from ppafo.loading import load_scenario, reloaded
 from ppafo.metrics.metric import hold_start
 from ppafo.parameters.reach import supply_for, torque_reach
@@ -16,7 +14,7 @@ from ppafo.remedy_trials import tried
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.tracking import most_reversals, tracking_in
+from ppafo.simulation.tracking import tracking_in
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.simulation.tracking.rule import failure_of_task
 from ppafo.simulation.tracking.settled import SettledPart, settled_task
@@ -163,71 +161,6 @@ SMALL_SINE = [
     "controller.derivative_gain=0 s/(N m)",
 ]
 """Sine that is small beside its mean."""
-
-
-def test_a_loop_that_keeps_only_the_mean_of_a_sine_does_not_follow_it() -> None:
-    slow = simulate(TASK, [*SMALL_SINE, "controller.proportional_gain=0.01 1/(N m)"])
-    assert slow.tracking is not None
-    assert slow.tracking.kind == "does not follow"
-    assert slow.tracking.error < 0.2 * slow.tracking.wanted
-    quick = simulate(TASK, [*SMALL_SINE, "controller.proportional_gain=4.5 1/(N m)"])
-    assert quick.tracking is None
-    # Nor do valves that are open or shut, whose steps of 2.2 N m are as large as the wave.
-    wave = ["reference.kind=sine", "reference.level=3 N m", "reference.amplitude=2 N m", "reference.frequency=1 Hz"]
-    coarse = simulate("torque-task-solenoid", wave)
-    assert coarse.tracking is not None
-    settled = settled_task(coarse.scenario, coarse.recording)
-    assert 0.5 * 2.0 / math.sqrt(2.0) < settled.rms_error < 0.25 * settled.wanted_change
-    assert "the valves cause a step of 2.19 N m in their dead time of 75 ms" in coarse.tracking.cause
-    # A constant delay behind a slow ramp is not judged by how little the ramp changes.
-    ramp = ["reference.kind=sine", "reference.level=3 N m", "reference.amplitude=1.5 N m", "reference.frequency=0.1 Hz"]
-    assert (
-        simulate(TASK, [*ramp, "reference.phase=-0.125", "controller.proportional_gain=0.5 1/(N m)"]).tracking is None
-    )
-
-
-class Switching:
-    """Relay with hysteresis: full opening towards the reference times ``sign`` beyond ``band`` [N m]."""
-
-    def __init__(self, band: float, sign: float = 1.0) -> None:
-        self.band, self.sign, self.command = band, sign, 0.0
-
-    def reset(self) -> None:
-        self.command = 0.0
-
-    def update(self, time: float, reference: float, measurement: Any) -> float:
-        error = reference - measurement.torque
-        if abs(error) > self.band:
-            self.command = math.copysign(self.sign, error * self.sign)
-        return self.command
-
-
-@pytest.mark.parametrize("command", [1.0, -1.0])
-def test_a_valve_that_is_never_reversed_is_neither_called_too_small_nor_of_the_wrong_sign(command: float) -> None:
-    class Opens:
-        def reset(self) -> None: ...
-
-        def update(self, time: float, reference: float, measurement: object) -> float:
-            return command
-
-    told = simulate(load_scenario(TASK, ["reference.level=2 N m"]).controlled_by(Opens())).tracking
-    assert told is not None
-    # The paper's actuator reaches 5 N m in either direction.
-    error = 3 if command > 0.0 else 7
-    assert f"the valve stays open {error} N m beyond the reference: the hysteresis" in told.sentence
-
-
-@pytest.mark.parametrize("rate", ["1 kHz", "20 Hz"])
-@pytest.mark.parametrize("band", [0.3, 1.0, 2.0])
-def test_the_wrong_sign_is_named_for_one_of_two_opposite_laws(band: float, rate: str) -> None:
-    scenario = load_scenario(TASK, ["reference.level=4 N m", f"controller.rate={rate}"])
-    right, wrong = (simulate(scenario.controlled_by(Switching(band, sign))).tracking for sign in (1.0, -1.0))
-    assert right is not None
-    assert wrong is not None
-    assert "reverse the sign" not in right.sentence
-    assert "reverse the sign" in wrong.sentence
-    # 2 N m above the reference is beyond the 5 N m of the actuator, so that the relay is never reversed.
-    assert right.cause.startswith("the valve stays open 1 N m beyond the reference") == (band == 2.0)
 
 
 def test_a_limit_cycle_beside_the_reference_oscillates_in_a_run_and_in_a_study() -> None:
@@ -403,14 +336,6 @@ def test_an_angle_is_held_to_degrees_where_a_torque_is_held_to_shares(
     assert failure_of_task(sampled(error, "torque")._replace(rests=rests), 0.0, False) is None
 
 
-def test_a_free_joint_that_its_torque_presses_on_a_stop_is_told_so() -> None:
-    changes = ["motion.kind=free", "reference.level=9 N m"]
-    told = simulate(TASK, changes).tracking
-    assert told is not None
-    assert "only the upper stop, on which the joint lies, resists the torque" in told.cause
-    assert told.remedies == ()
-
-
 def test_a_joint_that_reaches_a_stop_is_told_side_time_and_share_although_its_torque_follows() -> None:
     free = simulate(TASK, ["motion.kind=free", "reference.level=3 N m"])
     assert free.tracking is None
@@ -443,34 +368,6 @@ def test_a_changed_sensor_that_the_controller_does_not_read_is_told_so(law: str)
     pressed = simulate(TASK, [*task, "sensors.pressure_noise=0.5 psi_d", "sensors.seed=2"])
     assert not np.array_equal(quiet["command"], pressed["command"])
     assert not any("without effect" in said for said in (*quiet.warnings, *pressed.warnings))
-
-
-def test_sensors_of_an_angle_of_a_lever_and_of_an_open_loop_are_told_by_what_is_read() -> None:
-    servo = ["controller.kind=pid", "run.duration=0.3 s"]
-    told = simulate("cylinder-servo", [*servo, "sensors.pressure_noise=0.1 bar_d"])
-    assert np.array_equal(told["command"], simulate("cylinder-servo", servo)["command"])
-    assert "without effect here: sensors.pressure_noise; the controller reads the measured angle" in told.warnings
-    # The torque of a lever depends on its angle: the measured angle counts.
-    lever = ["device.set=cylinder-lever", "reference.level=3 N m", "sensors.angle_noise=2 deg", "run.duration=0.3 s"]
-    assert not any("without effect" in said for said in simulate(TASK, lever).warnings)
-    opened = simulate("step-response", ["sensors.delay=5 ms", "sensors.seed=4"]).warnings
-    assert "without effect here: sensors.delay, sensors.seed; the controller reads no sensor" in opened
-    with pytest.raises(
-        PpafoError, match=r"did you mean 'sensors\.pressure_noise'\?; the torque is computed from the mea"
-    ):
-        load_scenario(TASK, ["sensors.torque_noise=0.1 N m"])
-
-
-@pytest.mark.parametrize("law", ["pid", "sliding_mode", "on_off"])
-def test_a_law_on_a_pair_of_valves_is_told_the_step_of_its_valves_and_no_gain(law: str) -> None:
-    changes = [f"controller.kind={law}", "controller.rate=1 kHz", "reference.level=3 N m", "valve.area=60 mm^2"]
-    scenario = load_scenario("torque-task-solenoid", [*changes, "valve.opening_delay=10 ms"])
-    verdict = tried(scenario, simulate(scenario).tracking)
-    assert verdict is not None
-    assert "the valves cause a step of" in verdict.cause
-    assert (f"`{law}` requests partial openings, which on/off valves do not have" in verdict.cause) == (law != "on_off")
-    assert verdict.mended[0].startswith("valve.area=")
-    assert most_reversals(scenario) == math.inf
 
 
 def test_valves_whose_set_limits_nothing_are_told_how_often_they_switch() -> None:
@@ -582,24 +479,6 @@ def test_noise_that_turns_the_command_until_the_joint_rests_is_not_counted_as_os
     assert settled_task(scenario, recording.with_channel("command", command, "-")).command_reversal_rate == 0.0
     command[last:] = np.where(np.arange(count - last) % 4 < 2, 1.0, -1.0)
     assert settled_task(scenario, recording.with_channel("command", command, "-")).command_reversal_rate > 100.0
-
-
-def test_an_angle_that_lags_behind_a_wave_does_not_oscillate_in_a_sweep_either() -> None:
-    base = load_scenario("cylinder-servo", ["reference.frequency=4 Hz", "run.duration=4 s"])
-    columns = {"reference.amplitude": np.radians([10.0, 30.0])}
-    alone = [
-        simulate(with_numbers(base, {"reference.amplitude": value})).tracking for value in np.radians([10.0, 30.0])
-    ]
-    assert [verdict and verdict.kind for verdict in alone] == [None, "does not follow"]
-    metered = excess(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns)
-    assert metered.follows.tolist() == [1.0, 0.0]
-    assert metered.oscillates.tolist() == [0.0, 0.0]
-    stiff = {"controller.angle_stiffness": np.array([10.0, 80.0])}
-    wave = load_scenario(
-        "cylinder-servo", ["reference.frequency=4 Hz", "run.duration=4 s", "reference.amplitude=20 deg"]
-    )
-    metered = excess(run_ensemble(wave, stiff, with_companions([], wave)).metrics, wave, stiff)
-    assert metered.oscillates.tolist() == [0.0, 1.0]
 
 
 PULSES = {"kind": "smooth", "level": "0 N m", "period": "1.25 s", "value_01": "0 N m", "value_02": "3 N m"}

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from ppafo.engine.run import batch_of
-from ppafo.errors import ScenarioError
 from ppafo.loading import reloaded
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.columns import check_columns
@@ -83,18 +82,6 @@ def test_a_row_of_columns_has_the_bits_of_the_single_walk(name: str) -> None:
         np.testing.assert_array_equal(states, alone.states[:, 0], err_msg=str(row))
 
 
-def test_metrics_of_rows_are_those_of_the_walks_alone() -> None:
-    base = load_walk("proportional", ["run.duration=8 s"])
-    columns = {"supply.dorsiflexion_pressure": np.array([2.5e5, 3.1e5]), "wearer.body_mass": np.array([60.0, 90.0])}
-    names = ("gas", "net_push_off_work", "toe_clearance", "counted_strides", "total_gas", "push_off_error", "strides")
-    found = run_ensemble(base, columns, names)
-    for row in range(2):
-        words = [f"supply.dorsiflexion_pressure={columns['supply.dorsiflexion_pressure'][row].item()!r} Pa_a"]
-        alone = walk(reloaded(base, [*words, f"wearer.body_mass={columns['wearer.body_mass'][row].item()!r} kg"]))
-        for name in names:
-            assert found.metrics[name][row] == pytest.approx(alone.metrics[name].value, rel=2.0e-14), name
-
-
 def test_a_walk_that_contradicts_itself_is_refused_and_the_others_go_on() -> None:
     base = load_walk("solenoid", ["run.duration=6 s"])
     found = run_ensemble(base, {"controller.load_threshold": np.array([60.0, 25.0])}, ["strides"])
@@ -123,11 +110,3 @@ def test_a_person_is_healthy_as_his_or_her_own_gait_is() -> None:
     usual = walk("off", overrides=["run.duration=8 s"])
     assert own.metrics["angle_difference"].value < 0.02, "who keeps the gait keeps that of the person"
     assert own.metrics["healthy_positive_work"].value != usual.metrics["healthy_positive_work"].value
-
-
-@pytest.mark.parametrize(("words", "reason"), [("wearer.person=0.5", "must be a whole number")])
-def test_half_a_person_does_not_walk(words: str, reason: str) -> None:
-    with pytest.raises(ScenarioError, match=reason):
-        load_walk("off", [words])
-    found = run_ensemble(load_walk("off", ["run.duration=6 s"]), {"wearer.person": np.array([0.5, 1.0])}, ["strides"])
-    assert found.status.tolist() == [2, 0]

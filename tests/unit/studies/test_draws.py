@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.errors import StudyError
 from ppafo.simulation.loading import load_scenario
-from ppafo.studies.draws import choose_configuration, drawn_in, study_of, uncertainty_in, uncertainty_of
+from ppafo.studies.draws import choose_configuration, drawn_in, uncertainty_in, uncertainty_of
 from ppafo.studies.intervals import effective_sample_size, fraction_interval, replicates_interval
 from ppafo.studies.limits import MetricLimit, check_metrics
 from ppafo.studies.loading import load_study
@@ -76,29 +76,12 @@ def test_a_choice_of_configurations_is_not_made_in_silence() -> None:
         choose_configuration(whole, "solenoids")
 
 
-def test_a_change_of_the_chosen_configuration_is_not_asked_of_the_others() -> None:
-    document = study()
-    document["vary"][0]["only"] = ["solenoid"]
-    changes = ["controller.anti_windup=3 1/s"]
-    _, base, uncertainty = drawn_in(document, changes, "proportional")
-    assert base.scenario.controller.settings["anti_windup"] == 3.0
-    assert uncertainty.paths == ("valve.area", "actuator.leak.area")
-    assert uncertainty.scores is not None
-    with pytest.raises(StudyError, match=r"'solenoid'.*anti_windup"):
-        drawn_in(document, changes, "solenoid")
-
-
 def test_a_grid_has_no_probability() -> None:
     document = study(correlations=[], sample=None)
     document["vary"] = [{"path": "valve.area", "kind": "list", "values": ["10 mm^2", "11 mm^2"]}]
     del document["sample"]
     with pytest.raises(StudyError, match=r"'valve.area' is varied over a grid or list, which has no probabilities"):
         uncertainty_of(load_study(document))
-
-
-def test_a_study_that_is_loaded_takes_no_overrides() -> None:
-    with pytest.raises(StudyError, match="accepts no overrides"):
-        study_of(load_study(study()), ["valve.area=11 mm^2"])
 
 
 def test_metrics_are_checked_before_anything_runs() -> None:

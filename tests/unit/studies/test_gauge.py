@@ -103,32 +103,9 @@ def test_a_pressure_that_the_set_states_in_gauge_moves_with_the_atmosphere(tmp_p
     assert np.ptp(above) < to_si(12.0, "psi_d", "Pa_d")
 
 
-def test_a_path_that_is_the_same_as_a_gauge_pressure_counts_from_the_same_atmosphere() -> None:
-    made = study(
-        ROOMS,
-        {"path": "supply.pressure", "kind": "list", "values": ["50 psi_g"]},
-        {"path": "initial.pressure_1", "same_as": "supply.pressure"},
-    )
-    found = columns_of(made)
-    assert found["initial.pressure_1"].tolist() == found["supply.pressure"].tolist()
-
-
 TASK, METRIC, ATMOSPHERE = "torque-task-proportional", "largest_pressure", "supply.atmospheric_pressure"
 HIGH_UP = (f"{ATMOSPHERE}=80 kPa_a", "supply.pressure=400 kPa_a")
 REFUSED = rf"50 kPa_g'.*: must not be a gauge pressure, because {ATMOSPHERE} varies; give an absolute pressure"
-
-
-def tuning(path: str, minimum: str, maximum: str) -> dict[str, Any]:
-    """A tuning high above the sea that searches one path under a limit on the pressure."""
-    return {
-        "schema_version": 1,
-        "name": "high-up",
-        "scenario": TASK,
-        "overrides": list(HIGH_UP),
-        "search": [{"path": path, "minimum": minimum, "maximum": maximum}],
-        "objective": [{"metric": "rms_error"}],
-        "constraints": [{"metric": METRIC, "at_most": "50 kPa_g"}],
-    }
 
 
 def test_a_condition_of_find_counts_from_the_atmosphere_of_the_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,10 +121,3 @@ def test_a_condition_of_find_counts_from_the_atmosphere_of_the_scenario(monkeypa
     assert limits == [pytest.approx(130.0e3)]
     with pytest.raises(StudyError, match=REFUSED):
         ppafo.find(TASK, vary=f"{ATMOSPHERE}=70..90 kPa_a", such_that=f"{METRIC} <= 50 kPa_g", overrides=HIGH_UP)
-
-
-def test_a_constraint_of_a_tuning_counts_from_the_atmosphere_of_the_scenario() -> None:
-    (constraint,) = ppafo.load_tuning(tuning("supply.pressure", "200 kPa_a", "400 kPa_a")).constraints
-    assert constraint.limit == pytest.approx(130.0e3)
-    with pytest.raises(StudyError, match=REFUSED):
-        ppafo.load_tuning(tuning(ATMOSPHERE, "70 kPa_a", "90 kPa_a"))

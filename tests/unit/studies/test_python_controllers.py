@@ -82,25 +82,6 @@ def test_it_is_compared_over_an_uncertain_device_with_progress_and_overrides() -
         ppafo.compare(pair, overrides=["controller.proportional_gain=1"])
 
 
-def test_the_device_around_it_is_tuned_and_gains_that_it_does_not_declare_are_refused_in_a_line() -> None:
-    document = {
-        "schema_version": 1,
-        "name": "trial",
-        "scenario": TASK,
-        "overrides": list(SHORT),
-        "search": [{"path": "supply.pressure", "minimum": "20 psi_g", "maximum": "60 psi_g"}],
-        "objective": [{"metric": "rms_error"}],
-        "effort": {"starts": 1, "generations": 2, "candidates_per_gain": 4},
-    }
-    problem = ppafo.load_tuning(document)
-    tuned = ppafo.tune(replace(problem, scenario=problem.scenario.controlled_by(Integral()))).found
-    assert tuned.after.objective <= tuned.before.objective
-    gain = {"path": "controller.proportional_gain", "minimum": "0.05 1/(N m)", "maximum": "1 1/(N m)"}
-    problem = ppafo.load_tuning(document | {"search": [gain]})
-    with pytest.raises(StudyError, match="a Python controller object has no declared settings"):
-        ppafo.tune(replace(problem, scenario=problem.scenario.controlled_by(Integral())))
-
-
 def test_a_command_that_is_no_number_names_the_object_and_a_valve_that_nothing_controls_is_refused() -> None:
     base = ppafo.load_scenario(TASK, SHORT)
     columns = {"supply.pressure": np.array([4e5])}

@@ -55,15 +55,6 @@ def test_path_follows_in_the_draws_of_analyses_too() -> None:
     assert np.array_equal(columns["actuator.dead_volume_2"], columns["actuator.dead_volume_1"])
 
 
-def test_path_follows_only_where_it_is_to() -> None:
-    document = study(only=["one"])
-    document["configurations"].append({"name": "two", "scenario": "torque-task-solenoid"})
-    loaded = load_study(document)
-    values = drawn_values(loaded, np.arange(8))
-    assert "actuator.dead_volume_2" in varied_columns(loaded, loaded.configurations[0], values)
-    assert "actuator.dead_volume_2" not in varied_columns(loaded, loaded.configurations[1], values)
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -98,11 +89,6 @@ def test_second_pressure_that_is_apart_stays_where_it_is() -> None:
     scenario = load_scenario("step-response", ["supply.dorsiflexion_pressure=45 psi_g"])
     moved = with_numbers(scenario, {"supply.pressure": 5.0e5}).device.supply
     assert (moved.pressure, moved.dorsiflexion_pressure) == (5.0e5, scenario.device.supply.dorsiflexion_pressure)
-
-
-def test_line_of_the_readme_moves_both_chambers() -> None:
-    supply = load_scenario("step-response", ["supply.pressure=70 psi_g"]).device.supply
-    assert supply.dorsiflexion_pressure == supply.pressure > load_scenario("step-response").device.supply.pressure
 
 
 def test_a_correlation_of_1_varies_two_numbers_by_one_factor() -> None:

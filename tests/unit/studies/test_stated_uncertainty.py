@@ -60,11 +60,3 @@ def test_what_the_set_does_not_state_is_refused(
 ) -> None:
     with pytest.raises(StudyError, match=expected):
         load_study(stating(path, *overrides))
-
-
-def test_configurations_must_state_the_same(stating: Callable[..., Any]) -> None:
-    document = stating("actuator.torque_constant")
-    other = dict(document["configurations"][0], name="other", scenario="torque-task-proportional")
-    document["configurations"].append(other)
-    with pytest.raises(StudyError, match="needs an uncertainty in the parameter set 'ppafo2011'"):
-        load_study(document)

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import ppafo
-from ppafo.metrics import METRICS
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
@@ -107,20 +105,6 @@ def test_the_lowest_toes_are_those_of_the_mean_stride_in_mid_swing() -> None:
     assert pair.without_device.metrics["lowest_toes"].value < 0.0 < pair.healthy["lowest_toes"].value < 0.02
 
 
-def test_the_name_of_a_configuration_is_as_good_as_the_configuration() -> None:
-    by_name = walk("off", minutes=MINUTES)
-    np.testing.assert_array_equal(
-        by_name.recording["angle"], walk(load_walk("off"), minutes=MINUTES).recording["angle"]
-    )
-
-
-def test_progress_is_told_up_to_the_end() -> None:
-    told: list[tuple[float, float]] = []
-    walk("off", minutes=4.0, progress=lambda done, total: told.append((done, total)))
-    assert len(told) >= 2
-    assert told[-1][0] == told[-1][1] == pytest.approx(4.0, abs=1e-3)
-
-
 def diverging() -> WalkResult:
     configuration = load_walk("solenoid")
     supply = replace(configuration.device.supply, pressure=1.0e18)
@@ -152,12 +136,6 @@ def test_a_walk_is_written_for_opensim(tmp_path: Path) -> None:
     assert table.in_degrees is False
 
 
-def test_a_result_can_be_drawn_and_says_what_it_is() -> None:
-    result = compared("proportional").with_device
-    assert len(result.plot().axes) == 5
-    assert repr(result).startswith("Walk 'proportional', 0.15 min: completed\n  gas ")
-
-
 def test_a_landing_on_the_toes_is_that_of_the_stride_that_it_begins() -> None:
     strikes = {5: 0.0, 15: 1.0, 25: 0.0, 35: 1.0}
     strides, landings = (np.zeros(40) for _ in range(2))
@@ -168,10 +146,3 @@ def test_a_landing_on_the_toes_is_that_of_the_stride_that_it_begins() -> None:
     found = per_stride(totals, stride_starts(strides))
     assert found["toe_landing"].tolist() == [0.0, 1.0, 0.0]
     assert found["gas"].tolist() == [1.0, 1.0, 1.0]
-
-
-def test_a_metric_of_a_module_is_one_of_a_walk_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    # In the catalogue it stands by the place of its object.
-    monkeypatch.setitem(METRICS._kinds, "my_module:KIND", replace(METRICS["largest_pressure"], name="own"))
-    metrics = ppafo.simulate(load_walk("proportional", ["run.duration=8 s"])).metrics
-    assert metrics["own"].value == metrics["largest_pressure"].value

@@ -330,33 +330,6 @@ def test_every_mistake_in_a_file_is_one_line(tmp_path: Path, before: str, after:
     assert "\n" not in str(caught.value)
 
 
-def test_every_fault_of_a_design_file_is_in_one_refusal(tmp_path: Path) -> None:
-    faulty = FILE.replace('"4 N m", "4 N m"', '"4 N m"')
-    faulty = faulty.replace("task-proportional", "task-proportionel").replace("repetitions = 100", "")
-    faulty = faulty.replace('"0.4 N m"', '"0.4 Pa"') + '\n[pressure]\nlowest = "5 deg"\n'
-    (tmp_path / "faulty.toml").write_text(faulty)
-    with pytest.raises(PpafoError) as caught:
-        load_design(tmp_path / "faulty.toml")
-    named = ("torque has 4;", "task-proportionel", "pressure.lowest", "[use]", "limits.rms_error")
-    assert [word in part for word, part in zip(named, caught.value.parts, strict=True)] == [True] * 5
-    # The keys of a table that is missing altogether are asked for at once.
-    (tmp_path / "faulty.toml").write_text(FILE.partition("[limits]")[0])
-    with pytest.raises(PpafoError, match=r"'limits\.rms_error' and 'valves' are missing"):
-        load_design(tmp_path / "faulty.toml")
-
-
-def test_runs_that_all_fail_are_said_in_one_line(folder: Path) -> None:
-    late = FILE.replace(
-        "simulated = 1", 'simulated = 1\noverrides = ["actuator.dead_volume_1=1e-6 mm^3", "motion.angle=20 deg"]'
-    )
-    (folder / "failing.toml").write_text(late)
-    with pytest.raises(
-        PpafoError, match=r"every run with valve 'enfield-ls-v05s' failed; the first failure: "
-    ) as caught:
-        design(folder / "failing.toml")
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -439,27 +412,6 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
     assert whole.choice is not None
     assert TORQUE_CONSTANT * (whole.choice.pressure - ATMOSPHERE) == pytest.approx(5.0, rel=5e-3)
     assert "cut off" not in suggestion_sentence(whole)
-
-
-def test_a_cut_peak_is_told_without_a_bottle_and_without_a_pressure_that_suffices(tmp_path: Path) -> None:
-    document = (
-        FILE.replace("task-proportional", "task-solenoid")
-        .replace("repetitions = 100", "hours = 20.0")
-        .replace('"0.4 N m"', '"1.2 N m"')
-    )
-    (tmp_path / "long.toml").write_text(document)
-    sizing = design(tmp_path / "long.toml").found
-    (sized,) = sizing.valves
-    assert (sized.works, sized.bottle) == (True, None)
-    # Equation (2): 4 N m / 14.51 cm^3 = 275.7 kPa, 39.98 psi above the atmosphere.
-    most = sizing.problem.torque_constant * (sized.pressure - ATMOSPHERE)
-    assert f"at most {most:.3g} N m of 4 N m" in suggestion_sentence(sizing)
-    assert "pressure.lowest = '40 psi_g'" in suggestion_sentence(sizing)
-    (tmp_path / "weak.toml").write_text(f'{document.replace("1.2 N m", "0.1 N m")}[pressure]\nhighest = "20 psi_g"\n')
-    (sized,) = design(tmp_path / "weak.toml").found.valves
-    assert not sized.works
-    # 20 psi give 137.9 kPa x 14.51 cm^3 = 2.001 N m: half of the peak.
-    assert sized.pressure == pytest.approx(ATMOSPHERE + 20.0 * 6894.757)
 
 
 def recorded_torques(sizing: Sizing) -> list[float]:
