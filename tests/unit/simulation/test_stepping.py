@@ -103,4 +103,4 @@ def test_a_run_that_diverges_is_over() -> None:
 
 def test_a_walk_on_a_bottle_is_refused() -> None:
     with pytest.raises(ppafo.ScenarioError, match="bottle"):
-        ppafo.start(ppafo.load_walk("solenoid", bottle="pipeline-jacpac-9oz"))
+        ppafo.start(ppafo.load_walk("solenoid", bottle="paper-co2-9oz"))
