@@ -5,13 +5,12 @@ import sys
 from typing import Any
 
 import pytest
-from ppafo.control.walking.timing import TimingParts, threshold_time
 
-from ppafo.control.controllers import pid, switching
-from ppafo.control.walking import assistance
+from ppafo.control.controllers import pid
 from ppafo.engine.package_key import package_key
 from ppafo.golden_bits import plain_batch
 from ppafo.model.binding import made_of
+from ppafo.model.controlled import OF_TORQUE, turned_round
 
 FOLDERS = ("control", "model", "signals")
 """Without the engine, of which the tests replace a function to count what is compiled."""
@@ -24,12 +23,9 @@ def test_every_scenario_of_the_package_has_a_key(name: str) -> None:
 
 
 def test_the_key_of_a_law_tells_what_its_parts_are() -> None:
-    frame = assistance.timed_phase
-    follows: Any = (pid.pid_update, switching.sliding_update)
-    laws = [made_of(frame, "timed", TimingParts(part, threshold_time)) for part in follows]
-    first: Any = threshold_time
-    other = made_of(frame, "timed", TimingParts(first, follows[0]))
-    keys = [package_key(law, FOLDERS) for law in (*laws, other)]
+    other: Any = pid.pid_update
+    parts = (OF_TORQUE, OF_TORQUE._replace(steered=turned_round), OF_TORQUE._replace(value=other))
+    keys = [package_key(made_of(pid.pid_update, "timed", each), FOLDERS) for each in parts]
     assert None not in keys
     assert len({key.words for key in keys if key is not None}) == 3
 
@@ -38,7 +34,7 @@ def test_a_law_with_a_part_from_elsewhere_has_no_key() -> None:
     def elsewhere(value: float) -> float:
         return value
 
-    made = made_of(assistance.timed_phase, "timed", TimingParts(elsewhere, threshold_time))  # type: ignore[arg-type]
+    made = made_of(pid.pid_update, "timed", OF_TORQUE._replace(steered=elsewhere))
     assert package_key(made, FOLDERS) is None
 
 
