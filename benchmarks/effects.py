@@ -21,13 +21,7 @@ from ppafo.simulation.plan import plan_run
 
 ON = (
     "effects.line_resistance.area=10 mm^2",
-    "effects.second_virial.share=1",
-    "effects.silencer.sonic_conductance=2e-8 m^3/(s Pa)",
-    "effects.ice.blockage_per_gas=100 1/kg",
-    "effects.leak_opening.pressure=30 kPa_d",
     "effects.laminar_leak.coefficient=1e-16 kg/(s Pa^2)",
-    "effects.spool_play.width=0.05",
-    "effects.coil_heating.steady_rise=60 K",
     "effects.seal_friction.dynamic_per_pressure=1e-7 N m/Pa",
     "effects.stribeck.velocity=0.1 rad/s",
     "effects.joint_load.drag=0.01 N m s^2/rad^2",

@@ -56,7 +56,7 @@ def truths(truth: Mapping[str, Any]) -> dict[str, float]:
         "friction.dynamic_torque": device["friction"]["dynamic_torque"],
         "valves.proportional.discharge_coefficient": valve["discharge_coefficient"],
         "valves.proportional.dead_band": valve["dead_band"],
-        "effects.spool_play.width": truth["preset"]["values"]["bench.hysteresis"],
+        "valve_map.hysteresis": truth["preset"]["values"]["bench.hysteresis"],
         "actuator.leak.area": actuator["leak"]["area"],
     }
 

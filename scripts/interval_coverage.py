@@ -65,8 +65,6 @@ DEPARTURES = {
     "whole stribeck": ("effects.stribeck.velocity=0.1 rad/s", "effects.stribeck.share=0.99"),
     "dead volume": ("actuator.dead_volume_1=70 cm^3", "actuator.dead_volume_2=70 cm^3"),
     "displacement per radian": ("actuator.displacement_per_radian=28 cm^3/rad",),
-    # Of the leak of the set, 0.3 mm^2, nobody would see in these recordings whether it opens.
-    "leak that opens": ("effects.leak_opening.pressure=150 kPa_d", "actuator.leak.area=1.5 mm^2"),
     "slew limit": ("valve.slew_limit=40 1/s",),
 }
 

@@ -86,12 +86,12 @@ FAULTS = (
     ),
     Fault(
         "gain of pressure_1 4 % high",
-        ("pressure_1 seems to be read",),
+        ("pressure_1 seems to read",),
         lambda one: read_with_gain(one, 1.04, "pressure_1"),
     ),
     Fault(
         "gain of both chambers 4 % high",
-        ("pressure_1 and pressure_2 seem to be read",),
+        ("pressure_1 and pressure_2 seem to read",),
         lambda one: read_with_gain(one, 1.04, *GAUGES),
     ),
     Fault(
@@ -117,9 +117,7 @@ FAULTS = (
         ("command seems to have the wrong sign",),
         lambda one: changed(one, command=-one["command"]),
     ),
-    Fault(
-        "gain of the angle 5 % high", ("angle seems to be read",), lambda one: changed(one, angle=1.05 * one["angle"])
-    ),
+    Fault("gain of the angle 5 % high", ("angle seems to read",), lambda one: changed(one, angle=1.05 * one["angle"])),
     Fault("leak 3 times", ("actuator.leak.",), device=("actuator.leak.area=0.9 mm^2",)),
     Fault("Cd of the valve 10 % low", ("valve.discharge_coefficient",), device=("valve.discharge_coefficient=0.1017",)),
     Fault("inertia 30 % high", ("foot_plate.inertia",), device=("foot_plate.inertia=0.01092 kg m^2",)),

@@ -1,9 +1,15 @@
 """The code that a page of the documents shows: its blocks as text, and a module of it as a package on the path."""
 
 import re
+import sys
 import textwrap
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
+
+from ppafo.model.catalog import EFFECTS
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -49,3 +55,14 @@ def write_package(folder: Path, module: str, text: str, entry_points: str) -> No
         line for group, names in groups.items() for line in (f"[{group}]", *(f"{a} = {b}" for a, b in names.items()))
     ]
     (about / "entry_points.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def with_the_effect_of_the_page(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Have the effect of the page on extensions on the path as an installer leaves it, and forget it afterwards."""
+    page = "how-to/extend.md"
+    write_package(folder, "my_effects.ice", block_with(page, "EFFECT = Effect"), block_with(page, "ppafo.effects"))
+    monkeypatch.syspath_prepend(folder)
+    yield
+    EFFECTS.pop("ice", None)
+    for name in [name for name in sys.modules if name.split(".")[0] == "my_effects"]:
+        del sys.modules[name]

@@ -42,7 +42,7 @@ def test_every_value_lies_inside_its_interval_or_is_flagged(bench: Path, found: 
         "friction.dynamic_torque": device["friction"]["dynamic_torque"],
         "valves.proportional.discharge_coefficient": device["valve"]["discharge_coefficient"],
         "valves.proportional.dead_band": device["valve"]["dead_band"],
-        "effects.spool_play.width": truth["preset"]["values"]["bench.hysteresis"],
+        "valve_map.hysteresis": truth["preset"]["values"]["bench.hysteresis"],
         "actuator.leak.area": device["actuator"]["leak"]["area"],
     }
     estimates = {item.path: item for item in found.estimates}

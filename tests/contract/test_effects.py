@@ -1,10 +1,9 @@
-"""An effect of another package is one file and one entry point: every door knows it by that."""
+"""The effect of the page, one file of another package and one entry point: every door knows it by that."""
 
 import ctypes
 import importlib.util
 import shutil
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from ppafo.cli.main import main
 from ppafo.engine.lanes import LaneBlock
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
+from ppafo.errors import SimulationError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import library_files
@@ -40,132 +40,126 @@ from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import walk
 from tests.built_once import shared_library
 from tests.modules_under_node import compared, drawn
-from tests.page_code import block_with, write_package
+from tests.page_code import with_the_effect_of_the_page
 from tests.reference.reference_solver import compare_with_reference
 
-AREA = "effects.mesh.area"
-NARROW = f"{AREA}=4 mm^2"
+GROWTH = "effects.ice.blockage_per_gas"
+ICE = (f"{GROWTH}=3e4 1/kg", "effects.ice.melting_time=30 ms")
 NAME, SHORT = "step-response", ("run.duration=0.3 s",)
 BOTTLE = "bottle.name=paper-co2-9oz"
-ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
-REAL = "effects.second_virial.share=1"
-PAGE = "how-to/extend.md"
+LINE = "effects.line_resistance.area=4 mm^2"
+MEANING = "blockage per gas that leaves, 0 for none"
 
 
 @pytest.fixture(autouse=True)
-def _forgotten() -> Iterator[None]:
-    known, modules = set(EFFECTS), set(sys.modules)
-    yield
-    for name in set(EFFECTS) - known:
-        del EFFECTS[name]
-    for name in set(sys.modules) - modules:
-        if name.split(".")[0] == "my_effects":
-            del sys.modules[name]
-
-
-@pytest.fixture(autouse=True)
-def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The package of the page, as an installer leaves it."""
-    module, entry_points = block_with(PAGE, "EFFECT = Effect"), block_with(PAGE, "ppafo.effects")
-    write_package(tmp_path / "site", "my_effects.mesh", module, entry_points)
-    monkeypatch.syspath_prepend(tmp_path / "site")
+    yield from with_the_effect_of_the_page(tmp_path / "site", monkeypatch)
 
 
-def slower(with_mesh: Any, without: Any) -> bool:
+BEFORE: Mapping[tuple[str, tuple[str, ...]], Mapping[str, str]] = {
+    (NAME, SHORT): {
+        "angle": "0x1.6d8e32c9ca8e6p+8",
+        "pressure_1": "0x1.f9cb29e2d3a9ap+26",
+        "pressure_2": "0x1.6ec98c81cbb9fp+26",
+        "vented_mass": "0x1.2f81f29c91ac8p-4",
+    },
+    ("torque-task-solenoid", ("motion.kind=free", "run.duration=0.5 s")): {
+        "angle": "0x1.eeba0513730ecp+9",
+        "pressure_1": "0x1.1788a4db1b6c6p+27",
+        "pressure_2": "0x1.c52be3b911bd2p+26",
+        "vented_mass": "0x1.0703c846a2205p-4",
+    },
+}
+"""Sums over recordings of runs with ice [SI], from the version of the package that had this effect built in."""
+
+
+@pytest.mark.parametrize(("name", "texts"), BEFORE)
+def test_the_file_of_the_page_has_the_numbers_of_the_effect_that_the_package_had(
+    name: str, texts: tuple[str, ...]
+) -> None:
+    found = simulate(load_scenario(name, (*texts, *ICE))).recording
+    assert {channel: float(found[channel].sum()).hex() for channel in BEFORE[name, texts]} == BEFORE[name, texts]
+
+
+def slower(iced: Any, without: Any) -> bool:
     """Whether chamber 2 keeps its pressure for longer than without."""
-    return bool(np.abs(with_mesh.recording["pressure_2"] - without.recording["pressure_2"]).max() > 1.0e3)
+    return bool(np.abs(iced.recording["pressure_2"] - without.recording["pressure_2"]).max() > 1.0e3)
 
 
 def test_it_is_set_as_any_number_is_and_found_only_then() -> None:
     without = simulate(load_scenario(NAME, SHORT))
-    assert "mesh" not in tuple(EFFECTS)
-    scenario = load_scenario(NAME, (*SHORT, NARROW))
-    assert scenario.device.effects["mesh"] == {"area": pytest.approx(4e-6), "discharge_coefficient": 0.6}
+    assert "ice" not in tuple(EFFECTS)
+    scenario = load_scenario(NAME, (*SHORT, *ICE))
+    assert scenario.device.effects["ice"] == {"blockage_per_gas": pytest.approx(3e4), "melting_time": 0.03}
     assert slower(simulate(scenario), without)
 
 
 def test_switched_off_it_leaves_every_bit_and_the_program_as_they_were() -> None:
     without = load_scenario(NAME, SHORT)
-    off = load_scenario(NAME, (*SHORT, f"{AREA}=0 mm^2"))
+    off = load_scenario(NAME, (*SHORT, f"{GROWTH}=0 1/kg"))
     assert batch_of(plan_run(off)).program == batch_of(plan_run(without)).program
     np.testing.assert_array_equal(simulate(off).recording["torque"], simulate(without).recording["torque"])
 
 
 def test_a_wrong_setting_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     for text, said in (
-        (
-            f"{AREA}=-1 mm^2",
-            "effects.mesh.area = -1 mm^2: must be at least 0 mm^2 and at most 10000 mm^2 (open area of the mesh, 0 for "
-            "none)",
-        ),
-        ("effects.mesh.aera=1 mm^2", "did you mean 'effects.mesh.area'?"),
-        ("effects.mash.area=1 mm^2", "no effect 'mash', did you mean 'mesh'?"),
-        ("effects.meshes:EFFECT.area=1 mm^2", "an effect is found by its entry point 'ppafo.effects' alone"),
-        (f"{AREA}=1 mm", "unit 'mm' does not fit"),
+        (f"{GROWTH}=-1 1/kg", f"must be at least 0 1/kg and at most 1e+06 1/kg ({MEANING})"),
+        ("effects.ice.blockage=1 1/kg", f"did you mean '{GROWTH}'?"),
+        ("effects.icy.blockage_per_gas=1 1/kg", "no effect 'icy', did you mean 'ice'?"),
+        ("effects.ices:EFFECT.melting_time=1 s", "an effect is found by its entry point 'ppafo.effects' alone"),
+        (f"{GROWTH}=1 mm", "unit 'mm' does not fit"),
     ):
         assert main(["simulate", "torque-task-solenoid", "--set", text]) == 2
         assert said in capsys.readouterr().err
 
 
 def test_a_column_of_it_has_the_bits_of_the_single_runs_and_splits_where_it_is_off() -> None:
-    areas = np.array([0.0, 4e-6, 0.0, 9e-6])
-    base = load_scenario(NAME, SHORT)
-    found = run_ensemble(base, {AREA: areas}, ["gas_vented"])
-    for area, gas in zip(areas, found.metrics["gas_vented"], strict=True):
-        alone = simulate(load_scenario(NAME, (*SHORT, f"{AREA}={float(area)!r} m^2")))
+    rates = np.array([0.0, 1e4, 0.0, 3e4])
+    base = load_scenario(NAME, (*SHORT, ICE[1]))
+    found = run_ensemble(base, {GROWTH: rates}, ["gas_vented"])
+    for rate, gas in zip(rates, found.metrics["gas_vented"], strict=True):
+        alone = simulate(load_scenario(NAME, (*SHORT, ICE[1], f"{GROWTH}={float(rate)!r} 1/kg")))
         assert gas == alone.metrics["gas_vented"].value
     assert len(set(found.metrics["gas_vented"])) == 3
 
 
 def test_the_schema_has_it_and_a_set_file_may_give_it() -> None:
-    assert "open area of the mesh, 0 for none" in str(json_schema())
+    assert MEANING in str(json_schema())
     shipped = (files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8")
-    given = '[effects.mesh.area]\nvalue = 3.0\nunit = "mm^2"\norigin = "datasheet"\nsource = "catalogue"\n'
+    given = f'[{GROWTH}]\nvalue = 0.3\nunit = "1/g"\norigin = "assumed"\nsource = "a trial"\n'
     device = build_device(parse_parameter_set(f"{shipped}\n{given}".encode(), "mine.toml"))
-    assert device.effects["mesh"]["area"] == pytest.approx(3e-6)
+    assert device.effects["ice"]["blockage_per_gas"] == pytest.approx(300.0)
 
 
 def test_it_can_be_fitted() -> None:
-    scenario = load_scenario(NAME, (*SHORT, NARROW))
-    assert declaration_of(AREA, scenario).unit == "m^2"
-    *_, row = plan_run(with_fitted(scenario, {AREA: 8e-6})).effects
-    assert row.resistance == pytest.approx(plan_run(scenario).effects[-1].resistance / 4.0)
+    scenario = load_scenario(NAME, (*SHORT, *ICE))
+    assert declaration_of(GROWTH, scenario).unit == "1/kg"
+    *_, row = plan_run(with_fitted(scenario, {GROWTH: 6e4})).effects
+    assert row.blockage_per_gas == pytest.approx(2.0 * plan_run(scenario).effects[-1].blockage_per_gas)
 
 
 def test_the_reference_solver_has_the_same_law() -> None:
     for name, motion in (("torque-task-solenoid", "motion.kind=free"), ("step-response", "valve.area=12 mm^2")):
-        agreement = compare_with_reference(plan_run(load_scenario(name, ("run.duration=0.3 s", motion, NARROW))))
+        agreement = compare_with_reference(plan_run(load_scenario(name, ("run.duration=0.3 s", motion, *ICE))))
         assert agreement.angle < 2e-4
         assert agreement.worst_pressure < 1e-3
 
 
-def test_a_linear_model_has_it_as_a_difference_of_two_runs_has() -> None:
-    venting = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s")
-    rates = [
-        linearise("torque-task-proportional", at=0.2, overrides=(*venting, text)).found.rates
-        for text in (f"{AREA}=0 mm^2", NARROW)
-    ]
-    step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
-    found = simulate(load_scenario("torque-task-proportional", (*venting, NARROW, *step))).recording
-    here = int(np.searchsorted(found.time, 0.2 - 1e-9))
-    slope = (found["pressure_1"][here + 20] - found["pressure_1"][here - 20]) / (40 * 1e-5)
-    assert rates[1][0] == pytest.approx(slope, rel=1e-3)
-    assert rates[0][0] != pytest.approx(slope, rel=0.1)
+def test_a_linear_model_refuses_an_effect_with_a_state_in_one_line() -> None:
+    with pytest.raises(SimulationError, match=r"effect 'ice' has state variables, .*switch the effect off"):
+        linearise("torque-task-proportional", at=0.2, overrides=("run.duration=0.3 s", *ICE))
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 @pytest.mark.parametrize("name", [NAME, "proportional"])
 def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: str, tmp_path: Path) -> None:
     is_walk = name == "proportional"
-    walked: Any = (
-        load_walk("proportional", [NARROW, *ICE, REAL])
-        if is_walk
-        else load_scenario(name, (*SHORT, NARROW, *ICE, REAL))
-    )
+    walked: Any = load_walk("proportional", list(ICE)) if is_walk else load_scenario(name, (*SHORT, *ICE))
     library = library_of(walked)
     places = {item.path: place for place, item in enumerate(library.settings)}
-    assert {AREA, "effects.mesh.discharge_coefficient"} <= set(places)
-    assert not any(path.startswith("effects.silencer.") for path in places)
+    assert {GROWTH, "effects.ice.melting_time"} <= set(places)
+    assert not any(path.startswith("effects.stribeck.") for path in places)
     for file, content in library_files(library).items():
         (tmp_path / file).write_bytes(content)
     source = tmp_path / f"{c_identifier(walked.name)}.c"
@@ -177,9 +171,6 @@ def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: 
     counts = np.zeros(len(COUNTS))
     built.prepare(*map(handed, (settings, found, states, counts)))
     assert found.tobytes() == batch.parameters[:, 0].tobytes()
-    rows = row_numbers(batch.program.state_rows())
-    for path in ("masses.mass_1", "masses.mass_2"):
-        assert batch.states[rows[path], 0] in states
 
 
 def handed(values: Any) -> Any:
@@ -192,14 +183,14 @@ def handed(values: Any) -> Any:
 )
 def test_a_unit_has_its_settings_and_the_bits_of_python(tmp_path: Path) -> None:
     fmpy = importlib.import_module("fmpy")
-    scenario = load_scenario(NAME, (*SHORT, NARROW, REAL))
+    scenario = load_scenario(NAME, (*SHORT, *ICE))
     ((file, content),) = functional_unit(closed_loop(scenario), 2, ["linux64"]).items()
     (tmp_path / file).write_bytes(content)
-    moved = simulate(load_scenario(NAME, (*SHORT, f"{AREA}=7e-06 m^2", REAL)))
+    moved = simulate(load_scenario(NAME, (*SHORT, f"{GROWTH}=10000.0 1/kg", ICE[1])))
     given = {
         "stop_time": scenario.run.duration,
         "step_size": scenario.run.output_interval,
-        "start_values": {AREA: 7e-6},
+        "start_values": {GROWTH: 1e4},
     }
     found = fmpy.simulate_fmu(
         str(tmp_path / file), output=["torque", "mass_1"], output_interval=scenario.run.output_interval, **given
@@ -210,24 +201,22 @@ def test_a_unit_has_its_settings_and_the_bits_of_python(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
 def test_the_page_has_its_words_and_the_bits_of_python() -> None:
-    module = module_of(load_scenario(NAME, (*SHORT, NARROW, *ICE, REAL)))
-    (entry,) = [item for item in module.description["settings"] if item["key"] == AREA]
-    assert entry["description"] == "open area of the mesh, 0 for none"
-    assert AREA not in setting_names(), "a page needs no words of its own for it"
+    module = module_of(load_scenario(NAME, (*SHORT, *ICE)))
+    (entry,) = [item for item in module.description["settings"] if item["key"] == GROWTH]
+    assert entry["description"] == MEANING
+    assert GROWTH not in setting_names(), "a page needs no words of its own for it"
     assert compared(NAME, module, drawn(module, 3))
 
 
 def test_it_walks() -> None:
-    texts = ((), (NARROW,), (NARROW, *ICE), (NARROW, *ICE, REAL))
-    without, narrow, iced, real = (walk(load_walk("proportional", given), minutes=0.1) for given in texts)
-    for one, other in ((narrow, without), (iced, narrow), (real, iced)):
-        assert one.status.is_completed
-        assert slower(one, other)
+    without, iced = (walk(load_walk("proportional", texts), minutes=0.1) for texts in ((), ICE))
+    assert iced.status.is_completed
+    assert slower(iced, without)
 
 
-def test_it_walks_on_a_bottle_and_follows_the_temperature_of_its_gas(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_effect_walks_on_a_bottle_and_follows_the_temperature_of_its_gas(monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[dict[str, float]] = []
-    names = list(row_numbers(plan_walk(load_walk("proportional", [NARROW, BOTTLE])).program.parameter_rows()))
+    names = list(row_numbers(plan_walk(load_walk("proportional", [LINE, BOTTLE])).program.parameter_rows()))
     passed_on = LaneBlock.set_parameters
 
     def watched(self: LaneBlock, rows: Sequence[int], values: Any) -> None:
@@ -235,11 +224,11 @@ def test_it_walks_on_a_bottle_and_follows_the_temperature_of_its_gas(monkeypatch
         passed_on(self, rows, values)
 
     monkeypatch.setattr(LaneBlock, "set_parameters", watched)
-    with_mesh = walk(load_walk("proportional", [NARROW, BOTTLE]), minutes=0.1)
-    assert with_mesh.status.is_completed
-    assert with_mesh.supply is not None
-    warmth = with_mesh.supply.values["gas_temperature"]
+    narrow = walk(load_walk("proportional", [LINE, BOTTLE]), minutes=0.1)
+    assert narrow.status.is_completed
+    assert narrow.supply is not None
+    warmth = narrow.supply.values["gas_temperature"]
     assert warmth.min() < 0.995 * warmth[0]
-    resistances = np.array([row["mesh.resistance"] for row in given])
+    resistances = np.array([row["line_resistance.resistance"] for row in given])
     np.testing.assert_allclose(resistances / resistances[0], warmth[: len(given)] / warmth[0], rtol=1e-12)
-    assert slower(with_mesh, walk(load_walk("proportional", [BOTTLE]), minutes=0.1))
+    assert slower(narrow, walk(load_walk("proportional", [BOTTLE]), minutes=0.1))

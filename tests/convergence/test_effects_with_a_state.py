@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import pytest
@@ -9,9 +10,12 @@ import pytest
 from ppafo.model.catalog import EFFECTS
 from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, PlantSnapshot, State
+from ppafo.model.ports import at_valve, opening_time
+from ppafo.model.valves.proportional import spool_position
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
+from tests.page_code import with_the_effect_of_the_page
 from tests.reference.reference_solver import compare_with_reference, solve_reference
 
 ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
@@ -22,6 +26,12 @@ VENTING = (
 )
 
 
+@pytest.fixture
+def _ice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    yield from with_the_effect_of_the_page(tmp_path, monkeypatch)
+
+
+@pytest.mark.usefixtures("_ice")
 def test_a_state_that_acts_on_the_gas_leaves_the_step_its_second_order() -> None:
     reference, errors = None, []
     for step in ("2 ms", "0.25 ms"):
@@ -32,6 +42,7 @@ def test_a_state_that_acts_on_the_gas_leaves_the_step_its_second_order() -> None
     assert errors[0] / errors[1] > 0.8 * 8**2
 
 
+@pytest.mark.usefixtures("_ice")
 def test_the_error_of_a_state_shortens_steps() -> None:
     run = plan_run(
         load_scenario("step-response", ("effects.ice.blockage_per_gas=1e6 1/kg", "effects.ice.melting_time=3 ms"))
@@ -97,3 +108,107 @@ def test_a_state_that_leaves_what_is_possible_ends_the_run_with_a_status() -> No
     result = simulate(load_scenario("step-response", ["effects.runaway.rate=1e5 1/s"]))
     assert not result.status.is_completed
     assert "diverged" in str(result.status)
+
+
+class Play(NamedTuple):
+    """Backlash [-] between command and spool."""
+
+    width: Annotated[float, Number("", "backlash", 0.0, 0.0, 0.5)]
+
+
+class Spool(NamedTuple):
+    """Command behind the backlash [-]."""
+
+    command: float = 0.0
+
+
+def behind_play(command: float, play: Play, play_state: Spool) -> float:
+    """Command [-] that the spool follows."""
+    return spool_position(play_state.command, at_valve(command), play.width)
+
+
+def drawn_along(_play: Play, _play_state: Spool, command: float) -> Spool:
+    """The spool after a new command, which ``at_valve`` has already put behind the backlash."""
+    return Spool(command)
+
+
+def moved(_play: Play, _play_state: Spool, _before: PlantSnapshot, after: PlantSnapshot, _step: float) -> Spool:
+    """The spool after a step."""
+    return Spool(after.command)
+
+
+def rests(_play: Play, _play_state: Spool, _now: PlantSnapshot) -> Spool:
+    """No rate: the spool moves at a new command only."""
+    return Spool(0.0)
+
+
+class Wear(NamedTuple):
+    """Slowing of the coil per gas supplied [1/kg]."""
+
+    slowing: Annotated[float, Number("1/kg", "slowing", 0.0, 0.0, 1e6)]
+
+
+class Worn(NamedTuple):
+    """Slowing so far [-]."""
+
+    slower: float = 0.0
+
+
+def later(time: float, is_coil_a: float, wear: Wear, wear_state: Worn) -> float:
+    """Opening time [s] of a coil."""
+    return opening_time(time, is_coil_a) * (1.0 + wear_state.slower)
+
+
+def worn(wear: Wear, wear_state: Worn, _before: PlantSnapshot, after: PlantSnapshot, step: float) -> Worn:
+    """The slowing after a step."""
+    return Worn(wear_state.slower + step * wear.slowing * after.supplied_flow)
+
+
+def wears(wear: Wear, _wear_state: Worn, now: PlantSnapshot) -> Worn:
+    """Its rate [1/s]."""
+    return Worn(wear.slowing * now.supplied_flow)
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "texts"),
+    [
+        (
+            Effect(
+                "play",
+                "Backlash.",
+                Play,
+                Play,
+                None,
+                ("width",),
+                {at_valve: behind_play},
+                state=State(Spool, None, moved, rests, settle=drawn_along),
+            ),
+            "torque-task-proportional",
+            ("effects.play.width=0.2", "motion.kind=free", "run.duration=0.3 s"),
+        ),
+        (
+            Effect(
+                "wear",
+                "Coils that slow.",
+                Wear,
+                Wear,
+                None,
+                ("slowing",),
+                {opening_time: later},
+                state=State(Worn, None, worn, wears),
+            ),
+            "torque-task-solenoid",
+            ("effects.wear.slowing=1e4 1/kg", "valve.opening_delay=5 ms", "run.duration=0.5 s"),
+        ),
+    ],
+    ids=["at_valve", "opening_time"],
+)
+def test_effects_of_others_on_command_and_coils_are_those_of_the_reference_solver(
+    effect: Effect, name: str, texts: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(EFFECTS, effect.name, effect)
+    run, plain = (plan_run(load_scenario(name, words)) for words in (texts, texts[1:]))
+    agreement = compare_with_reference(run)
+    assert agreement.angle < 2e-4
+    assert agreement.worst_pressure < 1e-3
+    assert compare_with_reference(plain, solve_reference(run)).worst_pressure > 2e-3

@@ -96,21 +96,10 @@ VANE_FEATURES: dict[str, Feature] = {
     "dead band": _feature("valve.dead_band=0.05", needs="valve"),
     "spool": _feature("valve.spool_frequency=40 Hz", "valve.spool_damping_ratio=0.5", needs="valve"),
     "slew": _feature("valve.slew_limit=30 1/s", needs="valve"),
-    "play": _feature("effects.spool_play.width=0.04", needs="valve"),
     "solenoid": _feature(*_SOLENOID, needs="valve law clock actuator"),
     "opening delays": _feature(
         *_SOLENOID,
         *("valve.opening_delay=3.3 ms", "valve.closing_delay=2 ms", "valve.switching_interval=7 ms"),
-        needs="valve law clock actuator",
-    ),
-    "coil heating": _feature(
-        *_SOLENOID,
-        *(
-            "valve.opening_delay=3.3 ms",
-            "effects.coil_heating.steady_rise=60 K",
-            "effects.coil_heating.time_constant=1 s",
-        ),
-        "effects.coil_heating.pull_in_share=0.5",
         needs="valve law clock actuator",
     ),
     "parts of steps": _feature("valve.area=150 mm^2", "run.tolerance=1e-4", needs="area"),
@@ -121,12 +110,6 @@ VANE_FEATURES: dict[str, Feature] = {
     "line resistance": _feature(
         "effects.line_resistance.area=6 mm^2", "effects.line_resistance.discharge_coefficient=0.6"
     ),
-    "second virial": _feature("effects.second_virial.share=1", "effects.second_virial.coefficient=-1e-5 m^3/mol"),
-    "silencer": _feature("effects.silencer.sonic_conductance=2e-9 m^3/(s Pa)", "initial.pressure_1=40 psi_g"),
-    "ice": _feature(
-        "effects.ice.blockage_per_gas=1e4 1/kg", "effects.ice.melting_time=30 ms", "initial.pressure_1=40 psi_g"
-    ),
-    "leak that opens": _feature("effects.leak_opening.pressure=3 psi_d", "effects.leak_opening.rise=2"),
     "laminar leak": _feature("effects.laminar_leak.coefficient=1e-16 kg/(s Pa^2)"),
     # The joint.
     "free": _feature(*_FREE, "motion.angular_velocity=100 deg/s", "motion.external_torque=1 N m", needs="motion"),
@@ -225,10 +208,8 @@ VANE_FEATURES: dict[str, Feature] = {
 WALK_FEATURES: dict[str, Feature] = {
     "late command": _feature("valve.delay=5 ms", needs="valve"),
     "spool": _feature("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", needs="valve"),
-    "play": _feature("effects.spool_play.width=0.04", needs="valve"),
     "thermal gas": _feature(*_THERMAL),
     "supply lines": _feature(*_LINES),
-    "ice": _feature("effects.ice.blockage_per_gas=1e4 1/kg", "effects.ice.melting_time=30 ms"),
     "joint load": _feature("effects.joint_load.drag=0.01 N m s^2/rad^2", "effects.joint_load.stiffness=1 N m/rad"),
     "noise": _feature(
         *(
@@ -344,13 +325,13 @@ SHORT = (
     Case("late totals", "short", "step-response", ("run.duration=50 ms", "controller.rate=7 Hz")),
     _chosen(VANE_BASE, "cascade", "late sensors", "late command", "cylinder", "thermal gas"),
     _chosen(VANE_BASE, "difference", "supply lines", "bandwidth", "samples between steps", "parts of steps"),
-    _chosen(VANE_BASE, "opening delays", "coil heating", "noise", "resolution"),
-    _chosen(VANE_BASE, "joint load", "Stribeck", "seal friction", "play", "sensors late by parts of a step"),
-    _chosen(VANE_BASE, "leg of a gait", "ice", "silencer"),
-    _chosen(VANE_BASE, "prescribed", "second virial", "line resistance", "records between steps"),
+    _chosen(VANE_BASE, "opening delays", "noise", "resolution"),
+    _chosen(VANE_BASE, "joint load", "Stribeck", "seal friction", "sensors late by parts of a step"),
+    _chosen(VANE_BASE, "leg of a gait"),
+    _chosen(VANE_BASE, "prescribed", "line resistance", "records between steps"),
     _chosen(VANE_BASE, "bladder", "slew", "dead band", "damped", "smooth"),
-    _chosen(VANE_BASE, "muscle pair", "hysteresis", "leak that opens", "laminar leak", "relieving regulators"),
-    _chosen(WALK_BASE, "late command", "noise", "lost samples", "ice"),
+    _chosen(VANE_BASE, "muscle pair", "hysteresis", "laminar leak", "relieving regulators"),
+    _chosen(WALK_BASE, "late command", "noise", "lost samples"),
     _chosen(WALK_BASE, "spool", "bandwidth", "resolution", "thermal gas"),
 )
 """Twelve cases in which most of what has a state, a history or a clock meets something else."""

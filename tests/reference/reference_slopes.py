@@ -12,7 +12,6 @@ from ppafo.engine.groups import Role, rows_of
 from ppafo.engine.linking import link_program
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
-from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import NoParameters
 from ppafo.model.binding import made_of
@@ -25,7 +24,6 @@ from ppafo.model.plant import (
     PlantParameters,
     ThermalParameters,
     admitted_flow,
-    chamber_volumes,
 )
 from ppafo.model.ports import exhaust_path, leakage_path, supply_path
 
@@ -57,25 +55,6 @@ class ThermalGasRates(NamedTuple):
     supplied: float
     vented: float
     leaked: float
-
-
-def real_gas_rates(
-    plant: PlantParameters,
-    angle: float,
-    angular_velocity: float,
-    flow_1: float,
-    flow_2: float,
-    content_1: float,
-    content_2: float,
-) -> tuple[float, float]:
-    """Rates of both contents [kg/s] of gas that is not ideal, from the flows into its chambers. Equation (3)."""
-    volume_1, volume_2 = chamber_volumes(plant, angle)
-    # The chambers are opposite: what one gains in volume the other loses.
-    growth = plant.displacement_per_radian * angular_velocity
-    return (
-        content_rate(content_1, volume_1, growth, flow_1),
-        content_rate(content_2, volume_2, -growth, flow_2),
-    )
 
 
 def gas_rates(
@@ -295,10 +274,7 @@ def gas_lines(program: Program, add: Callable[..., str]) -> list[str]:
     orifices = "valve_orifice, leak_orifice, openings"
     if not program.is_thermal:
         rates = f"gas = {add(gas_rates)}(plant, {orifices}, pressure_1, pressure_2)"
-        if not program.has_true_masses:
-            return [rates, "slopes[2] = gas.mass_1", "slopes[3] = gas.mass_2"]
-        moved = f"{add(real_gas_rates)}(plant, angle, rate, gas.mass_1, gas.mass_2, y[2], y[3])"
-        return [rates, f"slopes[2], slopes[3] = {moved}"]
+        return [rates, "slopes[2] = gas.mass_1", "slopes[3] = gas.mass_2"]
     given = "(y[2], y[3]), (y[7], y[8]), angle, rate"
     rates_of = add(made_of(thermal_gas_rates, "thermal_gas_rates", program.functions))
     return [

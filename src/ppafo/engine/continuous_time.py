@@ -11,7 +11,6 @@ from ppafo.engine.in_python import in_program
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.pneumatics import StageFlows, plant_with_leak_at, stage_flows
-from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.plant import (
@@ -87,15 +86,10 @@ def flows_at(plant: PlantParameters, openings: Openings, pressure_1: float, pres
 def isothermal_rates(
     plant: PlantParameters, openings: Openings, at: _TurningChambers, pressure_1: float, pressure_2: float
 ) -> GasRates:
-    """Rates of isothermal gas, ideal or real, at absolute pressures [Pa]. Equations (3), (9)."""
+    """Rates of isothermal gas at absolute pressures [Pa]. Equations (3), (9)."""
     in_1, in_2, leak = flows_at(plant, openings, pressure_1, pressure_2)
     supplied = in_1.from_source + in_2.from_source
-    content_1 = chamber_mass(pressure_1, at.now.volume_1, plant.gas_product)
-    content_2 = chamber_mass(pressure_2, at.now.volume_2, plant.gas_product)
-    # Flows are true masses; where the gas is not ideal its content grows by another amount.
-    gained_1 = content_rate(content_1, at.now.volume_1, at.growth_1, in_1.total - leak)
-    gained_2 = content_rate(content_2, at.now.volume_2, at.growth_2, in_2.total + leak)
-    rate_1, rate_2 = pressure_rates(plant, at, pressure_1, pressure_2, gained_1, gained_2)
+    rate_1, rate_2 = pressure_rates(plant, at, pressure_1, pressure_2, in_1.total - leak, in_2.total + leak)
     return GasRates(
         pressure_1=rate_1,
         pressure_2=rate_2,

@@ -23,7 +23,7 @@ from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect, State
 from ppafo.model.plant import ActuatorFunctions, PlantState
-from ppafo.model.ports import exhaust_path, gas_density, ideal_density, leakage_path, supply_path
+from ppafo.model.ports import exhaust_path, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY, WALK, MeterKind, ReferenceSummary
@@ -41,12 +41,8 @@ class GasPhases(Protocol):
         """True if the gas has an energy balance."""
 
     @property
-    def HAS_TRUE_MASSES(self) -> bool:  # noqa: N802
-        """True if true masses are stored in addition to the masses in ``PlantState``."""
-
-    @property
     def START(self) -> Callable[..., Any] | None:  # noqa: N802
-        """Function ``START(plant, initial, parts=functions)`` for the initial gas state; None without a gas state."""
+        """Function of the initial ``PlantState`` for the initial gas state; None without a gas state."""
 
     def groups(self, parts: "Program") -> Groups:
         """Return the groups of numbers of this kind of gas."""
@@ -70,7 +66,7 @@ class GasPhases(Protocol):
         """Return the pressure error due to a relative opening change ``shift``, divided by the allowed error [-]."""
 
     def add(self, parts: "Program", lane: "Lane") -> None:
-        """Set ``lane.fed``, the state with the gas of the step, and ``lane.warmed``, the true masses if any."""
+        """Set ``lane.fed``, the state with the gas of the step, and ``lane.warmed``, the masses of thermal gas."""
 
     def move(self, parts: "Program", lane: "Lane", state: PlantState, assumed: float, reached: float) -> PlantState:
         """Return the state for the angle reached [rad] instead of the assumed angle [rad]."""
@@ -195,8 +191,8 @@ class Program:
 
     @property
     def stated_at_ports(self) -> dict[str, State]:
-        """States of effects used by laws that act on flows and gas, by effect name."""
-        ports = (supply_path, exhaust_path, leakage_path, gas_density, ideal_density)
+        """States of effects used by laws that act on flows, by effect name."""
+        ports = (supply_path, exhaust_path, leakage_path)
         laws = [(effect, effect.laws[port]) for effect in self.effects for port in ports if port in effect.laws]
         asked = {effect.name for effect, law in laws if effect.state_name in law.__code__.co_varnames}
         return {name: kind for name, kind in self.stated.items() if name in asked}
@@ -215,11 +211,6 @@ class Program:
     def is_thermal(self) -> bool:
         """True if the gas has an energy balance."""
         return self.gas.IS_THERMAL
-
-    @property
-    def has_true_masses(self) -> bool:
-        """True if true masses of the gas are stored in addition to the masses in ``PlantState``."""
-        return self.gas.HAS_TRUE_MASSES
 
     @property
     def walks(self) -> bool:
@@ -323,7 +314,7 @@ class Program:
     @property
     def keeps_volumes(self) -> bool:
         """True if the chamber volumes of a locked joint are computed only once."""
-        return self.is_locked and not (self.has_true_masses or self.feed is not None or self.actuator.gives)
+        return self.is_locked and not (self.is_thermal or self.feed is not None or self.actuator.gives)
 
     @property
     def hands_chambers_on(self) -> bool:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.groups import Role, filled, rows_of
-from ppafo.engine.in_python import functions_of
 from ppafo.engine.lanes import Batch, BatchResult, Clock, effort_for, load_programs, run_blocks
 from ppafo.engine.program import Program, place_of_group
 from ppafo.engine.rows import of_each, row_numbers
@@ -228,20 +227,9 @@ def _alike_together(run: Run, runs: int, members: Members) -> Members:
 
 
 def gas_at_start(run: Run) -> Any:
-    """Return the initial gas state beyond ``PlantState``, such as true masses; arrays (runs,) if the run has arrays."""
-    program, start = run.program, run.program.gas.START
-    if start is None:
-        return NoParameters()
-    if not program.effects:
-        return start(run.plant, run.initial, parts=program.functions)
-    rows: dict[str, Any] = {}
-    own = functions_of(program, rows).of(start)
-
-    def started(plant: Any, initial: Any, *effects: Any) -> Any:
-        rows.update(zip((effect.name for effect in program.effects), effects, strict=True))
-        return own(plant, initial, parts=program.functions)
-
-    return of_each(started, run.plant, run.initial, *run.effects)
+    """Return the initial gas state beyond ``PlantState``, the true masses; arrays (runs,) if the run has arrays."""
+    start = run.program.gas.START
+    return NoParameters() if start is None else start(run.initial)
 
 
 def states_at_start(run: Run) -> list[Any]:

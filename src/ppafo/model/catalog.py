@@ -43,13 +43,7 @@ EFFECTS: Kinds[Effect] = Kinds(
     {
         "restitution": restitution.EFFECT,
         "line_resistance": "ppafo.model.effects.line_resistance:EFFECT",
-        "second_virial": "ppafo.model.effects.second_virial:EFFECT",
-        "silencer": "ppafo.model.effects.silencer:EFFECT",
-        "ice": "ppafo.model.effects.ice:EFFECT",
-        "leak_opening": "ppafo.model.effects.leak_opening:EFFECT",
         "laminar_leak": "ppafo.model.effects.laminar_leak:EFFECT",
-        "spool_play": "ppafo.model.effects.spool_play:EFFECT",
-        "coil_heating": "ppafo.model.effects.coil_heating:EFFECT",
         "joint_load": "ppafo.model.effects.joint_load:EFFECT",
         "seal_friction": "ppafo.model.effects.seal_friction:EFFECT",
         "stribeck": "ppafo.model.effects.stribeck:EFFECT",

@@ -1,8 +1,7 @@
 """Gases: constants of orifice flow, and energy balance of a gas that is not isothermal.
 
 The energy of a chamber changes by the enthalpy of the inflow and outflow, the work of the moving wall and the heat
-through the wall: ``dE/dt = sum of m_dot h_up - P dV/dt + h A (T_wall - T)``. A real gas is in
-``effects/second_virial.py``.
+through the wall: ``dE/dt = sum of m_dot h_up - P dV/dt + h A (T_wall - T)``.
 """
 
 import math
@@ -36,6 +35,9 @@ SPECIES: dict[str, _Species] = {
         _Species("He", MOLAR_MASSES["He"], 1.667, _WEBBOOK),
     )
 }
+
+SECOND_VIRIAL = {"CO2": -123.0e-6, "air": -7.4e-6, "N2": -4.5e-6, "He": 11.8e-6}
+"""Second virial coefficient [m^3/mol] at 298 K of every gas that a set can name; J. H. Dymond and E. B. Smith, 1980."""
 
 
 def specific_gas_constant(universal_gas_constant: float, molar_mass: float) -> float:

@@ -95,13 +95,6 @@ class ThermalState(NamedTuple):
     gas_work: float
 
 
-class TrueMasses(NamedTuple):
-    """True masses of a real gas in both chambers [kg]; ``PlantState`` has masses of an ideal gas at its pressure."""
-
-    mass_1: float
-    mass_2: float
-
-
 class ActuatorFunctions(NamedTuple):
     """Functions of an actuator, as parts of stepping, measuring and recording; SI units, first argument a plant."""
 

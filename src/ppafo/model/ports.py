@@ -62,13 +62,3 @@ def load_torque(torque: float, angle: float, rate: float) -> float:
     as is the weight of the foot plate; the rest is a drag.
     """
     return torque
-
-
-def gas_density(density: float) -> float:
-    """Density [kg/m^3] of the gas in a chamber, given the density of an ideal gas at its pressure. Equation (3)."""
-    return density
-
-
-def ideal_density(density: float) -> tuple[float, float]:
-    """Inverse of ``gas_density`` [kg/m^3], and its derivative with respect to the density [-]. Equation (3)."""
-    return density, 1.0

@@ -110,10 +110,7 @@ def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:
         flow=Flow(**read("flow", declaration.FLOW)),
         valve_name=name,
         joint=parameter_set.joint,
-        effects={
-            effect: read(EFFECTS[effect].section, EFFECTS[effect].quantities_in(species))
-            for effect in sorted(named_effects)
-        },
+        effects={effect: read(EFFECTS[effect].section, EFFECTS[effect].quantities) for effect in sorted(named_effects)},
         links=links,
         units=parameter_set.shown,
     )

@@ -110,23 +110,22 @@ def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
 
 
 def quantities(
-    valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name, species: str = "", has_one_chamber: bool = False
+    valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name, has_one_chamber: bool = False
 ) -> Mapping[str, Quantity]:
-    """Return the declarations of all numbers by path, given valve kinds by name, actuator and gas."""
+    """Return the declarations of all numbers by path, given valve kinds by name, and the actuator."""
     # Effects are part of the key: another package's may be loaded between two calls.
-    return _by_path(tuple(valve_kinds.items()), actuator_kind, species, has_one_chamber, device_effects())
+    return _by_path(tuple(valve_kinds.items()), actuator_kind, has_one_chamber, device_effects())
 
 
 @functools.lru_cache(maxsize=32)
 def _by_path(
     valve_kinds: tuple[tuple[str, str], ...],
     actuator_kind: str,
-    species: str,
     has_one_chamber: bool,
     effects: tuple[Effect, ...],
 ) -> Mapping[str, Quantity]:
     sections = [(section, members(section, actuator_kind)) for section in SECTIONS]
-    sections += [(effect.section, effect.quantities_in(species)) for effect in effects]
+    sections += [(effect.section, effect.quantities) for effect in effects]
     for name, kind in valve_kinds:
         sections.append((f"valves.{name}", ORIFICE + VALVES[kind].quantities))
         sections.append((f"reported.valves.{name}", REPORTED_OF_A_VALVE))

@@ -25,7 +25,7 @@ def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS)
     if effect.section in others or effect.always:
         section = others[effect.section] if effect.section in others else getattr(device, effect.section)
         return {quantity.name: getattr(section, quantity.name) for quantity in effect.quantities}
-    return {**effect.defaults(device.gas.species), **device.effects.get(effect.name, {})}
+    return {**effect.defaults(), **device.effects.get(effect.name, {})}
 
 
 def all_settings(device: Device) -> dict[str, dict[str, Any]]:

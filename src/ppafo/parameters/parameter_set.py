@@ -13,7 +13,7 @@ from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import SPECIES_PATH, alternatives, fits, is_within, quantities, range_rule
+from ppafo.parameters.declaration import alternatives, fits, is_within, quantities, range_rule
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
     DISPLACEMENT_PATH,
@@ -136,9 +136,7 @@ class ParameterSet:
 
     def declarations(self) -> Mapping[str, Quantity]:
         """Return the declarations of all numbers that this set may contain, by path."""
-        species = self.texts.get(SPECIES_PATH)
-        name = "" if species is None else species.value
-        return quantities(self.valve_kinds, self.actuator_kind, name, self.has_one_chamber)
+        return quantities(self.valve_kinds, self.actuator_kind, self.has_one_chamber)
 
     @property
     def has_one_chamber(self) -> bool:

@@ -15,9 +15,9 @@ from ppafo.constants import PASCALS_PER_PSI
 from ppafo.documents.json_text import fields_of, plain
 from ppafo.errors import ParameterError, SimulationError
 from ppafo.model.catalog import VALVES
-from ppafo.model.effects.spool_play import spool_position
 from ppafo.model.gas import temperature_flow_factor
 from ppafo.model.orifice import exact_flow
+from ppafo.model.valves.proportional import spool_position
 from ppafo.parameters.device import VANE, Device, SonicOrifice
 from ppafo.parameters.loading import load_device, load_parameter_set
 from ppafo.parameters.overrides import read_overrides

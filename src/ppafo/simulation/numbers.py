@@ -140,12 +140,10 @@ def of_its_chambers(by_path: Mapping[str, _Item], device: Device) -> dict[str, _
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a device, by path; both forms of each orifice."""
-    kind, species = device.actuator.kind, device.gas.species
+    kind = device.actuator.kind
     declared = [(section, quantity) for section in _DEVICE_SECTIONS for quantity in members(section, kind)]
     declared += [("actuator.leak", quantity) for quantity in ORIFICE]
-    declared += [
-        (effect.section, quantity) for effect in device_effects() for quantity in effect.quantities_in(species)
-    ]
+    declared += [(effect.section, quantity) for effect in device_effects() for quantity in effect.quantities]
     declared += [("valve", quantity) for quantity in (*ORIFICE, *VALVES[device.valve.kind].quantities)]
     return of_its_chambers({f"{section}.{quantity.name}": quantity for section, quantity in declared}, device)
 

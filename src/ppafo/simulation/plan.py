@@ -4,7 +4,7 @@ The formulas are pure functions of one run or of columns of runs: Python plans w
 them in C.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,11 +25,9 @@ from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import Problem, at, choose, first, larger, over_runs, rounded_up, smaller, truncated, whole
 from ppafo.model.controlled import OF_TORQUE, TORQUE, error_functions
-from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass
-from ppafo.model.ports import gas_density
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
@@ -167,30 +165,13 @@ def compose_run(
     )
 
 
-def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
-    """Return the gas phases of a gas model; ScenarioError for a density effect that a component does not support."""
-    density_effect = next((effect for effect in effects if gas_density in effect.laws), None)
-    if density_effect is None and components.thermal is None:
+def _gas(components: Components) -> GasPhases:
+    """Return the gas phases of a gas model."""
+    if components.thermal is None:
         return isothermal
-    if density_effect is None:
-        from ppafo.engine.step import energy_balance  # most runs keep their temperature
+    from ppafo.engine.step import energy_balance  # most runs keep their temperature
 
-        return energy_balance
-    actuator_kind = components.device.actuator.kind
-    unsupported = {
-        "gas_model.kind=thermal": components.thermal is not None,
-        "[supply_line]": components.supply_lines is not None,
-        f"actuator.kind={actuator_kind}": ACTUATORS[actuator_kind].model.shape is not None,
-    }
-    for component, is_present in unsupported.items():
-        if is_present:
-            off = " and ".join(f"{density_effect.section}.{name}=0" for name in density_effect.switch)
-            raise ScenarioError(
-                f"effect '{density_effect.name}' cannot be combined with {component}; omit {component}, or set {off}"
-            )
-    from ppafo.engine.step import not_ideal  # most runs have ideal gas
-
-    return not_ideal
+    return energy_balance
 
 
 def _program(components: Components, grid: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
@@ -218,7 +199,7 @@ def _program(components: Components, grid: TimeGrid, walk: Walk | None, has_dela
         ideal_sensors=components.has_ideal_sensors,
         late_commands=has_delay,
         late_signals=first(components.signal_delay) > 0.0,
-        gas=_gas(components, effects),
+        gas=_gas(components),
         leg=leg,
         takes_task_sequence=walk is not None and walk.task_sequence is not None,
         feed=feed,

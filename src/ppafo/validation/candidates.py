@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
@@ -254,13 +253,6 @@ class _UnknownEffect(NamedTuple):
 
 _EFFECTS = (
     _UnknownEffect(
-        name="leak_opening",
-        words="the leak seems to open at {:.3g} Pa",
-        scaled=("pressure",),
-        range=(1e3, 2e5),
-        constant={"rise": 0.3},
-    ),
-    _UnknownEffect(
         name="stribeck",
         words="friction seems to be higher up to {:.2g} rad/s (Stribeck)",
         scaled=("velocity",),
@@ -272,19 +264,6 @@ _EFFECTS = (
         words="friction seems to grow with pressure by {:.2g} N m/Pa",
         scaled=("static_per_pressure", "dynamic_per_pressure"),
         range=(1e-8, 5e-6),
-    ),
-    _UnknownEffect(
-        name="second_virial",
-        words="the gas seems to have {:.2g} times the virial coefficient of CO2",
-        scaled=("share",),
-        range=(0.05, 8.0),
-        constant={"coefficient": SECOND_VIRIAL["CO2"]},
-    ),
-    _UnknownEffect(
-        name="spool_play",
-        words="the spool seems to have a play of {:.2g} of full command",
-        scaled=("width",),
-        range=(0.005, 0.4),
     ),
 )
 _SIZES_OF_AN_EFFECT = 5

@@ -20,7 +20,6 @@ from ppafo.engine.step import (
     isothermal,
     lines,
     meters,
-    not_ideal,
     phases,
     sample,
     stated,
@@ -30,9 +29,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.translation.c99 import program_source
 
-MODULES: list[ModuleType] = [
-    *(energy_balance, foot, isothermal, lines, meters, not_ideal, phases, sample, stated, walk)
-]
+MODULES: list[ModuleType] = [*(energy_balance, foot, isothermal, lines, meters, phases, sample, stated, walk)]
 
 
 def functions() -> list[tuple[str, Callable[..., Any]]]:

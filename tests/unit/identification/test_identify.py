@@ -154,7 +154,6 @@ def test_every_planted_value_gets_into_the_new_set_with_interval_and_origin(solv
         "friction.dynamic_torque",
         "valves.proportional.discharge_coefficient",
         "valves.proportional.dead_band",
-        "effects.spool_play.width",
         "actuator.leak.area",
     }
     entry = new.numbers["actuator.leak.area"]

@@ -7,11 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.errors import ArgumentError, ParameterError
-from ppafo.model.catalog import EFFECTS
-from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters import apply_overrides, load_device, load_parameter_set
 from ppafo.parameters.device import Orifice
-from ppafo.parameters.effects import settings_of
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import number_in_si
 
@@ -128,20 +125,6 @@ def test_a_number_of_a_gas_that_is_given_counts_before_and_after_the_gas(text: s
     plain = load_device("ppafo2011", overrides=("gas.species=N2",)).gas
     assert after != plain
     assert (after.species, before.molar_mass) in (("N2", 0.028), ("N2", plain.molar_mass))
-
-
-@pytest.mark.parametrize("gas", ["CO2", "air", "N2", "He"])
-def test_second_virial_coefficient_is_that_of_the_gas_unless_it_is_given(gas: str) -> None:
-    on, given = "effects.second_virial.share=1", "effects.second_virial.coefficient=-5 cm^3/mol"
-    words = (f"gas.species={gas}",)
-    effect = EFFECTS["second_virial"]
-
-    def coefficient(*overrides: str) -> float:
-        found: float = settings_of(load_device("ppafo2011", overrides=overrides), effect)["coefficient"]
-        return found
-
-    assert coefficient(on, *words) == coefficient(*words, on) == coefficient(*words) == SECOND_VIRIAL[gas]
-    assert coefficient(on, given, *words) == coefficient(*words, given) == pytest.approx(-5e-6)
 
 
 def test_an_unknown_gas_names_the_nearest() -> None:

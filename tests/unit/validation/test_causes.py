@@ -158,7 +158,12 @@ def test_a_valve_of_the_model_that_is_too_slow_is_not_taken_out_as_sensors_that_
 
 
 def test_an_effect_is_named_where_no_number_does_the_same(bench: Recording) -> None:
-    words = ["motion.kind=free", "run.duration=0.2 s", "effects.second_virial.share=1"]
+    words = [
+        "motion.kind=free",
+        "run.duration=0.2 s",
+        "effects.seal_friction.static_per_pressure=1e-6 N m/Pa",
+        "effects.seal_friction.dynamic_per_pressure=1e-6 N m/Pa",
+    ]
     run = simulate(load_scenario("step-response", words)).recording
     random = np.random.default_rng(9)
     seen = bench
@@ -166,7 +171,7 @@ def test_an_effect_is_named_where_no_number_does_the_same(bench: Recording) -> N
         seen = with_channel(seen, name, run[name] + size * random.standard_normal(len(run)))
     found = causes(seen).found
     assert found is not None
-    assert found.name == "second_virial"
+    assert found.name == "seal_friction"
 
 
 def test_what_sensors_of_any_bench_are_off_by_is_no_disagreement(bench: Recording) -> None:

@@ -35,7 +35,6 @@ from ppafo.engine.scheme.pneumatics import (
 )
 from ppafo.model.gas import enthalpy_flow_ratio, mass_flow_ratio
 from ppafo.model.plant import (
-    ActuatorFunctions,
     PlantParameters,
     PlantState,
     PortFlow,
@@ -614,12 +613,7 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
     return masses._replace(gas_work=masses.gas_work + work)
 
 
-def masses_at_start(
-    _plant: PlantParameters,
-    initial: PlantState,
-    *,
-    parts: ActuatorFunctions,  # noqa: ARG001 - those of a gas that is not ideal need them
-) -> ThermalState:
+def masses_at_start(initial: PlantState) -> ThermalState:
     """Initial gas masses [kg] at the reference temperature, equal to the masses in the plant state, and zero totals."""
     return ThermalState(
         mass_1=initial.mass_1,

@@ -8,7 +8,6 @@ from ppafo.engine.step.lane import Lane
 from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
 
 IS_THERMAL = True
-HAS_TRUE_MASSES = True
 START = thermal_gas.masses_at_start
 
 

@@ -10,7 +10,6 @@ from ppafo.engine.step.lane import Lane
 from ppafo.model.plant import PlantState
 
 IS_THERMAL = False
-HAS_TRUE_MASSES = False
 START = None
 
 
@@ -41,9 +40,7 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
 
 
 def moving(parts: Program, lane: Lane) -> MovingGas:
-    """Return the first stage with moving volumes, without the additional data for supply lines or real gas."""
-    if parts.has_true_masses:
-        return lane.real_gas.moving
+    """Return the first stage with moving volumes, without the additional data for supply lines."""
     return lane.moving_gas if parts.feed is None else lane.fed_gas.chambers
 
 

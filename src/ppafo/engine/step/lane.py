@@ -17,7 +17,6 @@ if TYPE_CHECKING:  # a lane is of these, and makes none of them
         StageFlows,
         StillGas,
     )
-    from ppafo.engine.scheme.real_gas import RealChange, RealGas
     from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
     from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
     from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
@@ -118,7 +117,7 @@ class Lane:
     result: LaneResult
     pace: "StepControl"  # the length that the error of the last part allows the next one
     state: "PlantState"
-    masses: Any  # true masses, of gas that is not isothermal and ideal
+    masses: Any  # true masses, of gas that is not isothermal
     valve_state: Any
     controller_state: Any
     walk: "WalkState"
@@ -145,13 +144,11 @@ class Lane:
     still_gas: "StillGas"  # first stage of the gas, by its kind: fixed volumes,
     moving_gas: "MovingGas"  # moving volumes,
     thermal_gas: "ThermalGas"  # energy balance,
-    real_gas: "RealGas"  # real gas,
     fed_gas: "FedGas"  # behind supply lines,
     fed_thermal_gas: "FedThermalGas"  # behind them with an energy balance
     passing: "StageFlows"  # flows at the pressures to which the first stage leads
     change: "GasChange"  # what the step adds to the gas, by its kind
     thermal_change: "ThermalFlows"
-    real_change: "RealChange"
     next_lines: "LineState"  # lines at the end of a part
     gas_error: float  # of the pressures over what is allowed
     slid: "PartSlide"  # an unconstrained vane at the end of a part without an event,

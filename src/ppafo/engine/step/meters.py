@@ -74,13 +74,13 @@ def temperature_of_chamber_2(parts: Program, lane: Lane) -> float:
 
 
 def gas_sample(parts: Program, lane: Lane) -> GasSample:
-    """Gas masses in the chambers and totals [kg]; true masses for real gas and for gas with an energy balance."""
+    """Gas masses in the chambers and totals [kg]; true masses for gas with an energy balance."""
     return GasSample(
         supplied_mass=lane.state.supplied_mass,
         vented_mass=lane.state.vented_mass,
         leaked_mass=lane.state.leaked_mass,
-        mass_1=lane.masses.mass_1 if parts.has_true_masses else lane.state.mass_1,
-        mass_2=lane.masses.mass_2 if parts.has_true_masses else lane.state.mass_2,
+        mass_1=lane.masses.mass_1 if parts.is_thermal else lane.state.mass_1,
+        mass_2=lane.masses.mass_2 if parts.is_thermal else lane.state.mass_2,
     )
 
 

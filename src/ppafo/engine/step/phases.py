@@ -311,7 +311,7 @@ def rests(parts: Program, lane: Lane) -> bool:
 def has_gas(parts: Program, lane: Lane) -> bool:
     """Return whether all masses at the end of the step are positive."""
     found = lane.after.mass_1 > 0.0 and lane.after.mass_2 > 0.0
-    if parts.has_true_masses:
+    if parts.is_thermal:
         found = found and lane.warmed.mass_1 > 0.0 and lane.warmed.mass_2 > 0.0
     if parts.feed is not None:
         found = found and lane.next_lines.mass_1 > 0.0 and lane.next_lines.mass_2 > 0.0
@@ -322,7 +322,7 @@ def is_possible(parts: Program, lane: Lane) -> bool:
     """Return whether the state at the end of the step is physically possible."""
     least = min(lane.after.mass_1, lane.after.mass_2)
     most = max(lane.after.mass_1, lane.after.mass_2)
-    if parts.has_true_masses:
+    if parts.is_thermal:
         least = min(lane.after.mass_1, lane.after.mass_2, lane.warmed.mass_1, lane.warmed.mass_2)
         most = max(lane.after.mass_1, lane.after.mass_2, lane.warmed.mass_1, lane.warmed.mass_2)
     possible = abs(lane.after.angular_velocity) < IMPOSSIBLE_RATE and least > 0.0 and most < IMPOSSIBLE_MASS
@@ -332,7 +332,7 @@ def is_possible(parts: Program, lane: Lane) -> bool:
 def keep_state(parts: Program, lane: Lane, waits: bool) -> None:
     """Store the state after the step as the present state, unless the run waits."""
     lane.state = lane.state if waits else lane.after
-    if parts.has_true_masses:
+    if parts.is_thermal:
         lane.masses = lane.masses if waits else lane.warmed
     if parts.leg is not None:
         lane.walk = lane.walk if waits else lane.walk_after

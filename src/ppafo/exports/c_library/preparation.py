@@ -254,7 +254,7 @@ def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     for name, of_plant in program.groups_of_plant.items():
         lane[name] = of_plant(lane.plant)
     if program.gas.START is not None:
-        lane.masses = program.gas.START(lane.plant, lane.state, parts=program.functions)
+        lane.masses = program.gas.START(lane.state)
     lane.valve_state = parts.constant(program.valve.initial())
     if program.controller is not None:
         lane.controller_state = parts.constant(program.controller.initial)

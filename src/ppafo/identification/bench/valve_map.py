@@ -1,7 +1,7 @@
 """Valve map: flow over command; dead band, gain, saturation and hysteresis of a proportional valve.
 
     m = Cd A(u') C1 P_up psi(P_down / P_up),   Cd A = sign(u') k min(max(|u'| - u_0, 0), u_s - u_0)     (6), (7)
-    u' = play(u; h):   y = max(u - h/2, min(u + h/2, y)),   u' = y / (1 - h/2)     effect ``spool_play``
+    u' = play(u; h):   y = max(u - h/2, min(u + h/2, y)),   u' = y / (1 - h/2)     ``spool_position``
 
 m is the mass flow [kg/s], positive into chamber 1, u the command from -1 to 1, u_0 the dead band, u_s the command from
 which the valve opens no further, h the width of the backlash, k the effective area per command [m^2]. The flow is
@@ -23,7 +23,7 @@ from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, me
 from ppafo.identification.residuals import FitVariable
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
-from ppafo.model.effects.spool_play import spool_position
+from ppafo.model.valves.proportional import spool_position
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
@@ -44,7 +44,7 @@ _CLEAR_COMMAND = 0.1
 """Least magnitude of a command with a clear direction [-]."""
 _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
-_GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve_map.saturation_command"
+_GAIN, _PLAY, _SATURATION = "valve_map.gain", "valve_map.hysteresis", "valve_map.saturation_command"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

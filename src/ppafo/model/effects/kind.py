@@ -6,12 +6,11 @@ use an effect by this value alone; none of them names an effect.
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import PlainFunction, Quantity, quantities_of
-from ppafo.model.gas import SPECIES
 
 SECTION = "effects"
 """Section of a parameter set with the settings of effects, and first part of their paths."""
@@ -82,8 +81,6 @@ class Effect:
 
     ``state`` declares the dynamics of the effect's own state, which laws take as ``NAME_state``; None without a state.
 
-    ``of_gas`` maps settings whose default is a property of the gas to these defaults [SI] by species, for all species.
-
     ``source`` is the source of law and numbers, ``equation`` is the line of the effect in the equations; ``symbols``
     are lines of the nomenclature: symbol, name in the code, unit, meaning.
     """
@@ -101,7 +98,6 @@ class Effect:
     state: State | None = None
     section_of_files: str = ""
     always: bool = False
-    of_gas: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -128,15 +124,9 @@ class Effect:
         """Names of the structs that the laws may take."""
         return (self.name,) if self.state is None else (self.name, self.state_name)
 
-    def quantities_in(self, species: str) -> tuple[Quantity, ...]:
-        """Settings with their defaults in a gas; with the declared defaults for an unknown gas."""
-        return tuple(
-            replace(item, default=self.of_gas.get(item.name, {}).get(species, item.default)) for item in self.quantities
-        )
-
-    def defaults(self, species: str = "") -> dict[str, float]:
-        """Default settings [SI] of a device with a gas whose parameter set does not mention the effect."""
-        return {item.name: float(item.default or 0.0) for item in self.quantities_in(species)}
+    def defaults(self) -> dict[str, float]:
+        """Default settings [SI] of a device whose parameter set does not mention the effect."""
+        return {item.name: float(item.default or 0.0) for item in self.quantities}
 
     def is_on(self, settings: Mapping[str, Any]) -> Any:
         """Return whether the effect is on with some settings; an array of truth values if some are arrays (runs,)."""
@@ -171,12 +161,6 @@ def _problems(effect: Effect) -> Iterator[str]:
                 yield f"switch names '{name}', which must be a quantity with minimum 0"
         if effect.is_on(effect.defaults()):
             yield "is on with its defaults; give defaults with which the effect is off"
-    for name, defaults in effect.of_gas.items():
-        # A gas without a default would silently get another gas's number.
-        lacking = [species for species in SPECIES if species not in defaults]
-        if lacking or all(item.name != name for item in effect.quantities):
-            missing = f"has no default for {', '.join(lacking)}" if lacking else "is not a quantity of the effect"
-            yield f"of_gas names '{name}', which {missing}"
     for port, law in effect.laws.items():
         given, taken = _parameters(port), [name for name in _parameters(law) if name not in effect.rows]
         if taken != given:

@@ -84,6 +84,18 @@ def opening_of_command(command: float, dead_band: float) -> float:
     return size if command >= 0.0 else -size
 
 
+def spool_position(position: float, command: float, play_width: float) -> float:
+    """Spool position [-1, 1] for a command [-], with a backlash of the total width ``play_width`` [-].
+
+    The inner side of the backlash, ``y``, moves with the command at its limits: ``y = max(c - b/2, min(c + b/2, y))``.
+    The spool position is ``y / (1 - b/2)``, so that the spool reaches full opening. The valve map of a bench shows it;
+    runs have no backlash.
+    """
+    half = 0.5 * play_width
+    inner = max(command - half, min(command + half, position * (1.0 - half)))
+    return max(-1.0, min(1.0, inner / (1.0 - half)))
+
+
 def advance_ideal(
     valve: IdealProportional, state: NoValveState, command: float, time: float, step: float
 ) -> tuple[float, NoValveState]:

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError, UnitError
-from ppafo.model.effects.second_virial import SECOND_VIRIAL
-from ppafo.model.gas import SPECIES
+from ppafo.model.gas import SECOND_VIRIAL, SPECIES
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence
 from ppafo.parameters.building import contradictions, missing_values, read_device
 from ppafo.parameters.declaration import is_within

@@ -131,7 +131,7 @@ def test_planted_dead_band_saturation_and_hysteresis_come_back() -> None:
     result = valve_map((planted.sweep(),), planted.CO2, "valves.main")
     for path, truth, near in (
         ("valves.main.dead_band", 0.12, 0.003),
-        ("effects.spool_play.width", 0.04, 0.003),
+        ("valve_map.hysteresis", 0.04, 0.003),
         ("valve_map.saturation_command", 0.9, 0.01),
     ):
         assert result[path].value == pytest.approx(truth, abs=near)
@@ -157,7 +157,7 @@ def test_a_valve_that_opens_more_in_one_direction_holds_for_this_model_only() ->
 def test_a_command_that_only_rises_leaves_hysteresis_out() -> None:
     up = RecordingSource(planted.sweep().recording.between(0.0, 10.0))
     result = valve_map((up,), planted.CO2)
-    assert "effects.spool_play.width" not in [item.path for item in result.estimates]
+    assert "valve_map.hysteresis" not in [item.path for item in result.estimates]
 
 
 def test_flow_with_the_wrong_sign_is_told() -> None:
