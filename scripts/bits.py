@@ -153,7 +153,7 @@ def translate_drawn(count: int) -> int:
 def main() -> int:
     """Print the table; 1 where any bits differ."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--names", metavar="NAME", nargs="+", help="scenarios, walks and task sequences (default: all)")
+    parser.add_argument("--names", metavar="NAME", nargs="+", help="scenarios and walks (default: all)")
     parser.add_argument(
         "--targets",
         nargs="+",

@@ -137,7 +137,7 @@ KINDS: Mapping[str, str] = {
     "overrides": "overrides",
     "name": (
         "baseline bottle catalogue columns configuration folder gait method metric "
-        "motion part path problem such_that task_sequence valve vary width"
+        "motion part path problem such_that valve vary width"
     ),
     "names": "also configurations initial metrics recordings scenarios thresholds",
     "positive": "atmosphere gas_per_stride mass minutes peak_flow pressure stature stride_time torque volume",
@@ -176,7 +176,7 @@ ARGUMENTS: Mapping[str, str] = {
     "load_study": "study overrides draws? seed?",
     "load_study_results": "folder",
     "load_tuning": "tuning overrides",
-    "load_walk": "scenario:name overrides gait? task_sequence? bottle? parameter_set?",
+    "load_walk": "scenario:name overrides gait? bottle? parameter_set?",
     "read_recording": "path atmosphere columns?",
     "read_result": "folder",
     "reproduce": "study:name overrides progress?",
@@ -194,7 +194,7 @@ ARGUMENTS: Mapping[str, str] = {
         "parameter_set:name recordings valve? overrides motion volume? initial thresholds longest_delay "
         "columns? progress?"
     ),
-    "walk": "scenario overrides gait? task_sequence? bottle? minutes? progress",
+    "walk": "scenario overrides gait? bottle? minutes? progress",
     "walk_population": "scenario wearers minutes? seed progress",
     "workbench": "scenarios overrides",
 }

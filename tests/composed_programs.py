@@ -77,7 +77,6 @@ def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:
             ),
             gas=energy_balance if draw.random() < 0.4 else isothermal,
             leg=walk if walks else None,
-            takes_task_sequence=walks and draw.random() < 0.5,
             feed=lines if draw.random() < 0.4 else None,
             # A free vane always goes through its steps in parts, a leg never as its error asks.
             is_adaptive=not walks and (angle is None or draw.random() < 0.5),

@@ -33,15 +33,13 @@ VARIED = {
     ),
 }
 """Golden runs of scenarios with special settings, for features that no bundled scenario uses."""
-TASK_SEQUENCES = {"first-steps": "proportional"}
-"""Golden runs of task sequences, with the walk that performs each."""
 WALKED = 4.0
 """Duration of a golden walk [s]."""
 
 
 def names() -> tuple[str, ...]:
     """Return the names of all golden runs."""
-    return (*list_scenarios(), *VARIED, *list_walks(), *TASK_SEQUENCES)
+    return (*list_scenarios(), *VARIED, *list_walks())
 
 
 def plain_batch(name: str) -> Batch:
@@ -51,8 +49,7 @@ def plain_batch(name: str) -> Batch:
         return batch_of(plan_run(load_scenario(scenario, settings)))
     if name in list_scenarios():
         return batch_of(plan_run(load_scenario(name)))
-    walk = load_walk(TASK_SEQUENCES[name], task_sequence=name) if name in TASK_SEQUENCES else load_walk(name)
-    return batch_of(plan_walk(with_duration(walk, WALKED)))
+    return batch_of(plan_walk(with_duration(load_walk(name), WALKED)))
 
 
 def digest(result: BatchResult) -> str:

@@ -75,13 +75,10 @@ def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:
     assert not has_ideal_sensors(configuration)
 
 
-def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> None:
-    (tmp_path / "door.toml").write_text(blocks("toml")[1])
+def test_the_bottle_of_the_page_loads(tmp_path: Path) -> None:
     walk_file = tmp_path / "own.toml"
-    walk_file.write_text(blocks("toml")[0] + blocks("toml")[2])
+    walk_file.write_text(blocks("toml")[0] + blocks("toml")[1])
     assert walk_of(load_walk(walk_file)).bottle is not None
-    walk_file.write_text(blocks("toml")[0])
-    assert walk_of(load_walk(walk_file, [f"task_sequence={tmp_path / 'door.toml'}"])).task_sequence is not None
 
 
 def test_the_walk_on_its_bottle_ends_as_the_page_shows() -> None:

@@ -27,7 +27,6 @@ FILES = {
     "tuning": "analyses/tune/library",
     "design": "analyses/design/library",
     "walk": "walking/configurations/solenoid.toml",
-    "task-sequence": "walking/task_sequences",
     "rig": "rig/presets",
     "gait": "gait/normative",
     "bottle": "parameters/bottles/files",

@@ -24,7 +24,6 @@ from ppafo.storage.column_map import load_column_map
 from ppafo.storage.reading import read_recording
 from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk
-from ppafo.walking.task_sequence import load_task_sequence
 
 LOADERS: dict[str, Callable[[str], Any]] = {
     "parameters": load_parameter_set,
@@ -33,7 +32,6 @@ LOADERS: dict[str, Callable[[str], Any]] = {
     "tuning": load_tuning,
     "design": load_design,
     "walk": load_walk,
-    "task-sequence": load_task_sequence,
     "identification": load_problem,
     "columns": load_column_map,
     "rig": load_preset,

@@ -229,7 +229,6 @@ WALK_FEATURES: dict[str, Feature] = {
         "sensors.lost_share=0.2", "sensors.angle_lost_share=0.2", "sensors.pressure_lost_share=0.2"
     ),
     "samples between steps": _feature("controller.rate=330 Hz", "run.step=0.4 ms"),
-    "task sequence": _feature("task_sequence=first-steps"),
     "cylinder": _feature("device.set=cylinder-lever", needs="actuator"),
     "bladder": _feature(f"device.set={BLADDER}", needs="actuator area"),
     "muscle pair": _feature(f"device.set={MUSCLES}", needs="actuator"),

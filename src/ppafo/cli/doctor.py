@@ -18,7 +18,6 @@ FORMATS: dict[str, str] = {
     "tuning": "ppafo.analyses.tune.problem",
     "design": "ppafo.analyses.design.loading",
     "walk": "ppafo.walking.declaration",
-    "task-sequence": "ppafo.walking.task_sequence",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.column_map",
     "rig": "ppafo.rig.preset",

@@ -53,12 +53,6 @@ KINDS: dict[str, _NewFile] = {
         "ppafo.walking.loading:load_walk",
         "ppafo walk FILE --minutes 0.2 --out out/NAME",
     ),
-    "task-sequence": _NewFile(
-        "task sequence",
-        "walking/task_sequences",
-        "ppafo.walking.task_sequence:load_task_sequence",
-        "ppafo walk solenoid --task-sequence FILE --out out/NAME",
-    ),
     "gait-map": _NewFile(
         "gait map",
         "gait/recorded",
@@ -88,7 +82,7 @@ def new(
 ) -> CommandOutput:
     """Write an input file to start from: a template, or a copy of a shipped one; or the files of an example.
 
-    kind: scenario, set, study, walk, task-sequence, gait-map, bottle, or example: the files of a how-to page
+    kind: scenario, set, study, walk, gait-map, bottle, or example: the files of a how-to page
     name: name of the file and of what it describes; of an example, its name; without it, the examples are listed
     source: copy this one: a shipped name, or a .toml file
     out: the .toml file to write, default NAME.toml; of an example, the new folder, default NAME

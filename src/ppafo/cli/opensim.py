@@ -34,7 +34,7 @@ def export_opensim(
 
     walk: name of a walk, or a .toml file; or a recording (.csv, .nc) or result folder
     gait: of a walk: name of a gait, or a gait file
-    minutes: of a walk: time to walk; default: all of a task sequence, else 0.2
+    minutes: of a walk: time to walk; default 0.2
     side: which foot; default right
     strikes: of a walk: heel strikes of your motion [s], to put the mean stride of the torque on
         (--strikes=-0.4,0.8 where time begins below 0); default: the walk as it is, from 0 s on

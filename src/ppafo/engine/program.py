@@ -26,7 +26,7 @@ from ppafo.model.plant import ActuatorFunctions, PlantState
 from ppafo.model.ports import exhaust_path, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
-from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY, WALK, MeterKind, ReferenceSummary
+from ppafo.signals.meter import LED_SHANK, REQUESTED, WALK, MeterKind, ReferenceSummary
 
 if TYPE_CHECKING:
     from ppafo.engine.scheme.thermal_gas import WarmFunctions
@@ -88,7 +88,6 @@ class Program:
         gas: module of ``engine.step`` for the gas
         late_signals: True for delayed signals
         leg: module ``walk`` for a walking leg, whose foot is free or moved by ground and gait, with sensors
-        takes_task_sequence: True for a leg that stands, starts, changes speed and stops; False for equal strides
         feed: module ``lines`` for supply lines; None for constant supply pressures
         is_adaptive: True for steps divided by error control
         rests_whole: True if steps with a prescribed joint at rest are undivided under the conditions for a locked joint
@@ -111,7 +110,6 @@ class Program:
     gas: GasPhases
     late_signals: bool = False
     leg: ModuleType | None = None
-    takes_task_sequence: bool = False
     feed: ModuleType | None = None
     is_adaptive: bool = False
     rests_whole: bool = False
@@ -254,7 +252,6 @@ class Program:
         """Properties of the runs that a metric may require in addition to channels."""
         has = {
             WALK: self.walks,
-            STEADY: not self.takes_task_sequence,
             LED_SHANK: self.is_on_gait,
             REQUESTED: self.requests_torque,
         }

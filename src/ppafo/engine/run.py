@@ -24,7 +24,7 @@ from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 if TYPE_CHECKING:  # for most runs know no leg, no line and no walk
     from ppafo.engine.led_leg import LedLeg
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
-    from ppafo.model.gait import GaitSeries, GaitTiming, TimedSequence
+    from ppafo.model.gait import GaitSeries, GaitTiming
     from ppafo.model.leg import LegParameters
     from ppafo.model.regulator import LineState, SupplyLines
 
@@ -44,10 +44,7 @@ WHOLE = 1.0e-9
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """Leg that follows a gait.
-
-    ``task_sequence`` is None for equal strides.
-    """
+    """Leg that follows a gait of equal strides."""
 
     leg: "LegParameters"
     share: "DeviceShare"
@@ -55,7 +52,6 @@ class Walk:
     timing: "GaitTiming"
     sensors: GaitSensors
     initial: "WalkState"
-    task_sequence: "TimedSequence | None" = None
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -66,7 +62,6 @@ class Walk:
             "gait": self.gait,
             "gait_timing": self.timing,
             "gait_sensors": self.sensors,
-            **({} if self.task_sequence is None else {"task_sequence": self.task_sequence}),
         }
 
     @property

@@ -23,7 +23,7 @@ from ppafo.walking.walk import walk
 from ppafo.wording import argument_text
 
 FEW_STRIDES = 0.2
-"""Default duration [min] of a walk without a task sequence."""
+"""Default duration [min] of a walk."""
 SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
 """Accepted time [s] between two heel strikes of one foot."""
 
@@ -46,13 +46,12 @@ def files_of_walk(
     side: Side,
     strikes: tuple[float, ...] | None,
 ) -> dict[str, bytes]:
-    """Return the OpenSim files of a walk by name, over ``minutes`` [min], its task sequence, or ``FEW_STRIDES``."""
+    """Return the OpenSim files of a walk by name, over ``minutes`` [min], by default ``FEW_STRIDES``."""
     if strikes is not None:
         check_strikes(strikes)
     check_duration_once(overrides, minutes)
     chosen = load_walk(name, overrides, gait=gait)
-    few_strides = FEW_STRIDES if walk_of(chosen).task_sequence is None else None
-    result = walk(chosen, minutes=few_strides if minutes is None else minutes)
+    result = walk(chosen, minutes=FEW_STRIDES if minutes is None else minutes)
     return opensim_files(result, side, strikes or ())
 
 

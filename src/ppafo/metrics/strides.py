@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean
 from ppafo.model.helping import PUSH_OFF
-from ppafo.signals.meter import REQUESTED, STEADY, WALK, MeterKind, ReferenceSummary, Sample, StrideSample
+from ppafo.signals.meter import REQUESTED, WALK, MeterKind, ReferenceSummary, Sample, StrideSample
 
 SETTLING = 2
 """Number of initial strides excluded from averages, while the controller learns the stride time."""
@@ -201,8 +201,6 @@ METRICS = (
             quantity.unit,
             f"{quantity.summary}, mean",
             ReadAt((f"meters.strides.ended.sums.{name}", "meters.strides.ended.averaged"), mean_of),
-            # In a task sequence it would be a mean over other strides.
-            STEADY,
         )
         for name, quantity in PER_STRIDE.items()
     ),
@@ -211,14 +209,12 @@ METRICS = (
         "-",
         "strides over which the means are taken",
         ReadAt(("meters.strides.ended.averaged",)),
-        STEADY,
     ),
     _kind(
         "push_off_error",
         "N m",
         "RMS of requested torque less actuator torque in push-off",
         ReadAt(("meters.strides.ended.squared_errors", "meters.strides.ended.push_off_samples"), root_mean),
-        STEADY,
         REQUESTED,
     ),
     _kind("strides", "-", "whole strides of the walk", ReadAt(("meters.strides.ended.whole",))),

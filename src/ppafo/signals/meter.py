@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-WALK, STEADY, REQUESTED, LED_SHANK = "walk", "steady strides", "requested torque", "shank of a gait"
-"""Requirements of metrics besides channels: walk, equal strides, requested torque, shank led by a gait."""
+WALK, REQUESTED, LED_SHANK = "walk", "requested torque", "shank of a gait"
+"""Requirements of metrics besides channels: walk, requested torque, shank led by a gait."""
 
 
 class FootSample(NamedTuple):

@@ -73,8 +73,6 @@ CHANNELS: dict[str, ChannelKind] = {
     "swing_knee_torque": ChannelKind(
         "N m", "inertial torque T_1 of shank and foot in swing, equation (11); 0 on the ground"
     ),
-    "walking_speed": ChannelKind("m/s", "walking speed in a task sequence, stride length over stride time"),
-    "stride_frequency": ChannelKind("Hz", "stride frequency in a task sequence, 0 while standing"),
     "contact": ChannelKind(PLAIN_NUMBER, "foot contact: 0 none, 1 heel, 2 flat, 3 toes", is_held=True),
     "controller_phase": ChannelKind(
         PLAIN_NUMBER,

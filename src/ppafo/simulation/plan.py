@@ -201,7 +201,6 @@ def _program(components: Components, grid: TimeGrid, walk: Walk | None, has_dela
         late_signals=first(components.signal_delay) > 0.0,
         gas=_gas(components),
         leg=leg,
-        takes_task_sequence=walk is not None and walk.task_sequence is not None,
         feed=feed,
         is_adaptive=bool(first(grid.needs_parts)),
         # A broken number of steps to a sample puts samples inside steps.

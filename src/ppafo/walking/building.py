@@ -1,14 +1,12 @@
 """Building of a walk scenario from a validated document: motion, controller, sensors, supply and duration."""
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ppafo.control.walking.catalog import walking_controllers
-from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, refused_as
-from ppafo.gait import NORMATIVE, load_gait
+from ppafo.errors import DataError, ParameterError, ScenarioError, refused_as
+from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.assumptions import assumed_lines
@@ -34,8 +32,7 @@ from ppafo.walking.declaration import (
     WALK_SENSORS,
 )
 from ppafo.walking.motion import WalkMotion, duration_problems, record_interval, walk_of, with_duration
-from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
-from ppafo.walking.task_sequence import load_task_sequence
+from ppafo.walking.planning import NO_REFERENCE
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
 DEFAULT_PERIOD = 1.0e-3
@@ -105,12 +102,7 @@ def _motion(
     sensors: Mapping[str, float],
 ) -> WalkMotion:
     """Return the motion of a walk: wearer, gait, tasks, bottle; ``sensors`` are the sensor settings [SI]."""
-    sequence_file = _named_file("task_sequence", request, reading.document)
-    with _named_by("task_sequence", reading, request, ScenarioError):
-        sequence = None if sequence_file is None else load_task_sequence(sequence_file)
-    with _named_by("gait", reading, request, DataError):
-        gait = load_gait(_named_file("gait", request, reading.document) or NORMATIVE)
-    is_named = "gait" in request.instead or "gait" in reading.document
+    gait, is_named = _gait(reading, request)
     person = reading.number(f"wearer.{PERSON.name}", PERSON)
     if person != int(person):
         raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
@@ -119,32 +111,26 @@ def _motion(
         gait=gait,
         wearer=read_wearer(reading, gait, is_named),
         forces={name: sensors[name] for name in FORCES},
-        task_sequence=sequence,
         bottle=bottle,
         wearer_origin=wearer_origin(reading, gait, is_named),
         person=person,
     )
 
 
-def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:
-    """Return the name or file of a gait or task sequence; a relative path is resolved in the folder of the document."""
-    if path in request.instead:
-        return request.instead[path]
-    name = document.get(path)
-    if name is None or Path(name).suffix != ".toml" or Path(name).is_absolute():
-        return name
-    return str(request.folder / name)
+def _gait(reading: DocumentReader, request: ScenarioRequest) -> tuple[Gait, bool]:
+    """Return the gait of a walk, and whether it is named; a relative path is resolved in the folder of the document.
 
-
-def _named_by(
-    path: str, reading: DocumentReader, request: ScenarioRequest, kind: type[PpafoError]
-) -> AbstractContextManager[None]:
-    """Context manager that prefixes errors about a referenced file with the key at ``path``.
-
-    For a file given as an option, the message is left unchanged, because it names the file already.
+    An error about a gait that the document names starts with its key; an option names its file itself.
     """
-    is_of_walk = path not in request.instead and path in reading.document
-    return refused_as(kind, reading.quote(path), kind) if is_of_walk else nullcontext()
+    if "gait" in request.instead:
+        return load_gait(request.instead["gait"]), True
+    name = reading.document.get("gait")
+    if name is None:
+        return load_gait(NORMATIVE), False
+    if Path(name).suffix == ".toml" and not Path(name).is_absolute():
+        name = str(request.folder / name)
+    with refused_as(DataError, reading.quote("gait"), DataError):
+        return load_gait(name), True
 
 
 def _control(reading: DocumentReader, device: Device, sensors: Mapping[str, float]) -> tuple[Control, Graph]:
@@ -180,7 +166,7 @@ def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assu
 
 
 def _duration(reading: DocumentReader, scenario: Scenario) -> float:
-    """Return the duration of a walk [s] from its file, else of its task sequence, else 60 s, or 600 s on a bottle."""
+    """Return the duration of a walk [s] from its file, else 60 s, or 600 s on a bottle."""
     motion = walk_of(scenario)
     if value_at(reading.document, "run.duration") is not None:
         duration = reading.number("run.duration", DURATION)
@@ -188,7 +174,4 @@ def _duration(reading: DocumentReader, scenario: Scenario) -> float:
             if is_bad:
                 raise ScenarioError(f"{reading.file}: {line(0)}")
         return duration
-    if motion.task_sequence is not None:
-        # The time of the wearer with the unchanged gait, whichever person walks.
-        return float(planned_task_sequence(motion.task_sequence, motion.gait).duration)
     return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION

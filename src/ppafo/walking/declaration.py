@@ -35,9 +35,7 @@ PERSON = Quantity(
     0.0,
     float(LARGEST_SEED),
 )
-DURATION = Quantity(
-    "duration", "s", "duration of the walk; default: the length of the task sequence, else 1 min", None, 1.0, 3600.0
-)
+DURATION = Quantity("duration", "s", "duration of the walk; default: 1 min, on a bottle 10 min", None, 1.0, 3600.0)
 
 WALK_SENSORS = (
     *(quantity for quantity in SENSORS if quantity.name != "delay"),
@@ -98,7 +96,7 @@ def _check_motion(kind: object, place: str) -> None:
 
 def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of all text values that a document may contain."""
-    return (*TEXTS, "motion.kind", "gait", "task_sequence", BOTTLE_NAME, "controller.kind", "gas_model.kind")
+    return (*TEXTS, "motion.kind", "gait", BOTTLE_NAME, "controller.kind", "gas_model.kind")
 
 
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
@@ -113,11 +111,11 @@ OF_A_WALK = DeclaredContent(
     find_kinds,
     _texts,
     _quantities,
-    same={"motion.gait": "gait", "motion.task_sequence": "task_sequence"},
+    same={"motion.gait": "gait"},
     appended={path: (BOTTLE, own) for path, own in BOTTLE_OVERRIDES.items()},
     check_motion=_check_motion,
 )
-"""Possible content of a walk file. Gait and task sequence are at top level or in the table [motion]."""
+"""Possible content of a walk file. The gait is at top level or in the table [motion]."""
 
 
 def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
@@ -135,9 +133,6 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
         "gait": optional(
             str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
         ),
-        "task_sequence": optional(
-            str, "name of a task sequence, or the path of its file; equal strides unless one is given"
-        ),
     }
     bottle = {
         "name": optional(str, "name of a bottle, or the path of its file"),
@@ -147,7 +142,7 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
     motion = one_of([table(f"{model_name(name)}Motion", kind_field(name, SUMMARY) | led_by) for name in motions])
     sections: dict[str, Any] = {
         "run": optional(table("WalkRun", run), "duration and settings of the computation"),
-        "motion": optional(motion, "kind of motion; gait and task sequence may be given here"),
+        "motion": optional(motion, "kind of motion; the gait may be given here"),
         **led_by,
         "controller": (
             controller_table(walking_controllers(), "Walking"),

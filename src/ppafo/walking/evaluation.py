@@ -10,7 +10,7 @@ from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, state_row_number
 from ppafo.engine.step.lane import LaneResult
 from ppafo.metrics import METRICS, evaluate
 from ppafo.metrics.metric import MetricKind, Metrics
-from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY
+from ppafo.signals.meter import LED_SHANK, REQUESTED
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
@@ -19,20 +19,10 @@ from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
-from ppafo.walking.planning import requests_torque, task_sequence_of_walk
+from ppafo.walking.planning import requests_torque
 from ppafo.walking.recording import recording_of_walk
 from ppafo.walking.result import WalkResult
-from ppafo.walking.strides import (
-    SegmentResult,
-    mean_curves,
-    per_stride,
-    segment_results,
-    settled,
-    steady_strides,
-    stride_starts,
-    task_sequence_metrics,
-    walk_metrics,
-)
+from ppafo.walking.strides import mean_curves, per_stride, settled, stride_starts, walk_metrics
 
 REMEDY = "the time step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
 
@@ -73,19 +63,12 @@ def _evaluated(
     # The walk is compared with the healthy gait of the person who walked; the result keeps the scenario as planned.
     gait, wearer = as_drawn(motion.gait, motion.wearer, motion.person)
     of_person = replace(scenario, motion=replace(motion, gait=gait, wearer=wearer))
-    sequence = task_sequence_of_walk(of_person)
     recording = recording_of_walk(of_person, run, time, record, supply)
     starts = stride_starts(record["walk.strides"])
     strides = per_stride(record, starts)
-    # The first strides do not count for averages, in which the controller adapts; in a sequence only steady ones do.
-    every = np.ones(max(starts.size - 1, 0), dtype=np.bool_)
-    counted = settled(every) if sequence is None else steady_strides(sequence, time[starts])
+    counted = settled(max(starts.size - 1, 0))
     averages = mean_curves(recording, starts, counted)
     metrics = walk_metrics(of_person, recording, strides, averages, starts, counted)
-    segments: tuple[SegmentResult, ...] = ()
-    if sequence is not None:
-        segments = segment_results(of_person, sequence, recording, strides["net_push_off_work"], starts)
-        metrics |= task_sequence_metrics(sequence, segments, recording, int(counted.sum()))
     return WalkResult(
         scenario=scenario,
         recording=recording,
@@ -95,19 +78,8 @@ def _evaluated(
         status=status,
         starts=starts,
         counted=counted,
-        segments=segments,
         supply=supply,
     )
-
-
-def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
-    """Return the integral of a channel over the ankle angle in one stride [channel unit times rad], mean over strides.
-
-    The mean uses the strides that count for averages.
-    """
-    turned = np.diff(result.recording["angle"])
-    integral = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
-    return float(np.diff(integral[result.starts])[result.counted].mean())
 
 
 def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]) -> Measured:
@@ -129,8 +101,6 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
         return "the metric needs the whole run over time, which a walk does not keep"
     if LED_SHANK in kind.needs:
         return "the metric needs a leg without ground contact, whose shank follows a gait"
-    if STEADY in kind.needs and walk_of(scenario).task_sequence is not None:
-        return "the metric is a mean over equal strides, but strides of a task sequence differ: omit the task sequence"
     law = scenario.law
     if REQUESTED in kind.needs and (law is None or not requests_torque(law)):
         return f"controller '{scenario.controller.kind}' requests no torque"

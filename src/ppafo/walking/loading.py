@@ -56,7 +56,6 @@ def load_walk(
     overrides: Overrides = (),
     *,
     gait: str | Path | None = None,
-    task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
     parameter_set: ParameterSet | str | Path | None = None,
     plugins: Plugins = (),
@@ -69,7 +68,6 @@ def load_walk(
         scenario: name of a walk, or a .toml file
         overrides: texts such as ``controller.peak_torque=6 N m``, or a dictionary
         gait: name or file of a gait, instead of the file's
-        task_sequence: name or file of a task sequence, instead of the file's
         bottle: name or file of a bottle, instead of the file's
         parameter_set: parameter set of the device, instead of the file's
         plugins: modules of your own, files or names, whose objects files may name
@@ -83,12 +81,12 @@ def load_walk(
         DataError: a gait that cannot be read
 
     >>> import ppafo
-    >>> ppafo.load_walk("solenoid", task_sequence="corridor").name
+    >>> ppafo.load_walk("solenoid").name
     'solenoid'
     """
     name_plugins(plugins)
     file, changes = label(str(scenario)), read_overrides(overrides, ScenarioError)
-    chosen = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
+    chosen = {"gait": gait, BOTTLE_NAME: bottle}
     instead = {path: str(value) for path, value in chosen.items() if value is not None}
     # An override of a file that is given as an argument is refused.
     for override in changes:

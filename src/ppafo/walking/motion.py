@@ -18,7 +18,6 @@ from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BottleSupply
 from ppafo.walking.declaration import FORCES, PERSON, by_path, sections
-from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
 
@@ -32,7 +31,6 @@ class WalkMotion:
     - ``gait``: prescribed gait
     - ``wearer``: leg of the wearer
     - ``forces``: settings [SI] of the force sensors, by name
-    - ``task_sequence``: task sequence, None for equal strides
     - ``bottle``: gas bottle, None for an unlimited supply
     - ``wearer_origin``: description of the origin of the body mass
     - ``person``: number of the person of the population, 0 for the wearer with the unchanged gait, or a ``Person``
@@ -42,7 +40,6 @@ class WalkMotion:
     gait: Gait
     wearer: Wearer
     forces: Mapping[str, Any]
-    task_sequence: TaskSequence | None = None
     bottle: BottleSupply | None = None
     wearer_origin: str = "the paper's subject"
     person: Any = 0.0
@@ -56,8 +53,7 @@ class WalkMotion:
     @property
     def label(self) -> str:
         """Short description of the motion."""
-        along = "" if self.task_sequence is None else f", task sequence {self.task_sequence.name}"
-        return f"a walk, gait {self.gait.name}{along}"
+        return f"a walk, gait {self.gait.name}"
 
 
 def walk_of(scenario: Scenario) -> WalkMotion:
@@ -76,8 +72,6 @@ def person_remarks(scenario: Scenario) -> list[str]:
 
 SHORTEST_STRIDES = 5
 """Least number of strides of a walk; the controller adapts during the first two."""
-SHORTEST_TASK_SEQUENCE = 1.0
-"""Shortest duration of a walk along a task sequence [s]."""
 LONGEST_MINUTES = 60.0
 """Longest duration of a walk [min]."""
 
@@ -109,14 +103,11 @@ def with_duration(scenario: Scenario, seconds: float) -> Scenario:
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
     """Return the problems of a walk's duration [s], which may be an array (runs,)."""
     # The controller learns over the first strides, and means leave them out: a walk needs more than these.
-    has_task_sequence = walk_of(scenario).task_sequence is not None
-    shortest = SHORTEST_TASK_SEQUENCE if has_task_sequence else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
+    shortest = SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
     fits = np.logical_and(seconds >= shortest, seconds <= 60.0 * LONGEST_MINUTES)
 
-    least = "a second of a task sequence" if has_task_sequence else f"{SHORTEST_STRIDES} strides"
-
     def line(run: int) -> str:
-        limits = f"at least {shortest / 60.0:.2g} min ({least}) and at most {LONGEST_MINUTES:g} min"
+        limits = f"at least {shortest / 60.0:.2g} min ({SHORTEST_STRIDES} strides) and at most {LONGEST_MINUTES:g} min"
         return f"a walk of {at(seconds, run) / 60.0:.6g} min: must be {limits}"
 
     return ((np.logical_not(fits), line),)

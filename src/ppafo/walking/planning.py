@@ -15,7 +15,6 @@ from ppafo.engine.rows import of_each
 from ppafo.engine.run import Run, Walk, batches_of, states_at_start
 from ppafo.engine.scheme.actuators import filled_chambers
 from ppafo.errors import ScenarioError
-from ppafo.gait import Gait
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, at, first, larger, over_runs, smaller, whole
@@ -39,13 +38,10 @@ from ppafo.walking.preparation import (
     gait_sensors,
     smallest_chamber,
     vented_state,
-    walk_from_standing,
     walk_from_strike,
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.task_sequence import TaskSequence
-from ppafo.walking.task_sequence_plan import PlannedSequence, plan_task_sequence, standing_gait
 from ppafo.walking.wearer import leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
@@ -58,7 +54,7 @@ TINY = 1.0e-30
 
 
 def plan_walk(scenario: Scenario) -> Run:
-    """Return the run of a walk that starts with vented chambers, at a heel strike or, for a task sequence, standing.
+    """Return the run of a walk that starts with vented chambers at a heel strike.
 
     Raises ScenarioError if the walk cannot be simulated.
     """
@@ -79,13 +75,8 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     leg = leg_of_person(leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer)), person)
     bare = plant_parameters(device)
     sensors = gait_sensors_of(scenario)
-    planned = task_sequence_of_walk(scenario)
-    if planned is None:
-        # A walk of equal strides begins at a heel strike, a task sequence standing.
-        rows = leg, person.series, person.timing
-        initial = of_each(lambda leg, gait, timing: walk_from_strike(gait_at(gait, timing, leg, 0.0)), *rows)
-    else:
-        initial = of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, person.timing, planned.timed)
+    rows = leg, person.series, person.timing
+    initial = of_each(lambda leg, gait, timing: walk_from_strike(gait_at(gait, timing, leg, 0.0)), *rows)
     walk = Walk(
         leg=leg,
         share=device_share(bare, leg.gravity),
@@ -93,7 +84,6 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         timing=person.timing,
         sensors=sensors,
         initial=initial,
-        task_sequence=None if planned is None else planned.timed,
     )
     # Whoever fits the controller to a person sets its thresholds and the start of its push-off anew.
     settings = settings_of_person(dict(scenario.controller.settings), person)
@@ -252,22 +242,3 @@ def fed_device(scenario: Scenario) -> Device:
     if bottle is None:
         return device
     return replace(device, gas=replace(device.gas, temperature=bottle.offers_first().gas_temperature))
-
-
-def task_sequence_of_walk(scenario: Scenario) -> PlannedSequence | None:
-    """Return the planned task sequence of a walk, or None without one.
-
-    Raises ScenarioError if the gait does not allow the sequence.
-    """
-    motion = walk_of(scenario)
-    sequence = motion.task_sequence
-    return None if sequence is None else planned_task_sequence(sequence, motion.gait, motion.person)
-
-
-def planned_task_sequence(sequence: TaskSequence, gait: Gait, number: Any = 0.0) -> PlannedSequence:
-    """Return a task sequence planned for the person with this number.
-
-    Raises ScenarioError if the gait does not allow the sequence.
-    """
-    person = person_of(gait, number)
-    return plan_task_sequence(sequence, gait, person.timing.frequency, person.timing, person.strike_angle)

@@ -18,8 +18,7 @@ from ppafo.walking.evaluation import REMEDY
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_people
-from ppafo.walking.planning import plan_walks, task_sequence_of_walk, unrecorded
-from ppafo.walking.task_sequence_plan import turns_walked
+from ppafo.walking.planning import plan_walks, unrecorded
 from ppafo.walking.walk import Progress, lasting, silent
 
 MAXIMUM_WEARERS = 1_000_000
@@ -129,17 +128,13 @@ def walk_population(
         )
     people = draw_people(motion.gait, wearers, np.random.default_rng(seed))
     crowd = crowd_of(configuration, people)
-    sequence = task_sequence_of_walk(crowd)
-    if minutes is None and sequence is not None:
-        # Until the slowest wearer has completed the task sequence.
-        minutes = float(np.max(sequence.duration)) / 60.0
     seconds = lasting(configuration, minutes).run.duration
     run, _ = plan_walks(with_duration(crowd, seconds))
     numbers = _final_numbers(unrecorded(run, wearers), progress)
     is_finished = np.isfinite(list(numbers.values())).all(axis=0) & (numbers["result.failure_time"] >= NEVER_FAILED)
     final = {path: values[is_finished] for path, values in numbers.items()}
     walked = run.step * run.step_count  # [s]; an unfinished stride counts by its fraction
-    strides = np.asarray(walked * people.timing.frequency if sequence is None else turns_walked(sequence.timed, walked))
+    strides = np.asarray(walked * people.timing.frequency)
     traits = {
         "body_mass": motion.wearer.body_mass * np.asarray(people.mass),
         "shank_length": motion.wearer.shank_length * np.asarray(people.stature),

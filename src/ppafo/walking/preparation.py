@@ -12,10 +12,10 @@ from ppafo.engine.scheme.pneumatics import filling_time
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState, foot_direction
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.columns import larger, rounded_up, smaller, truncated
-from ppafo.model.contact import FLAT, HEEL
+from ppafo.model.contact import HEEL
 from ppafo.model.elementary import exponential
 from ppafo.model.gait import GaitNow
-from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, foot_load, torque_of_shank
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle
 from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.sensors import GaitSensors
 from ppafo.simulation.plan import WHOLE, StepCounts, state_with_volumes
@@ -102,24 +102,14 @@ def vented_state(plant: PlantParameters, filled: Chambers, angle: float, angular
 
 def walk_from_strike(now: GaitNow) -> WalkState:
     """Return the state of a leg that starts to walk at a heel strike."""
-    return walk_from(now, HEEL, 0.0)
-
-
-def walk_from_standing(now: GaitNow) -> WalkState:
-    """Return the state of a leg that starts standing, with the weight evenly on heel and toes."""
-    return walk_from(now, FLAT, 0.5 * now.force)
-
-
-def walk_from(now: GaitNow, contact: float, shown_force: float) -> WalkState:
-    """Return the initial state of a leg; ``shown_force`` [N] is the reading of the sensors under heel and toes."""
     return WalkState(
-        contact=contact,
+        contact=HEEL,
         offset=0.0,
         now=now,
         foot=foot_direction(now.shank, now.ankle),
         external_torque=0.0,
-        heel_force=shown_force,
-        toe_force=shown_force,
+        heel_force=0.0,
+        toe_force=0.0,
         toes_first=0.0,
         clearance=NO_CLEARANCE,
         strides=0.0,
@@ -127,34 +117,6 @@ def walk_from(now: GaitNow, contact: float, shown_force: float) -> WalkState:
         clearances=0.0,
         positive_push_off_work=0.0,
         net_push_off_work=0.0,
-    )
-
-
-def standing_on(
-    leg: LegParameters, ground_angle: float, sine_foot: float, cosine_foot: float, phase: float, load: float
-) -> GaitNow:
-    """Return the gait at the start of a task sequence: shank vertical, foot flat, both at rest.
-
-    ``phase`` is in [turns], ``load`` in [body weights]. ``sine_foot`` and ``cosine_foot`` belong to the angle of the
-    flat foot, ``ground_angle`` [rad]. Numbers may be arrays (wearers,).
-    """
-    upright = 0.0 * ground_angle
-    return GaitNow(
-        phase=phase,
-        shank=upright,
-        shank_rate=upright,
-        shank_acceleration=upright,
-        ankle=0.5 * math.pi - ground_angle,
-        ankle_rate=upright,
-        ankle_acceleration=upright,
-        moment=upright,
-        force=leg.body_mass * leg.gravity * load,
-        knee_forward=upright,
-        knee_up=upright,
-        sine_shank=upright,
-        cosine_shank=1.0 + upright,
-        sine_healthy_foot=sine_foot,
-        healthy_torque=torque_of_shank(foot_load(leg), 0.0, 1.0, sine_foot, cosine_foot, 0.0, 0.0, 0.0, 0.0),
     )
 
 

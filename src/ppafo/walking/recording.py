@@ -9,17 +9,15 @@ import numpy as np
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
-from ppafo.gait import Gait
 from ppafo.model.plant import PlantParameters
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.vane_recording import gas_channels
 from ppafo.walking.bottle.course import UNITS, SupplyCourse
-from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
+from ppafo.walking.gait_series import ankle_path
 from ppafo.walking.inverse_dynamics import dorsiflexor_moment, swing_knee_torque
 from ppafo.walking.motion import walk_of
-from ppafo.walking.task_sequence_plan import pace_in_time
 
 _PHASE_ROW, _REQUEST_ROW = "controller_state.phase.phase", "controller_state.request.torque"
 """Paths of the rows for gait phase and requested torque of a controller that has them."""
@@ -33,7 +31,6 @@ def recording_of_walk(
     assert walk is not None, "a walk has a leg"
     plant = run.plant if supply is None else _plant_on_bottle(run, time, supply)
     path = ankle_path(gait, walk.timing, walk_of(scenario).wearer)
-    pace = None if walk.task_sequence is None else pace_in_time(walk.task_sequence, time)
     angle, rate, external = (record[row] for row in ("state.angle", "state.angular_velocity", "walk.external_torque"))
     pressure_1, pressure_2 = pressures_of(actuator, plant, angle, record["state.mass_1"], record["state.mass_2"])
     channels: dict[str, tuple[Any, str]] = {
@@ -47,7 +44,7 @@ def recording_of_walk(
         "external_torque": (external, "N m"),
         "device_power": (external * rate, "W"),
         "swing_knee_torque": (swing_knee_torque(walk.leg, time, record), "N m"),
-        "toe_height": (_toe_height(gait, path, None if pace is None else pace[2], record), "m"),
+        "toe_height": (path.toe_height(record["walk.now.phase"], record["walk.now.shank"], angle), "m"),
         "command": (record["result.command"], "-"),
         "contact": (record["walk.contact"], "-"),
         "heel_force": (record["walk.heel_force"], "N"),
@@ -67,11 +64,6 @@ def recording_of_walk(
         channels["controller_phase"] = (record[_PHASE_ROW], "-")
     if _REQUEST_ROW in record:
         channels["reference"] = (record[_REQUEST_ROW], "N m")
-    if pace is not None:
-        _, frequency, stride = pace
-        channels["stride_frequency"] = (frequency, "Hz")
-        if gait.walking_speed is not None:
-            channels["walking_speed"] = (gait.walking_speed * stride * frequency * gait.stride_time, "m/s")
     absent = OF_SECOND_CHAMBER if run.program.has_one_chamber else frozenset()
     present = {name: Channel(np.asarray(each), unit) for name, (each, unit) in channels.items() if name not in absent}
     return Recording(f"walk, {scenario.name}", time, present, kind="simulated")
@@ -87,17 +79,3 @@ def _plant_on_bottle(run: Run, time: Floats, supply: SupplyCourse) -> PlantParam
     temperature = supply.values["gas_temperature"]
     gas_product: Any = run.plant.gas_product * (temperature / temperature[0])[latest]
     return run.plant._replace(gas_product=gas_product)
-
-
-def _toe_height(gait: Gait, path: AnklePath, stride: Floats | None, record: Mapping[str, Floats]) -> Floats:
-    """Return the height of the toes above the ground [m], which may be stairs or a slope in a task sequence.
-
-    ``stride`` is the stride length in the sequence relative to the recorded one [-], None for a level walk. The toe
-    height of the healthy gait is scaled by this ratio.
-    """
-    phase, shank, angle = (record[row] for row in ("walk.now.phase", "walk.now.shank", "state.angle"))
-    if stride is None:
-        return path.toe_height(phase, shank, angle)
-    healthy_shank, healthy_ankle = (truncate(curve).values_at(phase) for curve in (gait.shank_angle, gait.ankle_angle))
-    raised = path.toes_over_ankle(shank, angle) - path.toes_over_ankle(shank, record["walk.now.ankle"])
-    return np.asarray(stride * path.toe_height(phase, healthy_shank, healthy_ankle) + raised)

@@ -28,7 +28,7 @@ from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.motion import walk_of
-from ppafo.walking.strides import Curves, SegmentResult
+from ppafo.walking.strides import Curves
 from ppafo.wording import changed_text, override_text
 
 if TYPE_CHECKING:
@@ -44,8 +44,6 @@ _in_own_units = in_units(lambda walked, *_, **__: walked.scenario.device.shown)
 class WalkResult:
     """Result of a walk. Averages and metrics use strides after the first ones, in which the controller adapts.
 
-    For a task sequence, averages and metrics use steady strides on level ground only.
-
     - ``scenario``: scenario of the walk
     - ``recording``: channels over time [SI]
     - ``strides``: numbers of each whole stride [SI], each (strides,), by name
@@ -54,7 +52,6 @@ class WalkResult:
     - ``status``: completed, or diverged with the time [s]
     - ``starts``: samples directly after each heel strike
     - ``counted``: True for each stride that counts for averages (strides,)
-    - ``segments``: results of the segments of a task sequence, () without one
     - ``supply``: gas bottle over the walk, None without a bottle
     """
 
@@ -66,7 +63,6 @@ class WalkResult:
     status: Status
     starts: NDArray[np.intp]
     counted: NDArray[np.bool_]
-    segments: tuple[SegmentResult, ...] = ()
     supply: SupplyCourse | None = None
 
     @property

@@ -1,30 +1,23 @@
-"""Stride-by-stride evaluation of a walk: numbers of each stride, mean curves, metrics of walks and task segments."""
+"""Stride-by-stride evaluation of a walk: numbers of each stride, mean curves and metrics."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.constants import STANDARD_GRAVITY
 from ppafo.metrics import METRICS, Metric
 from ppafo.metrics.command import command_reversals, peak_torque, requested_samples
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
-from ppafo.model.contact import FLAT, SWING
 from ppafo.model.helping import PUSH_OFF
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.gait_series import ankle_path, gait_timing
 from ppafo.walking.motion import walk_of
-from ppafo.walking.task_sequence_plan import PlannedSequence
 
 PHASES = np.linspace(0.0, 1.0, 101)
 """Phases [strides] from heel strike to heel strike at which curves are averaged."""
-
-LOADED_HEEL = 0.1
-"""Force under the heel [body weights] above which the heel counts as loaded during a plantarflexion push."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +104,9 @@ def walk_metrics(
     return metrics
 
 
-def settled(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the chosen strides (strides,), without the first strides of the walk, in which the controller adapts."""
-    return chosen & (np.arange(chosen.size) >= SETTLING)
+def settled(count: int) -> NDArray[np.bool_]:
+    """Return False for the first strides of ``count``, in which the controller adapts, and True for the others."""
+    return np.arange(count) >= SETTLING
 
 
 def stride_metrics(
@@ -127,11 +120,10 @@ def stride_metrics(
     ``averages`` are the mean curves of the same strides.
     """
     metrics = {}
-    over = "" if walk_of(configuration).task_sequence is None else " over the strides at an even speed on level ground"
     for name, quantity in PER_STRIDE.items():
         values = strides[name][chosen]
         if values.size:
-            metrics[name] = Metric(float(values.mean()), quantity.unit, f"{quantity.summary}, mean{over}")
+            metrics[name] = Metric(float(values.mean()), quantity.unit, f"{quantity.summary}, mean")
     metrics["counted_strides"] = Metric(float(chosen.sum()), "-", "strides over which the means are taken")
     healthy = healthy_positive_work(configuration)
     if healthy > 0.0:
@@ -180,116 +172,3 @@ def healthy_toe_height(configuration: Scenario) -> Floats:
     gait = walk_of(configuration).gait
     path = ankle_path(gait, gait_timing(gait), walk_of(configuration).wearer)
     return path.toe_height(PHASES % 1.0, gait.shank_angle.values_at(PHASES), gait.ankle_angle.values_at(PHASES))
-
-
-@dataclass(frozen=True, slots=True)
-class SegmentResult:
-    """Result of one segment of a task sequence, in SI units.
-
-    - ``kind``, ``title``: kind of the segment, and its title for tables
-    - ``start``, ``end``: time interval of the segment [s]
-    - ``strides``: number of strides that start in the segment
-    - ``gas``: consumed gas [kg]
-    - ``net_push_off_work``: net push-off work of the strides that start in the segment [J]
-    - ``lowest_toes``: lowest toe clearance in mid-swing [m], None without a swing
-    - ``flat_push``: largest plantarflexion torque with a loaded heel [N m]
-    """
-
-    kind: str
-    title: str
-    start: float
-    end: float
-    strides: int
-    gas: float
-    net_push_off_work: float
-    lowest_toes: float | None
-    flat_push: float
-
-
-def steady_strides(planned: PlannedSequence, strikes: Floats) -> NDArray[np.bool_]:
-    """Return True for each whole stride, between strikes at times [s], at constant speed on level ground."""
-    first, last = strikes[:-1], strikes[1:]
-    steady = np.zeros(first.size, dtype=np.bool_)
-    for start, end in planned.steady:
-        steady |= (first >= start) & (last <= end)
-    return steady
-
-
-def segment_results(
-    configuration: Scenario,
-    planned: PlannedSequence,
-    recording: Recording,
-    works: Floats,
-    starts: NDArray[np.intp],
-) -> tuple[SegmentResult, ...]:
-    """Return the results of the recorded segments; ``works`` [J] are of the strides between strikes at ``starts``."""
-    time, contact = recording.time, recording["contact"]
-    strikes, end = time[starts], float(time[-1])
-    heel = recording["heel_force"] > LOADED_HEEL * walk_of(configuration).wearer.body_mass * STANDARD_GRAVITY
-    results = []
-    for span in planned.spans:
-        start, last = float(span.start), min(float(span.end), end)
-        if start >= end:
-            continue
-        own = (time >= start) & (time <= last)
-        # The last strike of a recording begins a stride that is not whole: it has no work of its own.
-        begun = np.flatnonzero((strikes >= start) & (strikes < last))
-        gas = np.interp([start, last], time, recording["supplied_mass"])
-        push = recording["torque"][own & heel & (contact <= FLAT) & (contact != SWING)]
-        result = SegmentResult(
-            kind=span.kind,
-            title=span.title,
-            start=start,
-            end=last,
-            strides=begun.size,
-            gas=float(gas[1] - gas[0]),
-            net_push_off_work=float(works[begun[begun < works.size]].sum()),
-            lowest_toes=_lowest_toes(configuration, recording, own),
-            flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
-        )
-        results.append(result)
-    return tuple(results)
-
-
-def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.bool_]) -> float | None:
-    """Return the lowest toes [m] in the same part of each swing as in the mean stride, or None without a swing."""
-    timing = gait_timing(walk_of(configuration).gait)
-    swing = recording["contact"] == SWING
-    edges = np.flatnonzero(np.diff(swing.astype(np.int8))) + 1
-    heights = []
-    for first, last in pairwise(edges.tolist()):
-        if not (swing[first] and own[first]):
-            continue
-        span = 1.0 - timing.toe_off
-        middle = [first + round((last - first) * (at - timing.toe_off) / span) for at in timing[4:6]]
-        heights.append(float(recording["toe_height"][middle[0] : middle[1] + 1].min()))
-    return min(heights, default=None)
-
-
-def task_sequence_metrics(
-    planned: PlannedSequence, segments: Sequence[SegmentResult], recording: Recording, steady: int
-) -> dict[str, Metric]:
-    """Return the metrics of a whole task sequence by name, SI units, or of the walked part of an incomplete one."""
-    toes = [segment.lowest_toes for segment in segments if segment.lowest_toes is not None]
-    # A walk may go on after its task sequence.
-    end = min(float(recording.time[-1]), float(planned.duration))
-    gas = float(np.interp(end, recording.time, recording["supplied_mass"]))
-    strides = float(sum(segment.strides for segment in segments))
-    work = sum(segment.net_push_off_work for segment in segments)
-    push = max((segment.flat_push for segment in segments), default=0.0)
-    metrics = {
-        "task_sequence_time": Metric(end, "s", "length of the task sequence, as far as it was walked"),
-        "task_sequence_planned_time": Metric(float(planned.duration), "s", "length of the whole task sequence"),
-        "steady_strides": Metric(float(steady), "-", "whole strides at an even speed on level ground"),
-        "task_sequence_strides": Metric(strides, "-", "strides of the task sequence"),
-        "task_sequence_gas": Metric(gas, "kg", "gas taken from the supply over the task sequence"),
-        "task_sequence_work": Metric(work, "J", "net work of T_ex while the foot rolls over the toes"),
-        "task_sequence_flat_push": Metric(push, "N m", "largest torque in plantarflexion with a loaded heel"),
-    }
-    if toes:
-        summary = "lowest toe height above ground in mid-swing"
-        metrics["task_sequence_lowest_toes"] = Metric(min(toes), "m", summary)
-    if "walking_speed" in recording:
-        way = float(np.trapezoid(recording["walking_speed"], recording.time))
-        metrics["task_sequence_length"] = Metric(way, "m", "distance walked in the task sequence")
-    return metrics

@@ -28,7 +28,7 @@ from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.evaluation import result_of_walk
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
-from ppafo.walking.planning import fed_device, plan_walk, task_sequence_of_walk
+from ppafo.walking.planning import fed_device, plan_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 
@@ -52,7 +52,6 @@ def walk(
     *,
     overrides: Overrides = (),
     gait: str | Path | None = None,
-    task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
     minutes: Minutes | None = None,
     plugins: Plugins = (),
@@ -60,15 +59,14 @@ def walk(
 ) -> WalkResult:
     """Simulate a walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
 
-    The default duration is stated in the file, or it is the duration of the task sequence, or otherwise one minute,
-    and ten minutes on a bottle, which may end the walk earlier.
+    The default duration is stated in the file, or otherwise one minute, and ten minutes on a bottle, which may end the
+    walk earlier.
 
     Arguments:
         scenario: a Scenario that is a walk, the name of a shipped one, or a .toml file; the arguments up to ``bottle``
             need a name or a file
         overrides: values to change, as texts or as a dictionary, as in ``simulate``
         gait: name or file of a gait in place of the scenario's
-        task_sequence: name or file of a task sequence in place of the scenario's
         bottle: name or file of a bottle in place of the scenario's
         minutes: length of the walk [min]
         plugins: modules of your own, files or names, whose objects files may name
@@ -89,11 +87,9 @@ def walk(
     """
     name_plugins(plugins)
     if not isinstance(scenario, Scenario):
-        scenario = load_walk(scenario, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
-    elif tuple(overrides) or any(choice is not None for choice in (gait, task_sequence, bottle)):
-        raise ScenarioError(
-            "a loaded Scenario accepts no overrides, gait, task sequence or bottle; give these to load_walk"
-        )
+        scenario = load_walk(scenario, overrides, gait=gait, bottle=bottle)
+    elif tuple(overrides) or any(choice is not None for choice in (gait, bottle)):
+        raise ScenarioError("a loaded Scenario accepts no overrides, gait or bottle; give these to load_walk")
     else:
         check_parts(scenario)
     scenario = lasting(scenario, minutes)
@@ -120,8 +116,8 @@ def _simulated(run: Run, progress: Progress) -> BatchResult:
 def bottle_life(scenario: Scenario, schedule: Schedule) -> BottleLife:
     """Walk on the scenario's bottle until the bottle is exhausted; return the time that it lasted.
 
-    The simulation is as in ``walk``, with the rests and the longest duration of ``schedule``; a task sequence is
-    repeated. Raises ScenarioError for a walk without a bottle.
+    The simulation is as in ``walk``, with the rests and the longest duration of ``schedule``. Raises ScenarioError for
+    a walk without a bottle.
     """
     motion = walk_of(scenario)
     if motion.bottle is None:
@@ -134,13 +130,11 @@ def bottle_life(scenario: Scenario, schedule: Schedule) -> BottleLife:
 
 
 def _repeated_walk(scenario: Scenario, longest: float) -> Scenario:
-    """Return the walk that is repeated on a bottle: a task sequence, else strides for up to ``longest`` [s].
+    """Return the walk that is repeated on a bottle: strides for up to ``longest`` [s].
 
     Strides are recorded once a minute, and last as many whole minutes as the steps of one run allow.
     """
-    sequence, stride_time = task_sequence_of_walk(scenario), walk_of(scenario).gait.stride_time
-    if sequence is not None:
-        return with_duration(scenario, float(sequence.duration))
+    stride_time = walk_of(scenario).gait.stride_time
     minute = replace(scenario, run=replace(scenario.run, duration=60.0, output_interval=60.0))
     seconds_of_run = 60.0 * (MAXIMUM_STEPS * plan_walk(minute).step // 60.0)
     seconds = min(math.ceil(longest / stride_time) * stride_time, seconds_of_run)
@@ -175,7 +169,7 @@ class WalkComparison:
 def compare_walks(
     scenario: Scenario | str | Path, *, minutes: Minutes | None = None, progress: Progress = silent
 ) -> WalkComparison:
-    """Walk with the device and without it, for some minutes or along a whole task sequence.
+    """Walk with the device and without it.
 
     Arguments:
         scenario: a walk, its name or its file

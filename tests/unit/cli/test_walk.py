@@ -15,7 +15,7 @@ from ppafo.analyses.walk import command
 from ppafo.cli.main import main
 from ppafo.storage import read_csv
 from ppafo.storage.netcdf_reading import read_netcdf
-from ppafo.walking import loading
+from ppafo.walking import list_walks, loading
 
 SHORT = ["--minutes", "0.1"]
 FILES = [
@@ -97,40 +97,11 @@ def test_tables_and_recordings_say_the_same_and_that_they_are_simulated(walked: 
     assert "angle [rad],angle_deviation [rad]" in mean[1]
 
 
-def test_the_list_names_every_walk_and_every_task_sequence(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_list_names_every_walk(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["walk", "--list"]) == 0
-    names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
-    proportional = ("proportional", "proportional-regulators")
-    assert names[:5] == ["off", *proportional, "solenoid", "solenoid-regulators"]
-    assert names[5:] == ["corridor", "first-steps", "six-minutes", "stairs"]
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(list_walks())
     assert main(["walk", "--list", "--json"]) == 0
-    listed = json.loads(capsys.readouterr().out)["walks"]
-    assert [item["kind"] for item in listed] == ["walk"] * 6 + ["task sequence"] * 4
-
-
-def test_a_task_sequence_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = tmp_path / "along"
-    assert main(["walk", "solenoid", "--task-sequence", "stairs", "--minutes", "0.3", "--out", str(folder)]) == 0
-    out = capsys.readouterr().out
-    assert "stairs, 0.6 m/s" in out
-    assert "as far as walked" in out, "0.3 min are a part of the task sequence"
-    assert "is scaled to 0.6, 0.8 m/s, outside 1.06 to 1.6 m/s" in out
-    assert {"task-sequence.png", "task-sequence.svg", "segments.csv", "segments-off.csv"} <= set(names(folder))
-    assert "legs.png" not in names(folder)
-    document = json.loads((folder / "walk.json").read_text())
-    assert document["task_sequence"] == "stairs"
-    assert [item["kind"] for item in document["segments"]] == ["stand", "walk", "stairs"]
-    lines = (folder / "segments.csv").read_text().splitlines()
-    assert lines[1].startswith("kind,start [s],end [s],strides [-],gas [kg]")
-    assert len(lines) == 5
-
-
-def test_a_bottle_repeats_a_task_sequence_as_a_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = tmp_path / "along"
-    assert main(["walk", "solenoid", "--task-sequence", "stairs", "--out", str(folder)]) == 0
-    capsys.readouterr()
-    assert main(["bottle", str(folder), "--longest", "5 s"]) == 0
-    assert "walk 'solenoid' in task sequence 'stairs'" in capsys.readouterr().out
+    assert [item["name"] for item in json.loads(capsys.readouterr().out)["walks"]] == list(list_walks())
 
 
 @pytest.fixture

@@ -46,10 +46,9 @@ OF_ANOTHER_KIND = (
 VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
-    ("proportional", ("task_sequence=first-steps",)),
     *(("proportional", of_kind) for of_kind in OF_ANOTHER_KIND),
 )
-"""Every shipped walk, one with all further features (noisy sensors, thermal gas, slow valve), task sequences,
+"""Every shipped walk, one with all further features (noisy sensors, thermal gas, slow valve), and
 other actuators."""
 
 
@@ -120,7 +119,7 @@ def batches(name: str, overrides: tuple[str, ...]) -> list[tuple[Values, Batch]]
     """Settings as they are, then drawn ones, each with what Python plans of them."""
     settings = exported(name, overrides)[0].settings
     draw = np.random.default_rng(15)
-    kinds = [text for text in overrides if "kind=" in text or text.startswith(("task_sequence", "device.set"))]
+    kinds = [text for text in overrides if "kind=" in text or text.startswith("device.set")]
     values = {item.path: item.value for item in settings}
     found: list[tuple[Values, Batch]] = []
     while len(found) < DRAWS:

@@ -23,7 +23,6 @@ WALKS: dict[str, tuple[str, tuple[str, ...]]] = {
     "lines": ("proportional-regulators", ()),
     "lines, slow": ("solenoid-regulators", ("controller.rate=500 Hz",)),
     "slow sensors": ("proportional", ("sensors.pressure_bandwidth=40 Hz",)),
-    "task_sequence": ("proportional", ("task_sequence=first-steps",)),
     "thermal": ("proportional", (*THERMAL, "gas_model.wall_area_per_volume=100 1/m", "sensors.force_noise=2 N")),
 }
 VARIED: dict[str, tuple[float, float, str]] = {
@@ -62,7 +61,7 @@ def columns_of(scenario: Scenario, seed: int) -> tuple[dict[str, np.ndarray], di
 @pytest.mark.parametrize("name", WALKS)
 def test_a_row_of_columns_has_the_bits_of_the_single_walk(name: str) -> None:
     file, words = WALKS[name]
-    base = load_walk(file, [*words, *(() if "task_sequence" in name else ("run.duration=6 s",))])
+    base = load_walk(file, [*words, "run.duration=6 s"])
     columns, units = columns_of(base, len(name))
     plan = plan_ensemble(check_columns(base, columns))
     rows: dict[int, Any] = dict(plan.reasons)
@@ -89,10 +88,10 @@ def test_a_walk_that_contradicts_itself_is_refused_and_the_others_go_on() -> Non
     assert "must be below controller.load_threshold = 25 N" in found.reasons[1]
 
 
-@pytest.mark.parametrize("name", ["solenoid", "task_sequence"])
+@pytest.mark.parametrize("name", ["solenoid", "proportional"])
 def test_a_person_of_the_population_walks_in_a_row_as_alone(name: str) -> None:
     file, words = WALKS[name]
-    base = load_walk(file, [*words, *(() if "task_sequence" in name else ("run.duration=6 s",))])
+    base = load_walk(file, [*words, "run.duration=6 s"])
     persons = np.array([0.0, 3.0, 17.0, 4.0e9])
     plan = plan_ensemble(check_columns(base, {"wearer.person": persons}))
     assert not plan.reasons

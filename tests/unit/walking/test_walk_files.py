@@ -11,7 +11,7 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import main
-from ppafo.errors import DataError, PpafoError, ScenarioError
+from ppafo.errors import DataError, ScenarioError
 from ppafo.loading import json_schema, list_all_scenarios, load_scenario, scenario_from_dict
 from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.simulation.numbers import declared_numbers
@@ -46,36 +46,31 @@ def test_every_shipped_walk_says_in_its_motion_that_it_is_one() -> None:
     }
 
 
-def test_gait_and_task_sequence_may_stand_in_the_motion_or_above_and_not_in_both(tmp_path: Path) -> None:
-    sequence = 'task_sequence = "stairs"\n'
-    inside = load_scenario(written(tmp_path, text_of(NAME) + MOTION + sequence))
-    above = load_scenario(written(tmp_path, sequence + text_of(NAME) + MOTION))
-    assert walk_of(inside).task_sequence == walk_of(above).task_sequence
-    assert walk_of(inside).task_sequence is not None
-    assert inside.run.duration == above.run.duration
-    with pytest.raises(
-        ScenarioError, match=r"mine\.toml: give either motion\.task_sequence or task_sequence, not both"
-    ):
-        load_scenario(written(tmp_path, sequence + text_of(NAME) + MOTION + sequence))
+def test_a_gait_may_stand_in_the_motion_or_above_and_not_in_both(tmp_path: Path) -> None:
+    gait = 'gait = "falisse2019-subject1"\n'
+    inside = load_scenario(written(tmp_path, text_of(NAME) + MOTION + gait))
+    above = load_scenario(written(tmp_path, gait + text_of(NAME) + MOTION))
+    assert walk_of(inside) == walk_of(above)
+    assert (
+        walk_of(inside).wearer.body_mass == walk_of(inside).gait.body_mass != walk_of(load_walk(NAME)).wearer.body_mass
+    )
+    with pytest.raises(ScenarioError, match=r"mine\.toml: give either motion\.gait or gait, not both"):
+        load_scenario(written(tmp_path, gait + text_of(NAME) + MOTION + gait))
 
 
 def test_an_override_means_the_same_under_either_path() -> None:
-    one, other = (load_scenario(NAME, [f"{path}=stairs"]) for path in ("task_sequence", "motion.task_sequence"))
-    assert walk_of(one).task_sequence == walk_of(other).task_sequence
-    with pytest.raises(
-        ScenarioError, match=r"override 'motion\.task_sequence=stairs': the motion is already given as 'rise'"
-    ):
-        load_walk(NAME, ["motion.task_sequence=stairs"], task_sequence="rise")
+    one, other = (load_scenario(NAME, [f"{path}=falisse2019-subject1"]) for path in ("gait", "motion.gait"))
+    assert walk_of(one) == walk_of(other)
+    with pytest.raises(ScenarioError, match=r"override 'motion\.gait=mine': the motion is already given as 'other'"):
+        load_walk(NAME, ["motion.gait=mine"], gait="other")
 
 
-def test_a_task_sequence_beside_a_file_in_another_folder_is_found_by_its_relative_path(tmp_path: Path) -> None:
-    sequence = (resources.files("ppafo") / "walking" / "task_sequences" / "stairs.toml").read_text(encoding="utf-8")
-    (tmp_path / "own.toml").write_text(sequence)
-    found = load_scenario(written(tmp_path, text_of(NAME) + MOTION + 'task_sequence = "own.toml"\n'))
-    own, shipped = (walk_of(item).task_sequence for item in (found, load_scenario(NAME, ["task_sequence=stairs"])))
-    assert own is not None
-    assert shipped is not None
-    assert (own.file, own.segments) == (str(tmp_path / "own.toml"), shipped.segments)
+def test_a_gait_beside_a_file_in_another_folder_is_found_by_its_relative_path(tmp_path: Path) -> None:
+    gait = (resources.files("ppafo") / "gait" / "normative" / "falisse2019-subject1.toml").read_text(encoding="utf-8")
+    (tmp_path / "own.toml").write_text(gait)
+    found = load_scenario(written(tmp_path, text_of(NAME) + MOTION + 'gait = "own.toml"\n'))
+    shipped = load_scenario(NAME, ["gait=falisse2019-subject1"])
+    assert walk_of(found).gait.ankle_angle == walk_of(shipped).gait.ankle_angle
 
 
 def test_a_dictionary_may_describe_a_walk() -> None:
@@ -115,17 +110,14 @@ def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Pa
         load_walk(misspelt)
 
 
-@pytest.mark.parametrize(("key", "kind"), [("gait", DataError), ("task_sequence", ScenarioError)])
-def test_a_gait_or_task_sequence_that_is_not_there_names_the_file_and_the_key(
-    key: str, kind: type[PpafoError], tmp_path: Path
-) -> None:
-    file, noun = written(tmp_path, f'{key} = "nobody"\n{text_of(NAME)}'), key.replace("_", " ")
-    with pytest.raises(kind, match=rf"{file.name}: {key} = 'nobody': there is no {noun} 'nobody'"):
+def test_a_gait_that_is_not_there_names_the_file_and_the_key(tmp_path: Path) -> None:
+    file = written(tmp_path, f'gait = "nobody"\n{text_of(NAME)}')
+    with pytest.raises(DataError, match=rf"{file.name}: gait = 'nobody': there is no gait 'nobody'"):
         load_walk(file)
-    with pytest.raises(kind, match=rf"^{NAME}: override {key}=nobody: there is no {noun} 'nobody'"):
-        load_walk(NAME, [f"{key}=nobody"])
-    with pytest.raises(kind, match=rf"^there is no {noun} 'nobody'"):
-        load_walk(NAME, gait="nobody") if key == "gait" else load_walk(NAME, task_sequence="nobody")
+    with pytest.raises(DataError, match=rf"^{NAME}: override gait=nobody: there is no gait 'nobody'"):
+        load_walk(NAME, ["gait=nobody"])
+    with pytest.raises(DataError, match=r"^there is no gait 'nobody'"):
+        load_walk(NAME, gait="nobody")
 
 
 def test_where_only_a_vane_will_do_a_walk_is_refused_by_its_motion(tmp_path: Path) -> None:

@@ -41,7 +41,6 @@ class Endurance:
     - ``schedule``: times of walking and rest
     - ``discharge``: state of the bottle over time, and its end
     - ``strides_when_warm``: number of strides from a bottle at constant room temperature, to show the effect of cooling
-    - ``is_of_task_sequence``: True if a repetition is a task sequence
     - ``is_of_recording``: True if a repetition is a whole recording
     - ``device_units``: display units of the device by SI unit, if it is known
     """
@@ -51,7 +50,6 @@ class Endurance:
     schedule: Schedule
     discharge: Discharge
     strides_when_warm: float
-    is_of_task_sequence: bool = False
     is_of_recording: bool = False
     device_units: Mapping[str, str] = field(default_factory=dict)
 
@@ -171,7 +169,7 @@ def finding_of_several(several: Endurances) -> Finding[Endurances]:
 
 
 def _counted(endurance: Endurance) -> str:
-    return "repetition" if endurance.is_of_task_sequence or endurance.is_of_recording else "stride"
+    return "repetition" if endurance.is_of_recording else "stride"
 
 
 def endurance_panels(endurance: Endurance) -> list[Panel]:
@@ -209,12 +207,12 @@ def _facts(endurance: Endurance) -> list[tuple[str, str]]:
     # What warms the gas of the full bottle to the room's temperature behind the regulator.
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, room)
     heat = heat_to_warm(bottle.fluid.table, content, room, bottle.regulator.set_pressure)
-    counted, repeated = _counted(endurance), "recording" if endurance.is_of_recording else "task sequence"
+    counted = _counted(endurance)
     of_device = ", the supply pressure of the device" * (bottle.entries[SET_PRESSURE].origin == "derived")
     use = "of use" if endurance.is_of_recording else "of walking"
     rows = [
         ("run time", f"{duration_text(result.walking_time)} {use}, {duration_text(result.total_time)} in total"),
-        ("strides" if counted == "stride" else f"repetitions of the {repeated}", strides_text(result.strides)),
+        ("strides" if counted == "stride" else "repetitions of the recording", strides_text(result.strides)),
         (
             f"{counted}s without cooling",
             f"{strides_text(endurance.strides_when_warm)} (a bottle that stays at room temperature)",

@@ -237,7 +237,7 @@ def discharge_of_life(life: BottleLife, draw: GasDemand) -> Discharge:
     return Discharge(
         walking_time=life.walked,
         total_time=life.total,
-        strides=life.repeats,
+        strides=life.strides,
         ending=DischargeEnd(
             TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable
         ),

@@ -46,8 +46,7 @@ def bottle(
         recordings: a .csv or .nc file with supplied_mass, or the result folder of a run or a walk; repeated until the
             bottle ends; several are compared side by side
         gas_per_stride: gas per stride, for example '0.3 g'
-        stride_time: time of one stride; default: '1.1 s', the whole recording, one stride of a walk, or its task
-            sequence
+        stride_time: time of one stride; default: '1.1 s', the whole recording, or one stride of a walk
         peak_flow: largest flow, for example '4.5 g/s'; default: the mean flow
         bottle: name of a bottle or a .toml file; default: the walk's, or the paper's bottle
         walk: time of walking between two rests, with --rest; default '10 min'

@@ -84,9 +84,10 @@ def endurance_of_gas_use(
             use, stride_time, PAPER_BOTTLE if bottle is None else bottle, schedule, tuple(overrides)
         )
     if stride_time is not None:
-        stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"
         argument = argument_text("stride_time")
-        raise ParameterError(f"{argument} applies to recordings only: {name} repeats {stride}; omit {argument}")
+        raise ParameterError(
+            f"{argument} applies to recordings only: {name} repeats one stride of its walk; omit {argument}"
+        )
     return endurance_of_walk_gas(gas, bottle, schedule, overrides)
 
 
@@ -148,7 +149,7 @@ def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -
 
     The same device walks on the bottle until the bottle is exhausted, as with ``ppafo walk --bottle``.
     The default of ``bottle`` is the bottle of the walk, else the paper's bottle. A repetition is a stride of the leg
-    with the device, or a whole task sequence.
+    with the device.
 
     >>> import ppafo
     >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1), bottle="co2-25g")
@@ -185,7 +186,7 @@ def endurance_of_walk_gas(
     check_schedule(schedule)
     life = bottle_life(walking, schedule)
     # A bottle may end before the first stride does.
-    strides = max(life.repeats, 1.0e-9)
+    strides = max(life.strides, 1.0e-9)
     stride_time, mass = life.walked / strides, life.course.regulated / strides
     before = Kind("", "kg", "gas mass", ".3g").text(at_set_pressure.mass_per_stride)
     origin = (
@@ -203,7 +204,6 @@ def endurance_of_walk_gas(
         schedule=schedule,
         discharge=ended,
         strides_when_warm=usable / demand.mass_per_stride,
-        is_of_task_sequence=bool(gas.task_sequence),
         device_units=gas.scenario.device.shown,
     )
 

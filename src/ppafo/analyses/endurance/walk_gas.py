@@ -30,36 +30,31 @@ _LEAST_GAS = -1.0e-12
 class WalkGas:
     """Gas demand of a walk: name, recording, gas per stride [kg] and stride time [s].
 
-    ``gas_per_stride`` is the mean of the assisted strides at the set pressure, 0 if the walk took no gas. For a walk on
-    a ``task_sequence`` ("" without one), a repetition is the whole sequence, and gas and time are its totals.
-    ``scenario`` is the scenario of the walk.
+    ``gas_per_stride`` is the mean of the assisted strides at the set pressure, 0 if the walk took no gas. ``scenario``
+    is the scenario of the walk.
     """
 
     name: str
     recording: Recording
     gas_per_stride: float
     stride_time: float
-    task_sequence: str = ""
     scenario: Scenario | None = None
 
 
 def walk_gas(result: WalkResult) -> WalkGas:
-    """Return the gas demand of a walk per stride, or per task sequence, with the recording."""
-    configuration, sequence = result.scenario, walk_of(result.scenario).task_sequence
-    gas = result.metrics.get("gas" if sequence is None else "task_sequence_gas")
-    time = None if sequence is None else result.metrics.get("task_sequence_time")
+    """Return the gas demand of a walk per stride, with the recording."""
+    configuration, gas = result.scenario, result.metrics.get("gas")
     return WalkGas(
         configuration.name,
         result.recording,
         0.0 if gas is None else gas.value,
-        walk_of(configuration).gait.stride_time if time is None else time.value,
-        task_sequence="" if sequence is None else sequence.name,
+        walk_of(configuration).gait.stride_time,
         scenario=configuration,
     )
 
 
 def demand_of_walk(walk: WalkGas) -> GasDemand:
-    """Return the gas demand of a walk that continues, per stride of the leg with the device or per task sequence."""
+    """Return the gas demand of a walk that continues, per stride of the leg with the device."""
     if walk.gas_per_stride <= 0.0:
         raise DataError(
             f"walk '{walk.name}': takes no gas from the supply, so no bottle would become empty; give "
@@ -68,8 +63,7 @@ def demand_of_walk(walk: WalkGas) -> GasDemand:
     # An open valve may let gas back into the supply for moments, so the largest flow is a mean over 0.1 s.
     peak = max(largest_flow(walk.recording), walk.gas_per_stride / walk.stride_time)
     draw = demand_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
-    along = f" in task sequence '{walk.task_sequence}'" if walk.task_sequence else ""
-    return replace(draw, origin=f"walk '{walk.name}'{along}, {walk.recording.kind}")
+    return replace(draw, origin=f"walk '{walk.name}', {walk.recording.kind}")
 
 
 def read_walk_gas(folder: Path) -> WalkGas:
@@ -84,14 +78,10 @@ def read_walk_gas(folder: Path) -> WalkGas:
             f"{path}: the walk {status}, so its gas demand cannot be repeated; give a walk that ran to its end"
         )
     configuration = _table(path, document, "configuration")
-    has_sequence = configuration.get("task_sequence") is not None
-    sequence = _table(path, document, "configuration.task_sequence") if has_sequence else None
-    metric = "gas" if sequence is None else "task_sequence_gas"
-    time = "configuration.gait.stride_time" if sequence is None else "metrics.task_sequence_time.value"
     # A walk without help has no gas among its metrics.
-    has_gas = metric in _table(path, document, "metrics")
-    gas = _number(path, document, f"metrics.{metric}.value", above=_LEAST_GAS) if has_gas else 0.0
-    stride_time = _number(path, document, time, above=0.0)
+    has_gas = "gas" in _table(path, document, "metrics")
+    gas = _number(path, document, "metrics.gas.value", above=_LEAST_GAS) if has_gas else 0.0
+    stride_time = _number(path, document, "configuration.gait.stride_time", above=0.0)
     recording = read_recording(folder)
     if "supplied_mass" not in recording:
         raise DataError(f"{recording.label}: there is no channel 'supplied_mass'; repeat the walk with 'ppafo walk'")
@@ -100,7 +90,6 @@ def read_walk_gas(folder: Path) -> WalkGas:
         recording,
         gas,
         stride_time,
-        task_sequence="" if sequence is None else str(sequence.get("name", "task sequence")),
         scenario=_walked(configuration, path),
     )
 

@@ -45,15 +45,15 @@ class _Computation:
 
 # Several claims rest on one walk, which takes seconds.
 @lru_cache(maxsize=16)
-def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
-    """Run a shipped walk with overrides.
+def _walked(overrides: tuple[str, ...]) -> WalkResult:
+    """Run the shipped walk with overrides.
 
     Raises SimulationError if the walk does not reach its end.
     """
-    result = walk(load_walk(name, overrides), minutes=MINUTES)
+    result = walk(load_walk(PAIR, overrides), minutes=MINUTES)
     if not result.status.is_completed:
         raise SimulationError(
-            f"walk '{name}' cannot be used for a claim, which needs a complete walk: {result.status.message}"
+            f"walk '{PAIR}' cannot be used for a claim, which needs a complete walk: {result.status.message}"
         )
     return result
 
@@ -74,12 +74,12 @@ def walking_torque(pressure: float) -> float:
     """Peak torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure [Pa absolute]."""
     # As repr, so that the walk has this very number. Nothing is published of a limit of the torque.
     overrides = (f"supply.pressure={pressure!r} SI", "controller.largest_torque=100 N m")
-    return float(_walked(PAIR, overrides).averages["torque"].mean.max())
+    return float(_walked(overrides).averages["torque"].mean.max())
 
 
 def dorsiflexor_share() -> float:
     """Dorsiflexor moment of a nondisabled wearer with the device divided by the moment without [-], stride means."""
-    worn = _walked(PAIR, (KEEPS_GAIT,))
+    worn = _walked((KEEPS_GAIT,))
     return worn.metrics["dorsiflexor_moment"].value / healthy_metrics(worn.scenario)["dorsiflexor_moment"].value
 
 

@@ -1,7 +1,6 @@
 """Report of a walk of one wearer with and without the device: text, tables and figures."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -10,7 +9,6 @@ import numpy as np
 from ppafo.analyses.walk.benefit import benefit_sentence
 from ppafo.analyses.walk.bottle import bottle_data, bottle_parts
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes, versions, walk_document
-from ppafo.analyses.walk.task_sequence import segments_csv, task_sequence_parts, task_sequence_pictures, trust_remark
 from ppafo.documents.json_text import plain
 from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
@@ -99,8 +97,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     worn = comparison.with_device
     scenario, motion, law = worn.scenario, walk_of(worn.scenario), law_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
-    ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}"
+    ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}"
     verdict, gains = tried(scenario, worn.tracking), gains_of(scenario, law)
     said = [ended, benefit_sentence(comparison), worn.torque_sentence(verdict), limited_request(scenario)]
     said += [unlimited_switching(worn), scenario.origin.replaced, "" if gains is None else gains.sentence]
@@ -115,7 +112,6 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
         said=[sentence for sentence in said if sentence],
         parts=(
             Section(said=[sentence for sentence in set_up if sentence], is_detail=True),
-            *task_sequence_parts(comparison),
             Section(columns=comparison_table(comparison), remarks=_remarks(comparison)),
             *bottle_parts(worn),
             Section("Command with the remedy" if mended else "", code=mended),
@@ -137,13 +133,6 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking | None) -> dict[str
     ``verdict`` is on a torque that does not follow the controller's request, None if the torque follows.
     """
     worn, bare = comparison.with_device, comparison.without_device
-    sequence, segments = walk_of(worn.scenario).task_sequence, {}
-    if sequence is not None:
-        segments = {
-            "task_sequence": sequence.name,
-            "segments": [asdict(segment) for segment in worn.segments],
-            "segments_off": [asdict(segment) for segment in bare.segments],
-        }
     return {
         "format": WALK_FORMAT,
         "schema_version": SCHEMA_VERSION,
@@ -158,7 +147,6 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking | None) -> dict[str
         "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
         "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
         "minutes": float(worn.recording.time[-1]) / 60.0,
-        **segments,
         **bottle_data(worn),
         "healthy": plain(dict(comparison.healthy)),
     }
@@ -172,22 +160,19 @@ def _files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
         files[f"recording{ending}.nc"] = partial(netcdf_bytes, result.recording, None)
         files[f"strides{ending}.csv"] = partial(strides_csv, result)
         files[f"mean-stride{ending}.csv"] = partial(mean_stride_csv, result)
-        if walk_of(worn.scenario).task_sequence is not None:
-            files[f"segments{ending}.csv"] = partial(segments_csv, result.segments)
     if worn.supply is not None:
         files["bottle.csv"] = partial(marked_csv_bytes, worn.supply.recording)
     return files
 
 
 def _remarks(comparison: WalkComparison) -> list[str]:
-    """Return remarks on wearer, bottle, pressures, the trusted range of speeds, and divergence."""
+    """Return remarks on wearer, bottle, pressures, and divergence."""
     worn = comparison.with_device
     diverged = [walked for walked in (worn, comparison.without_device) if not walked.status.is_completed]
     remarks = (
         *person_remarks(worn.scenario),
         _bottle_remark(worn),
         *_pressure_remarks(worn),
-        trust_remark(worn.scenario),
         *(f"{walked.scenario.name}: {walked.status.message}" for walked in diverged),
     )
     return [remark for remark in remarks if remark]
@@ -225,21 +210,16 @@ def _pressure_remarks(worn: WalkResult) -> Iterator[str]:
 
 
 def _pictures(comparison: WalkComparison) -> Sequence[Section]:
-    """Return the figures of a task sequence, or those of equal strides if there is a mean stride."""
+    """Return the figures of a walk, () without a mean stride."""
     worn, bare = comparison.with_device, comparison.without_device
-    if walk_of(worn.scenario).task_sequence is not None:
-        return task_sequence_pictures(comparison)
-    figures: list[tuple[str, str, str, Callable[[], Any]]] = []
-    if worn.averages and bare.averages:
-        walks = {"with the device": worn, "without": bare}
-        figures += [
-            ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
-            ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
-        ]
-    return [
-        Section(heading, name=name, caption=caption, draw=draw, is_detail=True)
-        for heading, name, caption, draw in figures
-    ]
+    if not (worn.averages and bare.averages):
+        return ()
+    legs, walks = partial(frames_figure, comparison), {"with the device": worn, "without": bare}
+    mean = partial(walk_figure, walks)
+    return (
+        Section("The leg", name="legs", caption=_LEGS, draw=legs, is_detail=True),
+        Section("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True),
+    )
 
 
 def comparison_table(comparison: WalkComparison) -> list[Column]:

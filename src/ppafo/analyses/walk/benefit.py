@@ -98,9 +98,8 @@ def _remedied(worn: WalkResult, drags: bool) -> list[str]:
 def _gain_with(worn: WalkResult, overrides: Sequence[str], drags: bool) -> str:
     """Return the gain of a remedy as text, from another walk of the same duration; "" if it does not suffice."""
     gain, whole = "", worn.scenario.run.duration
-    # Toes may sink from stride to stride: the whole walk decides. What a task sequence begins with is no sample of it.
-    is_even = walk_of(worn.scenario).task_sequence is None
-    for seconds in (_FIRST_TRIAL, whole) if is_even and whole > _FIRST_TRIAL else (whole,):
+    # Toes may sink from stride to stride: the whole walk decides.
+    for seconds in (_FIRST_TRIAL, whole) if whole > _FIRST_TRIAL else (whole,):
         try:
             again = walk(with_duration(reloaded(worn.scenario, overrides), seconds))
         except PpafoError:

@@ -49,11 +49,9 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     remaining = _GAS.text(end["bottle_mass"])
     if "liquid_mass" in values:
         remaining += f", {_GAS.text(end['liquid_mass'])} of it liquid"
-    walked = f"after {worn.counted.size} whole strides"
     # Strides are counted by time, as ``ppafo bottle`` counts them.
-    if motion.task_sequence is None:
-        strides = strides_text(supply.ending.time / motion.gait.stride_time)
-        walked = f"{strides} strides, {worn.counted.size} of them whole between strikes"
+    strides = strides_text(supply.ending.time / motion.gait.stride_time)
+    walked = f"{strides} strides, {worn.counted.size} of them whole between strikes"
     rows = [
         ("bottle", f"{supply.supply.bottle.title}, with {filled}"),
         ("reason for the end", supply.ending.message),

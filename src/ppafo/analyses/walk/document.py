@@ -29,7 +29,6 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "gait": plain(motion.gait),
         "wearer": plain(motion.wearer),
         "wearer_origin": motion.wearer_origin,
-        "task_sequence": plain(motion.task_sequence),
         "controller": control.kind,
         "settings": plain(control.settings),
         "period": control.period,

@@ -19,7 +19,6 @@ def walk_with_and_without(
     scenario: Annotated[Scenario | str | Path, Word("WALK")] = "solenoid",
     *,
     gait: Gait | None = None,
-    task_sequence: Annotated[str | Path, Word("SEQUENCE")] | None = None,
     bottle: Annotated[str | Path, Word("BOTTLE")] | None = None,
     minutes: Minutes | None = None,
     wearers: Count | None = None,
@@ -35,9 +34,8 @@ def walk_with_and_without(
 
     scenario: name of a walk configuration, or a .toml file; default solenoid
     gait: name of a gait, or a gait file; default: the gait of the configuration
-    task_sequence: what the wearer does one after the other: a name or a .toml file; 'ppafo walk --list' has the names
     bottle: supply the device from a bottle: a name ('ppafo bottle --list') or a .toml file; the walk ends with it
-    minutes: time to walk; default 1, up to 10 on a bottle, or a whole task sequence
+    minutes: time to walk; default 1, up to 10 on a bottle
     wearers: number of different wearers to simulate instead of one
     seed: random seed of the wearers; default 1
     check: end with exit code 1 where the torque does not follow what is requested; for one wearer
@@ -62,7 +60,7 @@ def walk_with_and_without(
     # The options of the command line belong to a file: a scenario that was built has all of it already.
     if not isinstance(chosen, Scenario):
         check_duration_once(overrides, minutes)
-        chosen = load_walk(chosen, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
+        chosen = load_walk(chosen, overrides, gait=gait, bottle=bottle)
     warn_of_coarse_pairs([chosen])
     report = progress or report_nothing
     if wearers is not None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # a lane is of these, and makes none of them
     from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
     from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
     from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
-    from ppafo.model.gait import GaitMeasured, GaitNow, GaitPlace, GaitSeries, GaitTiming, Marks, TimedSequence
+    from ppafo.model.gait import GaitMeasured, GaitNow, GaitPlace, GaitSeries, GaitTiming
     from ppafo.model.leg import FootLoad, LegParameters
     from ppafo.model.plant import PlantState, ThermalParameters
     from ppafo.model.regulator import LineState, SupplyLines
@@ -108,7 +108,6 @@ class Lane:
     gait: "GaitSeries"
     gait_timing: "GaitTiming"
     gait_sensors: "GaitSensors"
-    task_sequence: "TimedSequence"
     lines: "SupplyLines"
     load: "FootLoad"  # of a foot on a prescribed shank
     shank: Any  # of the profile of that shank
@@ -133,8 +132,7 @@ class Lane:
     carried: "CarriedFoot"  # torques of leg and device on the foot as the step begins
     place: "GaitPlace"  # where the gait is at the end of the step,
     measured: "GaitMeasured"  # what was measured there,
-    next_gait: "GaitNow"  # the gait there,
-    marks: "Marks"  # and what marks a stride of a task sequence there
+    next_gait: "GaitNow"  # and the gait there
     begun: "FreePart"  # first stage of an unconstrained vane
     prescribed: "PrescribedStep"  # motion at the end of a prescribed step
     walk_begun: "WalkStep"  # first stage of a walking leg

@@ -213,15 +213,11 @@ def do_step(parts: Program, lanes: Lanes, now: Now) -> None:
 def lead_walk(parts: Program, lanes: Lanes, now: Now) -> None:
     """Set the gait at the end of the step, and the predicted motion of the foot."""
     assert parts.leg is not None, "a leg walks"
-    if parts.takes_task_sequence:
-        for lane in lanes:
-            parts.leg.find_gait_of_task(parts, lane, now)
-    else:
-        for lane in lanes:
-            parts.leg.find_place(parts, lane, now)
-        for lane in lanes:
-            parts.leg.find_measured(parts, lane)
-        for lane in lanes:
-            parts.leg.find_gait(parts, lane)
+    for lane in lanes:
+        parts.leg.find_place(parts, lane, now)
+    for lane in lanes:
+        parts.leg.find_measured(parts, lane)
+    for lane in lanes:
+        parts.leg.find_gait(parts, lane)
     for lane in lanes:
         parts.leg.begin(parts, lane)

@@ -13,9 +13,6 @@ from ppafo.model.gait import (
     GaitPlace,
     GaitSeries,
     GaitTiming,
-    Marks,
-    TimedSequence,
-    gait_in_task_sequence,
     gait_of,
     measured_at,
     place_at,
@@ -24,22 +21,19 @@ from ppafo.model.leg import LegParameters
 from ppafo.model.sensors import GaitSeen, GaitSensors
 
 
-def groups(parts: Program) -> Groups:
+def groups(_parts: Program) -> Groups:
     """Groups for a walking leg: leg and gait, state of the walk, and values passed between phases."""
-    if parts.takes_task_sequence:
-        led = {"next_gait": handed(GaitNow), "marks": handed(Marks)}
-    else:
-        led = {"place": handed(GaitPlace), "measured": handed(GaitMeasured), "next_gait": handed(GaitNow)}
     return {
         "leg": given(LegParameters),
         "share": given(DeviceShare),
         "gait": given(GaitSeries),
         "gait_timing": given(GaitTiming),
         "gait_sensors": given(GaitSensors),
-        **({"task_sequence": given(TimedSequence)} if parts.takes_task_sequence else {}),
         "walk": kept(WalkState),
         "gait_seen": kept(GaitSeen),
-        **led,
+        "place": handed(GaitPlace),
+        "measured": handed(GaitMeasured),
+        "next_gait": handed(GaitNow),
         "carried": handed(CarriedFoot),
         "walk_begun": handed(WalkStep),
         "ahead": handed(HeldChambers),
@@ -56,7 +50,7 @@ def carry(parts: Program, lane: Lane) -> None:
 
 
 def find_place(parts: Program, lane: Lane, now: Now) -> None:
-    """Set the gait phase at the end of the step, for repeated equal strides."""
+    """Set the gait phase at the end of the step."""
     lane.place = place_at(lane.gait_timing, time_of(parts, lane, now) + length_of(parts, lane))
 
 
@@ -68,12 +62,6 @@ def find_measured(parts: Program, lane: Lane) -> None:
 def find_gait(parts: Program, lane: Lane) -> None:
     """Set the gait at the end of the step, for the leg of this wearer."""
     lane.next_gait = gait_of(lane.leg, lane.measured)
-
-
-def find_gait_of_task(parts: Program, lane: Lane, now: Now) -> None:
-    """Set the gait at the end of the step in a task sequence, with the stride events."""
-    end = time_of(parts, lane, now) + length_of(parts, lane)
-    lane.next_gait, lane.marks = gait_in_task_sequence(lane.gait, lane.task_sequence, lane.gait_timing, lane.leg, end)
 
 
 def begin(parts: Program, lane: Lane) -> None:
@@ -150,11 +138,3 @@ def end(parts: Program, lane: Lane, length: float) -> None:
         length,
         parts=parts.functions,
     )
-    if parts.takes_task_sequence:
-        # A stride's marks: a scuff, which the toe sensor follows, and a forefoot alone on a stair's edge.
-        follow_rate = lane.gait_sensors.follow_rate
-        followed = lane.marks.scuff_force * follow_rate * length / (1.0 + follow_rate * length)
-        lane.walk_after = lane.walk_after._replace(
-            toe_force=lane.walk_after.toe_force + followed,
-            toes_first=max(lane.walk_after.toes_first, lane.marks.forefoot),
-        )

@@ -42,7 +42,7 @@ def prepare_entry(
     *lines, counts = StepText(program, collector).joined(functions, preparation, ["settings"])
     assert isinstance(counts, ast.Return), "the last function gives the numbers of the steps"
     assert isinstance(counts.value, ast.Tuple), "as many as there are names"
-    # Task sequence and meters begin with the first sample.
+    # Meters begin with the first sample.
     later = {"course", *program.meter_groups}
     states = {name: row for name, row in program.state_rows().items() if name not in later}
     made = {name.id for line in lines for name in names_in(line) if isinstance(name.ctx, ast.Store)}

@@ -16,10 +16,9 @@ They equal the metrics of a study (`ppafo sweep`) to the bit. In `ppafo simulate
 recording, whose sums are rounded in another order: they agree to about 15 digits. Not here, since they need all samples
 of a channel: {left_out}."""
 _METRICS_OF_WALK = """\
-They are means over the strides from the third on, and counts; of a task sequence counts alone. In
-`ppafo walk` the same are computed from the recording, whose sums are rounded in another order: they agree to about 15
-digits. Not here, since they need the mean stride or the healthy one: `healthy_positive_work`, `push_off_share`,
-`lowest_toes`, `angle_difference`, `dorsiflexor_moment`; nor the segments of a task sequence."""
+They are means over the strides from the third on, and counts. In `ppafo walk` the same are computed from the recording,
+whose sums are rounded in another order: they agree to about 15 digits. Not here, since they need the mean stride or the
+healthy one: `healthy_positive_work`, `push_off_share`, `lowest_toes`, `angle_difference`, `dorsiflexor_moment`."""
 _FOLLOWS = """\
 - As in ppafo, these settings depend on others while they equal their default, even if it is given: {followers}."""
 _TRAPS_OF_WALK = """\
@@ -52,21 +51,18 @@ def words_of_walk(walk: Scenario, links: Graph) -> dict[str, str]:
     from ppafo.walking.motion import walk_of
     from ppafo.walking.planning import has_ideal_sensors
 
-    gait, sequence = walk_of(walk).gait, walk_of(walk).task_sequence
-    strides = "equal strides"
-    if sequence is not None:
-        strides = f"the task sequence `{sequence.name}`, which is fixed"
+    gait = walk_of(walk).gait
     fixed = [
         f"the gait, `{gait.name}`: its series, its events and its stride of {gait.stride_time:.4g} s are numbers in "
         f"the source",
-        f"the walk: {strides}",
+        "the walk: equal strides",
         f"the valve, `{walk.device.valve.kind}`, and the controller, `{walk.controller.kind}`",
         *_fixed_of_device(walk),
         _at_zero(walk.device, () if has_ideal_sensors(walk) else (1.0,)),
     ]
     return {
         "fixed": _listed(fixed),
-        "precomputed": "the gait alone" if sequence is None else "the gait and its task sequence alone",
+        "precomputed": "the gait alone",
         "traps": f"{_followers(links, second_chamber(walk))}\n{_TRAPS_OF_WALK}",
         "metrics_said": _METRICS_OF_WALK,
     }

@@ -1,6 +1,6 @@
 """Preparation of a walk from its settings: plain functions that call the planning of walks.
 
-Data derived from a gait (series, events, heel rocker) and from a task sequence are written as constants. Rows that the
+Data derived from a gait (series, events, heel rocker) are written as constants. Rows that the
 planning reads as mappings are structs in C; therefore Python runs only the functions of ``preparation``.
 """
 
@@ -25,7 +25,7 @@ from ppafo.walking.contradictions import PAIRS
 from ppafo.walking.declaration import PERSON, STEP
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import record_interval, walk_of
-from ppafo.walking.planning import NO_REFERENCE, law_of, task_sequence_of_walk
+from ppafo.walking.planning import NO_REFERENCE, law_of
 from ppafo.walking.preparation import (
     HIGHEST_ANGLE,
     LOWEST_ANGLE,
@@ -33,14 +33,11 @@ from ppafo.walking.preparation import (
     gait_sensors,
     rocker_on_heel,
     smallest_chamber,
-    standing_on,
     vented_state,
-    walk_from_standing,
     walk_from_strike,
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.task_sequence_plan import flat_foot
 from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
@@ -177,19 +174,8 @@ def set_walking_law(parts: Preparation, lane: PreparedLane, settings: Any) -> No
 
 
 def start_walk(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Set the initial leg and gas states: at a heel strike, or standing if there is a task sequence."""
-    planned = task_sequence_of_walk(parts.scenario)
-    if planned is None:
-        lane.walk = walk_from_strike(gait_at(lane.gait, lane.gait_timing, lane.leg, 0.0))
-    else:
-        lane.task_sequence = parts.constant(planned.timed)
-        foot = flat_foot(gait_timing(walk_of(parts.scenario).gait))
-        first = planned.timed.parts[0]
-        lane.walk = walk_from_standing(
-            standing_on(
-                lane.leg, lane.gait_timing.ground_angle, float(foot[0]), float(foot[1]), first.turns, first.load
-            )
-        )
+    """Set the initial leg and gas states, at a heel strike."""
+    lane.walk = walk_from_strike(gait_at(lane.gait, lane.gait_timing, lane.leg, 0.0))
     lane.gait_seen = parts.constant(NOTHING_SEEN)
     lane.state = vented_state(
         lane.plant,

@@ -68,13 +68,13 @@ class BottleLife:
     """State of a bottle from the start of a walk until the bottle ends it.
 
     ``course`` is the state of the supply over time, ``walked`` the walking time [s], ``total`` the walking time plus
-    the rests [s], and ``repeats`` the number of strides, or of task sequences, that were walked.
+    the rests [s], and ``strides`` the number of strides that were walked.
     """
 
     course: SupplyCourse
     walked: float
     total: float
-    repeats: float
+    strides: float
 
 
 def run_on_bottle(
@@ -100,15 +100,14 @@ def life_on_bottle(
     schedule: Schedule,
     progress: Callable[[float, float], None],
 ) -> BottleLife:
-    """Walk until the bottle is exhausted, with the rests of the schedule; a task sequence is repeated.
+    """Walk until the bottle is exhausted, with the rests of the schedule.
 
     The run is planned for the longest possible walk. ``progress`` is called as in ``run_on_bottle``.
     """
     use = _BottleInUse([_Meeting(0.0, supply.start(), supply.offers_first())])
     while use.ending is None and use.walked + use.rested < schedule.longest:
         _use_bottle(run, device, supply, stride_time, use, progress, schedule)
-    length = batch_of(run).clock.step_count * run.step if run.program.takes_task_sequence else stride_time
-    return BottleLife(_course_of_use(supply, use), use.walked, use.walked + use.rested, use.walked / length)
+    return BottleLife(_course_of_use(supply, use), use.walked, use.walked + use.rested, use.walked / stride_time)
 
 
 class _Meeting(NamedTuple):

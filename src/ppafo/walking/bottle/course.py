@@ -114,5 +114,5 @@ def duration_text(seconds: float) -> str:
 
 
 def strides_text(strides: float) -> str:
-    """Return a number of strides or task sequences as text, with one decimal below 100 and none above."""
+    """Return a number of strides as text, with one decimal below 100 and none above."""
     return f"{strides:.1f}" if strides < 99.5 else f"{strides:.0f}"

@@ -1,1 +1,1 @@
-"""Figures of walks: mean stride, stick figures of the leg, gait phases, and bottle and task sequences over time."""
+"""Figures of walks: mean stride, legs over one stride, and the bottle over time."""
