@@ -143,7 +143,7 @@ KINDS: Mapping[str, str] = {
     "positive": "atmosphere gas_per_stride mass minutes peak_flow pressure stature stride_time torque volume",
     "from zero": "longest longest_delay rest walk",
     "seed": "seed",
-    "count": "draws first_draws grid samples threads wearers",
+    "count": "draws first_draws grid samples threads",
     "function": "progress",
     "fraction": "confidence maximum_failed",
     "content": "content tasks",
@@ -195,7 +195,6 @@ ARGUMENTS: Mapping[str, str] = {
         "columns? progress?"
     ),
     "walk": "scenario overrides gait? bottle? minutes? progress",
-    "walk_population": "scenario wearers minutes? seed progress",
     "workbench": "scenarios overrides",
 }
 """Arguments of every public function that takes some; ``?`` where None is right too, ``:KIND`` for another kind."""
@@ -243,7 +242,6 @@ def right_values(recording: Path) -> dict[str, dict[str, Any]]:
         "tune": {"tuning": "pid-gains"},
         "validate": {"parameter_set": SET, "recordings": [recording]},
         "walk": {"scenario": WALK, "minutes": 0.05},
-        "walk_population": {"scenario": WALK, "wearers": 2, "minutes": 0.05},
     }
 
 

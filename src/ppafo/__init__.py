@@ -72,7 +72,7 @@ _HOMES = {
     "ppafo.studies.loading": ("list_studies", "load_study"),
     "ppafo.report.finding": ("Finding",),
     "ppafo.report.stored_figure": ("read_result",),
-    "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk_population"),
+    "ppafo.walking": ("compare_walks", "list_walks", "load_walk"),
     "ppafo.walking.walk": ("walk",),
 }
 """Module of each public name, from which ``__init__.pyi`` is generated."""

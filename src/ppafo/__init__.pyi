@@ -69,7 +69,6 @@ from ppafo.version import __version__ as __version__
 from ppafo.walking import compare_walks as compare_walks
 from ppafo.walking import list_walks as list_walks
 from ppafo.walking import load_walk as load_walk
-from ppafo.walking import walk_population as walk_population
 from ppafo.walking.walk import walk as walk
 
 __all__ = [
@@ -141,6 +140,5 @@ __all__ = [
     "tune",
     "validate",
     "walk",
-    "walk_population",
     "workbench",
 ]

@@ -18,7 +18,6 @@ FOLDERS: dict[str, list[str]] = {
     "tune": ["pid-gains"],
     "linearise": ["torque-task-proportional"],
     "walk": ["--minutes", "0.1"],
-    "walk --wearers": ["--wearers", "2"],
     "validate": ["ppafo2011", "bench.csv"],
     "rig": ["simulate", "step-response"],
     "identify": ["problem.toml"],
@@ -37,7 +36,7 @@ FOLDERS: dict[str, list[str]] = {
     "export firmware": ["firmware", "torque-task-solenoid"],
     "export firmware --try": ["firmware", "torque-task-solenoid", "--try"],
 }
-"""The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
+"""The words of every command that writes a folder."""
 
 FILES = {
     "export figure": (["{result}"], "figure.png"),

@@ -379,7 +379,6 @@ NOT_EXPORTED: dict[str, Case] = {
     "an integer law": Case("integer", "short", VANE_BASE, ("controller.kind=pid_fixed_point",)),
     "an object of Python": Case("object", "short", VANE_BASE, has_object=True),
     "an object of Python in a walk": Case("walking object", "short", WALK_BASE, has_object=True),
-    "a person of the population": Case("person", "short", WALK_BASE, ("wearer.person=3",)),
     "a bottle": Case("bottle", "short", WALK_BASE, ("bottle.name=paper-co2-9oz",)),
 }
 """What no door leads out of Python."""

@@ -45,8 +45,8 @@ _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow
 _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
 ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device", "actuator", "leak")}
 
-WHOLE_NUMBERS = ("sensors.seed", "wearer.person")
-"""Paths of index-like numbers: a random seed, and a person of the population."""
+NOISE_SEED = "sensors.seed"
+"""Path of the seed of the sensor noise, the only whole number."""
 _RATE, _PERIOD = "controller.rate", "controller.period"
 
 

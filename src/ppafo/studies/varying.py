@@ -15,7 +15,7 @@ from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, in_first_unit, unit_in
 from ppafo.simulation.document import PLAIN
 from ppafo.simulation.hardware import parameter_set_of
-from ppafo.simulation.numbers import WHOLE_NUMBERS, declared_numbers, number_at
+from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import (
@@ -157,9 +157,9 @@ def texts_of(entry: declared.Varied) -> list[object]:
 
 def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | RandomValue:
     """Convert a ``[[vary]]`` table to an axis or distribution; UnitError with the key of an unusable value."""
-    is_counted, is_whole = entry.path in WHOLE_NUMBERS, entry.kind == "whole_numbers"
+    is_counted, is_whole = entry.path == NOISE_SEED, entry.kind == "whole_numbers"
     if is_whole and not is_counted:
-        raise UnitError(f"kind = 'whole_numbers' is only for {' and '.join(WHOLE_NUMBERS)}; use 'choice' or 'uniform'")
+        raise UnitError(f"kind = 'whole_numbers' is only for {NOISE_SEED}; use 'choice' or 'uniform'")
     if is_counted and entry.kind not in ("grid", "list", "choice", "whole_numbers"):
         raise UnitError(
             f"kind = '{entry.kind}' does not give whole numbers, which '{entry.path}' needs; use 'whole_numbers'"
@@ -180,7 +180,7 @@ def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | R
 
 
 def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    broken = [value for value in values if path in WHOLE_NUMBERS and value != math.floor(value)]
+    broken = [value for value in values if path == NOISE_SEED and value != math.floor(value)]
     if broken:
         raise UnitError(f"{broken[0]:g} must be a whole number")
     return values

@@ -2,12 +2,10 @@
 
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import list_walks, load_walk
-from ppafo.walking.population import Population, walk_population
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import WalkComparison, compare_walks, walk
 
 __all__ = [
-    "Population",
     "Scenario",
     "WalkComparison",
     "WalkResult",
@@ -15,5 +13,4 @@ __all__ = [
     "list_walks",
     "load_walk",
     "walk",
-    "walk_population",
 ]

@@ -26,7 +26,6 @@ from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
     DURATION,
     FORCES,
-    PERSON,
     SEED,
     STEP,
     WALK_SENSORS,
@@ -103,9 +102,6 @@ def _motion(
 ) -> WalkMotion:
     """Return the motion of a walk: wearer, gait, tasks, bottle; ``sensors`` are the sensor settings [SI]."""
     gait, is_named = _gait(reading, request)
-    person = reading.number(f"wearer.{PERSON.name}", PERSON)
-    if person != int(person):
-        raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
     return WalkMotion(
         motion_kind=MOTIONS[kind_at(reading.document, "motion") or WALK],
         gait=gait,
@@ -113,7 +109,6 @@ def _motion(
         forces={name: sensors[name] for name in FORCES},
         bottle=bottle,
         wearer_origin=wearer_origin(reading, gait, is_named),
-        person=person,
     )
 
 

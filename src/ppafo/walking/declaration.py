@@ -27,14 +27,6 @@ SUMMARY = "the device on a leg that walks along a prescribed gait"
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
 STEP = Quantity("step", "s", "largest step; 1 ms unless given", 1.0e-3, 1.0e-6, 0.01)
 
-PERSON = Quantity(
-    "person",
-    "",
-    "number of the simulated person of the population; 0: the wearer of the file",
-    0.0,
-    0.0,
-    float(LARGEST_SEED),
-)
 DURATION = Quantity("duration", "s", "duration of the walk; default: 1 min, on a bottle 10 min", None, 1.0, 3600.0)
 
 WALK_SENSORS = (
@@ -54,7 +46,7 @@ def sections(controller: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
     """Return the declarations of a walk's numbers by section, for a named controller."""
     laws = walking_controllers()
     return {
-        "wearer": (*WEARER, PERSON),
+        "wearer": WEARER,
         "controller": (RATE, PERIOD, *(laws[controller].quantities if controller in laws else ())),
         "sensors": (*WALK_SENSORS, SEED),
         "run": (DURATION, STEP),
@@ -149,7 +141,7 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             Field(description="controller of the valve"),
         ),
         "wearer": optional(
-            table("Wearer", quantity_fields((*WEARER, PERSON))),
+            table("Wearer", quantity_fields(WEARER)),
             "wearer; default: the subject of the named gait, else the paper's subject",
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),

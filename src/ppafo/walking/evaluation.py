@@ -1,7 +1,6 @@
 """Evaluation of a simulated walk: status, recording, strides, averages and metrics from the rows of the engine."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -17,8 +16,6 @@ from ppafo.simulation.simulate import Status
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.contradictions import check_no_bottle
-from ppafo.walking.motion import walk_of
-from ppafo.walking.person import as_drawn
 from ppafo.walking.planning import requests_torque
 from ppafo.walking.recording import recording_of_walk
 from ppafo.walking.result import WalkResult
@@ -59,16 +56,12 @@ def _evaluated(
     supply: SupplyCourse | None,
 ) -> WalkResult:
     """Return the result of a walk from its rows (samples,) by path at times [s], up to the time of a failure."""
-    motion = walk_of(scenario)
-    # The walk is compared with the healthy gait of the person who walked; the result keeps the scenario as planned.
-    gait, wearer = as_drawn(motion.gait, motion.wearer, motion.person)
-    of_person = replace(scenario, motion=replace(motion, gait=gait, wearer=wearer))
-    recording = recording_of_walk(of_person, run, time, record, supply)
+    recording = recording_of_walk(scenario, run, time, record, supply)
     starts = stride_starts(record["walk.strides"])
     strides = per_stride(record, starts)
     counted = settled(max(starts.size - 1, 0))
     averages = mean_curves(recording, starts, counted)
-    metrics = walk_metrics(of_person, recording, strides, averages, starts, counted)
+    metrics = walk_metrics(scenario, recording, strides, averages, starts, counted)
     return WalkResult(
         scenario=scenario,
         recording=recording,

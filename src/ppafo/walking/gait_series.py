@@ -56,7 +56,7 @@ LONGER_THAN_A_FOOT = 1.0e3
 """Placeholder for an unmeasured lever of the ground force [m]; the heel lever of the wearer then limits it."""
 
 
-SERIES = {
+_SERIES = {
     "shank": "shank_angle",
     "ankle": "ankle_angle",
     "moment": "ankle_moment",
@@ -64,12 +64,12 @@ SERIES = {
     "knee_forward": "knee_forward",
     "knee_up": "knee_up",
 }
-"""Curves used by the engine, which vary between people, by field of ``GaitSeries``."""
+"""Curves used by the engine, by field of ``GaitSeries``."""
 
 
 def gait_series(gait: Gait) -> GaitSeries:
     """Return the curves of a gait for the engine; a moment, force or knee motion that was not measured is 0."""
-    return GaitSeries(**{field: series_of(gait, name) for field, name in SERIES.items()})
+    return GaitSeries(**{field: series_of(gait, name) for field, name in _SERIES.items()})
 
 
 def truncate(curve: GaitCurve) -> GaitCurve:
@@ -94,42 +94,25 @@ def foot_angles(gait: Gait, phases: Floats) -> Floats:
     return shank.values_at(phases) - ankle.values_at(phases) + 0.5 * math.pi
 
 
-def strike_angle(gait: Gait) -> float:
-    """Return the angle [rad] of the measured foot at heel strike, relative to the flat foot."""
-    return float(foot_angles(gait, np.zeros(1))[0]) - gait_timing(gait).ground_angle
-
-
 def gait_timing(gait: Gait) -> GaitTiming:
     """Return stride frequency [Hz], events [strides] and angle of the flat foot [rad].
 
     Heel rise and angle of the flat foot are determined from the curves.
     """
-    foot = foot_angles(gait, EVENT_PHASES)
-    events = gait_events(foot[None, :], np.array([gait.stance_share]))
-    return GaitTiming(
-        frequency=1.0 / gait.stride_time, start=0.0, **{name: float(values[0]) for name, values in events.items()}
-    )
-
-
-def gait_events(foot: Floats, stance_share: Floats) -> dict[str, Floats]:
-    """Return the fields of ``GaitTiming`` that follow ``start``, each an array (people,).
-
-    ``foot`` (people, phases) holds the foot angles [rad] from the horizontal at ``EVENT_PHASES``, ``stance_share``
-    (people,) the fraction of the stride in stance [-].
-    """
-    flat = (EVENT_PHASES >= FLAT_FROM) & (EVENT_PHASES <= FLAT_TO)
-    ground_angle = np.median(foot[:, flat], axis=1)
-    steep = (foot < (ground_angle - NEARLY_FLAT)[:, None]) & (EVENT_PHASES > FLAT_TO)
-    usual = USUAL_HEEL_RISE * stance_share
-    heel_off = np.where(steep.any(axis=1), EVENT_PHASES[np.argmax(steep, axis=1)], usual)
+    foot, stance_share = foot_angles(gait, EVENT_PHASES), gait.stance_share
+    ground_angle = float(np.median(foot[(EVENT_PHASES >= FLAT_FROM) & (EVENT_PHASES <= FLAT_TO)]))
+    steep = (foot < ground_angle - NEARLY_FLAT) & (EVENT_PHASES > FLAT_TO)
+    heel_off = float(EVENT_PHASES[np.argmax(steep)]) if steep.any() else USUAL_HEEL_RISE * stance_share
     swing = 1.0 - stance_share
-    return {
-        "heel_off": np.minimum(heel_off, LATEST_HEEL_RISE * stance_share),
-        "toe_off": stance_share,
-        "clearance_from": stance_share + CLEARANCE_FROM * swing,
-        "clearance_to": stance_share + CLEARANCE_TO * swing,
-        "ground_angle": ground_angle,
-    }
+    return GaitTiming(
+        frequency=1.0 / gait.stride_time,
+        start=0.0,
+        heel_off=min(heel_off, LATEST_HEEL_RISE * stance_share),
+        toe_off=stance_share,
+        clearance_from=stance_share + CLEARANCE_FROM * swing,
+        clearance_to=stance_share + CLEARANCE_TO * swing,
+        ground_angle=ground_angle,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

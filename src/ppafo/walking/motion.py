@@ -17,7 +17,7 @@ from ppafo.simulation.declaration import THERMAL, line_paths
 from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BottleSupply
-from ppafo.walking.declaration import FORCES, PERSON, by_path, sections
+from ppafo.walking.declaration import FORCES, by_path, sections
 from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
 
@@ -25,7 +25,7 @@ from ppafo.walking.wearer import WEARER, Wearer, who_walks
 class WalkMotion:
     """Walk of a wearer with the device; the gait prescribes shank and loaded foot, the device moves the free foot.
 
-    ``person`` and the numbers of ``wearer`` and ``forces`` may be arrays (runs,).
+    The numbers of ``wearer`` and ``forces`` may be arrays (runs,).
 
     - ``motion_kind``: functions of this type of motion
     - ``gait``: prescribed gait
@@ -33,7 +33,6 @@ class WalkMotion:
     - ``forces``: settings [SI] of the force sensors, by name
     - ``bottle``: gas bottle, None for an unlimited supply
     - ``wearer_origin``: description of the origin of the body mass
-    - ``person``: number of the person of the population, 0 for the wearer with the unchanged gait, or a ``Person``
     """
 
     motion_kind: MotionKind[Scenario] = field(compare=False)
@@ -42,7 +41,6 @@ class WalkMotion:
     forces: Mapping[str, Any]
     bottle: BottleSupply | None = None
     wearer_origin: str = "the paper's subject"
-    person: Any = 0.0
     locked_angle: ClassVar[None] = None
 
     @property
@@ -77,7 +75,6 @@ LONGEST_MINUTES = 60.0
 
 PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{quantity.name}": ("motion", "wearer", quantity.name) for quantity in WEARER},
-    f"wearer.{PERSON.name}": ("motion", PERSON.name),
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
 }
 """Attributes or keys that lead to the numbers of a walk that other scenarios do not have, by path."""

@@ -4,15 +4,12 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.in_python import in_program
-from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import of_each
-from ppafo.engine.run import Run, Walk, batches_of, states_at_start
+from ppafo.engine.run import Run, Walk, states_at_start
 from ppafo.engine.scheme.actuators import filled_chambers
 from ppafo.errors import ScenarioError
 from ppafo.model.actuators.kind import Chambers
@@ -28,9 +25,8 @@ from ppafo.parameters.plant import plant_parameters, venting_valve
 from ppafo.simulation.plan import Components, TimeGrid, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import ProfileChoice, Scenario
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
-from ppafo.walking.gait_series import heel_rocker
+from ppafo.walking.gait_series import gait_series, gait_timing, heel_rocker
 from ppafo.walking.motion import walk_of
-from ppafo.walking.person import Person, crowd_of, leg_of_person, person_of, settings_of_person
 from ppafo.walking.preparation import (
     HIGHEST_ANGLE,
     LOWEST_ANGLE,
@@ -71,29 +67,26 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     All runs of an ensemble must need the same program: each of ``flaws`` is 0 for all runs or for none.
     """
     motion, device = walk_of(scenario), fed_device(scenario)
-    person = person_of(motion.gait, motion.person)
-    leg = leg_of_person(leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer)), person)
+    leg = leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer))
+    gait, timing = gait_series(motion.gait), gait_timing(motion.gait)
     bare = plant_parameters(device)
     sensors = gait_sensors_of(scenario)
-    rows = leg, person.series, person.timing
-    initial = of_each(lambda leg, gait, timing: walk_from_strike(gait_at(gait, timing, leg, 0.0)), *rows)
+    initial = of_each(lambda leg: walk_from_strike(gait_at(gait, timing, leg, 0.0)), leg)
     walk = Walk(
         leg=leg,
         share=device_share(bare, leg.gravity),
-        gait=person.series,
-        timing=person.timing,
+        gait=gait,
+        timing=timing,
         sensors=sensors,
         initial=initial,
     )
-    # Whoever fits the controller to a person sets its thresholds and the start of its push-off anew.
-    settings = settings_of_person(dict(scenario.controller.settings), person)
     # An object in charge is asked between the steps, so the program has no controller of its own.
     is_outside = scenario.controller.is_outside
     components = Components(
         device=device,
         valve=venting_valve(device.valve),
         controller=None if is_outside else law_of(scenario),
-        settings={} if is_outside else settings,
+        settings={} if is_outside else scenario.controller.settings,
         reference=NO_REFERENCE,
         path=None,
         sensors=sensor_parameters(scenario),
@@ -110,18 +103,6 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         walk,
     )
     return run, (too_many_steps(scenario, run.step, run.step_count), *stiff_loads(run))
-
-
-def batch_of_many(scenario: Scenario, people: Person) -> Batch:
-    """Return the walks of many wearers as a batch without recording."""
-    run, _ = plan_walks(crowd_of(scenario, people))
-    return unrecorded(run, np.size(people.mass))
-
-
-def unrecorded(run: Run, runs: int) -> Batch:
-    """Return a batch of equally long walks without recording."""
-    ((_, batch),) = batches_of(run, runs)
-    return replace(batch, clock=replace(batch.clock, record_every=0))
 
 
 def walk_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:

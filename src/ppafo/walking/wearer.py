@@ -113,9 +113,8 @@ SCALING = {
 """Exponents of body mass and of stature with which the numbers of a leg scale between people."""
 
 
-def scaled(leg: Wearer | LegParameters, mass: Any, stature: Any) -> dict[str, Any]:
-    """Return the numbers of a leg [SI] multiplied for a relative body mass and stature [-], scalars or arrays."""
-    # A product has the same bits for one person as for a column of them, which a power need not have.
+def scaled(leg: Wearer, mass: float, stature: float) -> dict[str, Any]:
+    """Return the numbers of a leg [SI] multiplied for a relative body mass and stature [-]."""
     masses, statures = (1.0, mass), (1.0, stature, stature * stature)
     return {
         name: getattr(leg, name) * masses[of_mass] * statures[of_stature]

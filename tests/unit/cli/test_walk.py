@@ -131,29 +131,3 @@ def test_a_walk_that_diverges_is_a_status_and_exit_code_1(tmp_path: Path, capsys
     assert document["status"]["kind"] == "diverged"
     assert "diverged at t" in (tmp_path / "walk" / "report.html").read_text()
     assert "legs.png" not in names(tmp_path / "walk")
-
-
-@pytest.mark.usefixtures("bursting")
-def test_wearers_that_diverge_are_told_with_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["walk", *SHORT, "--wearers", "4", "--out", str(tmp_path / "walk")]) == 1
-    assert "4 of 4 wearers diverged and are left out" in capsys.readouterr().out
-    written = ["ppafo.json", "report.html", "wearers.csv", "wearers.json", "wearers.txt"]
-    assert names(tmp_path / "walk") == written
-
-
-def test_many_wearers_are_written_with_quantiles_and_histograms(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = tmp_path / "wearers"
-    assert main(["walk", *SHORT, "--wearers", "20", "--seed", "4", "--out", str(folder)]) == 0
-    assert capsys.readouterr().out.startswith("solenoid: 20 wearers, 0.1 min each\n")
-    written = [f"wearers.{ending}" for ending in ("csv", "json", "png", "svg", "txt")]
-    assert names(folder) == ["ppafo.json", "report.html", *written]
-    document = json.loads((folder / "wearers.json").read_text())
-    quantiles = document["outcomes"]["gas"]["quantiles"]
-    rows = (folder / "wearers.csv").read_text().splitlines()
-    column = rows[1].split(",").index("gas [kg]")
-    gas = [float(row.split(",")[column]) for row in rows[2:]]
-    assert len(gas) == document["wearers"] == 20
-    assert quantiles["0.5"] == pytest.approx(np.median(gas))
-    assert quantiles["0.05"] < quantiles["0.5"] < quantiles["0.95"]

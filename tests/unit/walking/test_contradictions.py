@@ -12,7 +12,7 @@ import pytest
 from ppafo.errors import ArgumentError, DataError, ParameterError, ScenarioError
 from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
-from ppafo.walking import list_walks, load_walk, walk, walk_population
+from ppafo.walking import list_walks, load_walk, walk
 from ppafo.walking.declaration import json_schema
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
@@ -117,14 +117,6 @@ def test_overrides_beside_a_configuration_are_refused() -> None:
     configuration = load_walk("off")
     with pytest.raises(ScenarioError, match="a loaded Scenario accepts no overrides"):
         walk(configuration, minutes=0.1, overrides=["wearer.body_mass=80 kg"])
-
-
-def test_a_number_of_wearers_that_cannot_walk_is_refused() -> None:
-    with pytest.raises(ScenarioError, match="must be from 1 to 1000000"):
-        walk_population(load_walk("off"), minutes=0.1, wearers=1_000_001)
-    for count in (0, -3):
-        with pytest.raises(ArgumentError, match=rf"^wearers={count}: must be a whole number, 1 or more"):
-            walk_population(load_walk("off"), minutes=0.1, wearers=count)
 
 
 def test_a_joint_whose_stops_the_gait_passes_is_refused_with_both_ranges() -> None:

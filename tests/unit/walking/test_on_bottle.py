@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.overrides import over
-from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking import load_walk, walk
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
@@ -156,8 +156,6 @@ def test_a_mistake_is_named_in_one_line(override: str) -> None:
 
 def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:
     configuration = load_walk(WALK, bottle=BOTTLE)
-    with pytest.raises(ScenarioError, match="walks of several wearers need a constant supply"):
-        walk_population(configuration, minutes=0.1, wearers=3)
     changes = ["gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"]
     with pytest.raises(ScenarioError, match=r"gas_model\.kind.*omit gas_model\.kind, or the bottle"):
         load_walk(WALK, [*changes, "gas_model.wall_area_per_volume=100 1/m"], bottle=BOTTLE)

@@ -4,12 +4,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-
 from ppafo.analyses.walk.wearers import wearers_finding
+from ppafo.walking.figures.population import population_figure
+
 from ppafo.report.finding import text_of
 from ppafo.walking import WalkComparison, compare_walks, load_walk, walk_population
 from ppafo.walking.figures.legs import legs_of, phases_of_last_stride
-from ppafo.walking.figures.population import population_figure
 
 CONFIGURATIONS = ("solenoid", "proportional")
 

@@ -11,7 +11,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.simulation.declaration import line_entries
 from ppafo.simulation.numbers import number_at, with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking import load_walk, walk
 from ppafo.walking.walk import without_device
 
 REGULATED = ("solenoid-regulators", "proportional-regulators")
@@ -93,11 +93,3 @@ def test_a_tenfold_droop_costs_work_and_a_smaller_step_changes_little() -> None:
     }
     assert found["drooping"] < 0.95 * found["base"]
     assert found["fine"] == pytest.approx(found["base"], rel=0.01)
-
-
-def test_many_wearers_have_lines_of_their_own() -> None:
-    people = walk_population(load_walk("solenoid-regulators"), minutes=0.1, wearers=40, seed=3)
-    ideal = walk_population(load_walk("solenoid"), minutes=0.1, wearers=40, seed=3)
-    assert people.count == ideal.count == 40
-    assert np.ptp(people.outcomes["gas"]) > 0.0
-    assert float(people.outcomes["gas"].mean()) < 0.98 * float(ideal.outcomes["gas"].mean())

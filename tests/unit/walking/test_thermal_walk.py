@@ -1,4 +1,4 @@
-"""Walks whose gas has an energy balance, with and without lines: balances, the isothermal limit, many wearers."""
+"""Walks whose gas has an energy balance, with and without lines: balances, the isothermal limit."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +10,7 @@ from ppafo.engine.step import energy_balance
 from ppafo.errors import ScenarioError
 from ppafo.metrics import evaluate
 from ppafo.simulation.scenario import GasModel
-from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking import load_walk, walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
 
@@ -56,11 +56,3 @@ def test_a_walk_with_warm_gas_keeps_mass_to_rounding_and_energy_and_comes_to_the
         assert rigid.metrics[metric].value == pytest.approx(plain.metrics[metric].value, rel=1e-3)
     if "regulated_mass" in warm.recording:
         assert (np.diff(warm.recording["regulated_mass"]) >= 0.0).all()
-
-
-def test_many_wearers_walk_with_warm_gas_and_the_first_is_that_of_the_configuration() -> None:
-    configuration = load_walk("solenoid", WARM)
-    people, alone = walk_population(configuration, minutes=0.1, wearers=3, seed=3), walk(configuration, minutes=0.1)
-    assert people.count == 3
-    strides = 6.0 / people.traits["stride_time"][0]
-    assert people.outcomes["gas"][0] * strides == pytest.approx(alone.recording["supplied_mass"][-1], rel=1e-3)

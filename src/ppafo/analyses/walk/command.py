@@ -20,5 +20,4 @@ def default_folder(values: Mapping[str, Any]) -> Path:
     configuration = load_walk(values["scenario"], **{name: values[name] for name in names})
     bottled = walk_of(configuration).bottle
     along = "" if bottled is None else f"-{bottled.bottle.name}"
-    kind = "walk" if values["wearers"] is None else "wearers"
-    return Path("out") / f"{kind}-{configuration.name}{along}"
+    return Path("out") / f"walk-{configuration.name}{along}"

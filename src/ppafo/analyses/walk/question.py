@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ppafo.arguments import Count, Gait, Minutes, Overrides, Whole, Word, checked
+from ppafo.arguments import Gait, Minutes, Overrides, Word, checked
 from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
@@ -21,8 +21,6 @@ def walk_with_and_without(
     gait: Gait | None = None,
     bottle: Annotated[str | Path, Word("BOTTLE")] | None = None,
     minutes: Minutes | None = None,
-    wearers: Count | None = None,
-    seed: Whole = 1,
     check: bool = False,
     overrides: Overrides = (),
     progress: Report | None = None,
@@ -36,9 +34,7 @@ def walk_with_and_without(
     gait: name of a gait, or a gait file; default: the gait of the configuration
     bottle: supply the device from a bottle: a name ('ppafo bottle --list') or a .toml file; the walk ends with it
     minutes: time to walk; default 1, up to 10 on a bottle
-    wearers: number of different wearers to simulate instead of one
-    seed: random seed of the wearers; default 1
-    check: end with exit code 1 where the torque does not follow what is requested; for one wearer
+    check: end with exit code 1 where the torque does not follow what is requested
 
     >>> print(walk_with_and_without("solenoid", minutes=0.1).said[0])
     solenoid: completed, 4 strides of falisse2019-subject1
@@ -46,27 +42,18 @@ def walk_with_and_without(
     from dataclasses import replace
 
     from ppafo.analyses.walk.answer import finding_of
-    from ppafo.analyses.walk.wearers import wearers_finding
-    from ppafo.errors import ArgumentError
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.walking.loading import check_duration_once, load_walk
-    from ppafo.walking.population import walk_population
     from ppafo.walking.walk import compare_walks
 
-    if check and wearers is not None:
-        raise ArgumentError("check: applies to the walk of one wearer; omit wearers or check")
     chosen = scenario
     # The options of the command line belong to a file: a scenario that was built has all of it already.
     if not isinstance(chosen, Scenario):
         check_duration_once(overrides, minutes)
         chosen = load_walk(chosen, overrides, gait=gait, bottle=bottle)
     warn_of_coarse_pairs([chosen])
-    report = progress or report_nothing
-    if wearers is not None:
-        advance = partial(_report_walk, report, "wearers", 0.0)
-        return wearers_finding(walk_population(chosen, minutes=minutes, wearers=wearers, seed=seed, progress=advance))
-    comparison = compare_walks(chosen, minutes=minutes, progress=partial(_report_walk, report, "min", _LONG_WALK))
+    comparison = compare_walks(chosen, minutes=minutes, progress=partial(_report_walk, progress or report_nothing))
     finding = finding_of(comparison)
     return replace(finding, passed=finding.passed and finding.found["tracking"] is None) if check else finding
 
@@ -75,7 +62,7 @@ _LONG_WALK = 12.0
 """Duration [min] above which a walk reports its progress."""
 
 
-def _report_walk(report: Report, noun: str, above: float, done: float, total: float) -> None:
-    """Report the progress of walks, counted in the unit ``noun``, if the total exceeds ``above``."""
-    if total > above:
-        report(Progress("walking", round(done), round(total), noun=noun))
+def _report_walk(report: Report, done: float, total: float) -> None:
+    """Report the progress of a long walk [min]."""
+    if total > _LONG_WALK:
+        report(Progress("walking", round(done), round(total), noun="min"))

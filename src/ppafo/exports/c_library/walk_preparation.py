@@ -22,7 +22,7 @@ from ppafo.simulation.numbers import device_numbers
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.contradictions import PAIRS
-from ppafo.walking.declaration import PERSON, STEP
+from ppafo.walking.declaration import STEP
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import record_interval, walk_of
 from ppafo.walking.planning import NO_REFERENCE, law_of
@@ -52,10 +52,6 @@ _RELATIONS = (
 
 def check_can_be_exported(configuration: Scenario) -> None:
     """Raise ScenarioError if a walk cannot be exported."""
-    if walk_of(configuration).person:
-        raise ScenarioError(
-            f"{configuration.name}: wearer.person is drawn at random in Python and cannot be exported; omit it"
-        )
     if walk_of(configuration).bottle is not None:
         raise ScenarioError(
             f"{configuration.name}: a walk with a bottle cannot be exported, because only Python computes bottle and "
@@ -79,12 +75,11 @@ def settings_of_walk(configuration: Scenario) -> tuple[ExportParameter, ...]:
     }
     # The structures of libraries have the device first, then the times of the run, the wearer and the controller.
     run_times = (path for path in times if path.startswith("run."))
-    wearer = (f"wearer.{quantity.name}" for quantity in (*WEARER, PERSON))
+    wearer = (f"wearer.{quantity.name}" for quantity in WEARER)
     ordered = dict.fromkeys(
         (*device_numbers(configuration.device), *run_times, *wearer, "controller.period", *control, *declared)
     )
-    # Persons are drawn in Python.
-    settings = {path: declared[path] for path in ordered if path in declared and path != f"wearer.{PERSON.name}"}
+    settings = {path: declared[path] for path in ordered if path in declared}
     return export_parameters(configuration, settings, times)
 
 

@@ -19,7 +19,7 @@ from ppafo.parameters.effects import switches_of
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import ScenarioColumns
 from ppafo.simulation.motion_kind import RunTimes
-from ppafo.simulation.numbers import WHOLE_NUMBERS, declared_numbers, with_numbers
+from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
 
@@ -107,12 +107,12 @@ def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
         written = f"{path} = {value:.9g} {unit}".rstrip()
         if not np.isfinite(value):
             return f"{written}: must be a finite number"
-        if path in WHOLE_NUMBERS and value != np.floor(value):
+        if path == NOISE_SEED and value != np.floor(value):
             return f"{written}: must be a whole number"
         return f"{written}: {range_rule(quantity, unit)}"
 
     is_good = np.isfinite(values) & is_within(values, quantity)
-    if path in WHOLE_NUMBERS:
+    if path == NOISE_SEED:
         is_good &= values == np.floor(values)
     return ~is_good, line
 

@@ -1,9 +1,6 @@
 """A walk whose torque loop oscillates fails a check, and is said without one."""
 
-import pytest
-
 from ppafo.analyses.walk.question import walk_with_and_without
-from ppafo.errors import ArgumentError
 
 TURNS = ("controller.torque_gain=5 1/(N m)", "valve.delay=8 ms")
 
@@ -17,8 +14,3 @@ def test_a_walk_whose_torque_loop_oscillates_fails_a_check_only() -> None:
     assert plain.passed
     assert not judged.passed
     assert sound.passed
-
-
-def test_a_check_is_of_one_wearer() -> None:
-    with pytest.raises(ArgumentError, match="check: applies to the walk of one wearer"):
-        walk_with_and_without("proportional", wearers=2, check=True)
