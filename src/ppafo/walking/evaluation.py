@@ -9,6 +9,7 @@ from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, state_row_number
 from ppafo.engine.step.lane import LaneResult
 from ppafo.metrics import METRICS, evaluate
 from ppafo.metrics.metric import MetricKind, Metrics
+from ppafo.metrics.strides import SETTLING
 from ppafo.signals.meter import LED_SHANK, REQUESTED
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.scenario import Scenario
@@ -19,7 +20,7 @@ from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.planning import requests_torque
 from ppafo.walking.recording import recording_of_walk
 from ppafo.walking.result import WalkResult
-from ppafo.walking.strides import mean_curves, per_stride, settled, stride_starts, walk_metrics
+from ppafo.walking.strides import mean_curves, per_stride, stride_starts, walk_metrics
 
 REMEDY = "the time step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
 
@@ -59,9 +60,8 @@ def _evaluated(
     recording = recording_of_walk(scenario, run, time, record, supply)
     starts = stride_starts(record["walk.strides"])
     strides = per_stride(record, starts)
-    counted = settled(max(starts.size - 1, 0))
-    averages = mean_curves(recording, starts, counted)
-    metrics = walk_metrics(scenario, recording, strides, averages, starts, counted)
+    averages = mean_curves(recording, starts[SETTLING:])
+    metrics = walk_metrics(scenario, recording, strides, averages, starts)
     return WalkResult(
         scenario=scenario,
         recording=recording,
@@ -70,7 +70,6 @@ def _evaluated(
         metrics=Metrics(metrics),
         status=status,
         starts=starts,
-        counted=counted,
         supply=supply,
     )
 

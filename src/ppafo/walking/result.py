@@ -51,7 +51,6 @@ class WalkResult:
     - ``metrics``: numbers of the whole walk, by name
     - ``status``: completed, or diverged with the time [s]
     - ``starts``: samples directly after each heel strike
-    - ``counted``: True for each stride that counts for averages (strides,)
     - ``supply``: gas bottle over the walk, None without a bottle
     """
 
@@ -62,7 +61,6 @@ class WalkResult:
     metrics: Mapping[str, Metric]
     status: Status
     starts: NDArray[np.intp]
-    counted: NDArray[np.bool_]
     supply: SupplyCourse | None = None
 
     @property

@@ -41,23 +41,16 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
     return {name: np.diff(totals[quantity.total][firsts[name]]) for name, quantity in PER_STRIDE.items()}
 
 
-def samples_of(chosen: NDArray[np.bool_], starts: NDArray[np.intp], samples: int) -> NDArray[np.bool_]:
-    """Return True for each sample within a chosen stride."""
-    # One more where a chosen stride begins and one less where it ends: the running sum is 1 inside.
-    edges = np.zeros(samples + 1)
-    np.add.at(edges, starts[:-1][chosen], 1.0)
-    np.add.at(edges, starts[1:][chosen], -1.0)
-    return np.asarray(np.cumsum(edges)[:-1] > 0.5)
+def mean_curves(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Curves]:
+    """Return mean and deviation of every channel over the time-normalised strides between heel strikes, in SI units.
 
-
-def mean_curves(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np.bool_]) -> dict[str, Curves]:
-    """Return mean and deviation of every channel over the chosen time-normalised strides, in SI units; {} without any.
-
-    ``chosen`` is of shape (strides,). Channels that are constant between samples, such as the command, have no mean.
+    ``starts`` are the samples after the strikes; the result is {} without a stride. Channels that are constant between
+    samples, such as the command, have no mean.
     """
-    if not chosen.any():
+    if starts.size < 2:
         return {}
-    times = times_of_phases(recording.time, starts)[chosen]
+    strikes = recording.time[starts]
+    times = strikes[:-1, None] + PHASES * np.diff(strikes)[:, None]
     curves = {}
     for name in recording.names:
         if name not in CHANNELS or not CHANNELS[name].is_held:
@@ -66,28 +59,21 @@ def mean_curves(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[
     return curves
 
 
-def times_of_phases(time: Floats, starts: NDArray[np.intp]) -> Floats:
-    """Return the times [s] of ``PHASES`` in each stride, shape (strides, phases)."""
-    first, last = time[starts[:-1]], time[starts[1:]]
-    return np.asarray(first[:, None] + PHASES * (last - first)[:, None])
-
-
 def walk_metrics(
     configuration: Scenario,
     recording: Recording,
     strides: Mapping[str, Floats],
     averages: Mapping[str, Curves],
     starts: NDArray[np.intp],
-    counted: NDArray[np.bool_],
 ) -> dict[str, Metric]:
     """Return the metrics of a walk by name, in SI units.
 
-    ``starts`` are the samples after each heel strike, and ``counted`` (strides,) marks the strides that count for
-    means. ``averages`` are over these strides.
+    ``starts`` are the samples after each heel strike. Means leave out the first strides, in which the controller
+    adapts, as ``averages`` do.
     """
     gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
-    metrics = stride_metrics(configuration, strides, averages, counted) | {
-        "strides": Metric(float(counted.size), "-", "whole strides of the walk"),
+    metrics = _stride_metrics(configuration, strides, averages) | {
+        "strides": Metric(float(strides["gas"].size), "-", "whole strides of the walk"),
         "total_gas": Metric(gas, "kg", "gas taken from the supply in the whole walk"),
     }
     of_torque: dict[str, float] = {}
@@ -95,8 +81,9 @@ def walk_metrics(
         reference, requested = recording["reference"], requested_samples(recording)
         error = reference - recording["torque"]
         # A controller that requests a torque is judged by how well it gets it in push-off.
-        pushes = samples_of(counted, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
-        parts = {"push_off_error": error[pushes], "torque_error": error[requested]}
+        settled = slice(*starts[[SETTLING, -1]]) if starts.size > SETTLING else slice(0)
+        pushes = recording["controller_phase"][settled] == PUSH_OFF
+        parts = {"push_off_error": error[settled][pushes], "torque_error": error[requested]}
         parts["requested_torque"] = reference[requested]
         of_torque = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items() if part.size}
     of_torque |= {"peak_torque": peak_torque(recording), "command_reversals": command_reversals(recording)}
@@ -104,27 +91,18 @@ def walk_metrics(
     return metrics
 
 
-def settled(count: int) -> NDArray[np.bool_]:
-    """Return False for the first strides of ``count``, in which the controller adapts, and True for the others."""
-    return np.arange(count) >= SETTLING
-
-
-def stride_metrics(
-    configuration: Scenario,
-    strides: Mapping[str, Floats],
-    averages: Mapping[str, Curves],
-    chosen: NDArray[np.bool_],
+def _stride_metrics(
+    configuration: Scenario, strides: Mapping[str, Floats], averages: Mapping[str, Curves]
 ) -> dict[str, Metric]:
-    """Return means over the chosen strides (strides,) and their ratios to a healthy ankle.
-
-    ``averages`` are the mean curves of the same strides.
-    """
+    """Return means over the strides after the first ones, and their ratios to a healthy ankle."""
     metrics = {}
     for name, quantity in PER_STRIDE.items():
-        values = strides[name][chosen]
+        values = strides[name][SETTLING:]
         if values.size:
             metrics[name] = Metric(float(values.mean()), quantity.unit, f"{quantity.summary}, mean")
-    metrics["counted_strides"] = Metric(float(chosen.sum()), "-", "strides over which the means are taken")
+    metrics["counted_strides"] = Metric(
+        float(strides["gas"][SETTLING:].size), "-", "strides over which the means are taken"
+    )
     healthy = healthy_positive_work(configuration)
     if healthy > 0.0:
         metrics["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")

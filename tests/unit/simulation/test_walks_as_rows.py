@@ -12,7 +12,7 @@ from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking import load_walk, walk
+from ppafo.walking import load_walk
 
 ROWS = 12
 THERMAL = ("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)")
@@ -86,26 +86,3 @@ def test_a_walk_that_contradicts_itself_is_refused_and_the_others_go_on() -> Non
     found = run_ensemble(base, {"controller.load_threshold": np.array([60.0, 25.0])}, ["strides"])
     assert found.status.tolist() == [0, 2]
     assert "must be below controller.load_threshold = 25 N" in found.reasons[1]
-
-
-@pytest.mark.parametrize("name", ["solenoid", "proportional"])
-def test_a_person_of_the_population_walks_in_a_row_as_alone(name: str) -> None:
-    file, words = WALKS[name]
-    base = load_walk(file, [*words, "run.duration=6 s"])
-    persons = np.array([0.0, 3.0, 17.0, 4.0e9])
-    plan = plan_ensemble(check_columns(base, {"wearer.person": persons}))
-    assert not plan.reasons
-    ((members, batch),) = plan.batches
-    for place, row in enumerate(members.tolist()):
-        alone = batch_of(plan_run(reloaded(base, [f"wearer.person={persons[row]:.0f}"])))
-        np.testing.assert_array_equal(batch.parameters[:, place], alone.parameters[:, 0], err_msg=str(row))
-        np.testing.assert_array_equal(batch.states[:, place], alone.states[:, 0], err_msg=str(row))
-    usual = batch_of(plan_run(base))
-    np.testing.assert_array_equal(batch.parameters[:, members.tolist().index(0)], usual.parameters[:, 0])
-
-
-def test_a_person_is_healthy_as_his_or_her_own_gait_is() -> None:
-    own = walk("off", overrides=["wearer.person=5", "run.duration=8 s", "wearer.keeps_gait=1"])
-    usual = walk("off", overrides=["run.duration=8 s"])
-    assert own.metrics["angle_difference"].value < 0.02, "who keeps the gait keeps that of the person"
-    assert own.metrics["healthy_positive_work"].value != usual.metrics["healthy_positive_work"].value

@@ -48,7 +48,7 @@ def test_the_mean_stride_is_the_mean_of_strides() -> None:
     growing = np.floor(time) + np.sin(2.0 * np.pi * time)
     recording = Recording("strides", time, {"angle": Channel(growing, "rad"), "command": Channel(0.0 * time, "-")})
     starts = stride_starts(np.floor(time + 1.0e-9))
-    curves = mean_curves(recording, starts, np.ones(starts.size - 1, dtype=np.bool_))
+    curves = mean_curves(recording, starts)
     assert set(curves) == {"angle"}, "a held channel has no mean"
     middle = np.abs(PHASES - 0.5) < 0.4
     np.testing.assert_allclose(curves["angle"].mean[middle], 2.0 + np.sin(2.0 * np.pi * PHASES[middle]), atol=1e-5)
@@ -57,7 +57,7 @@ def test_the_mean_stride_is_the_mean_of_strides() -> None:
 
 def test_two_strikes_are_needed_for_a_stride() -> None:
     recording = Recording("one", np.arange(3.0), {"angle": Channel(np.zeros(3), "rad")})
-    assert mean_curves(recording, np.array([1]), np.ones(0, dtype=np.bool_)) == {}
+    assert mean_curves(recording, np.array([1])) == {}
 
 
 def test_channels_of_a_walk_are_known_with_their_units() -> None:

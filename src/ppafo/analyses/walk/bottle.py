@@ -51,7 +51,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
         remaining += f", {_GAS.text(end['liquid_mass'])} of it liquid"
     # Strides are counted by time, as ``ppafo bottle`` counts them.
     strides = strides_text(supply.ending.time / motion.gait.stride_time)
-    walked = f"{strides} strides, {worn.counted.size} of them whole between strikes"
+    walked = f"{strides} strides, {worn.metrics['strides'].value:.0f} of them whole between strikes"
     rows = [
         ("bottle", f"{supply.supply.bottle.title}, with {filled}"),
         ("reason for the end", supply.ending.message),
