@@ -113,7 +113,8 @@ def failure_of(tests: list[str], source: Path, limit: float) -> str | None:
         )
     except subprocess.TimeoutExpired:
         return None
-    failed = [row.split()[1] for row in ended.stdout.splitlines() if row.startswith(("FAILED ", "ERROR "))]
+    rows = [row for row in ended.stdout.splitlines() if row.startswith(("FAILED ", "ERROR "))]
+    failed = [row.partition(" ")[2].partition(" - ")[0] for row in rows]
     return failed[0] if failed else "" if ended.returncode == 0 else f"exit {ended.returncode}"
 
 
