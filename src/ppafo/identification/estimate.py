@@ -17,7 +17,7 @@ into a set with the origin ``fitted``, and is not to be taken as a property of t
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 WRONG_UNIT: Verdict = "unit probably wrong"
-"""Verdict on a value far from the set that a common unit mistake in a recording explains; it is not used in a set."""
+"""Verdict where the recordings do better in another unit of pressure; the value is not used in a set."""
 _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only")
 
 UNKNOWN = 0.995

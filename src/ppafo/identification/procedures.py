@@ -32,7 +32,7 @@ from ppafo.identification.keys import Columns, Confidence, positive_in, quantity
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
-from ppafo.identification.unit_check import with_smoothing_unit
+from ppafo.identification.unit_check import with_tried_units
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import (
@@ -387,7 +387,9 @@ def run_procedure(
             raise
         raise IdentificationError(f"{context.label}: {error}") from error
     atmosphere = atmospheric_pressure(context.parameter_set)
-    result = with_smoothing_unit(result, sources, atmosphere, lambda again: problem.run(again, context))
+    result = with_tried_units(
+        result, sources, context.parameter_set, atmosphere, lambda again: problem.run(again, context)
+    )
     result = replace(result, summary=f"{result.summary}{gas_used}")
     acting = ("zero",) if problem.kind == "static-torque" else ()
     idle = [f"'{name}'" for name in context.tolerances.each_recording if name not in acting]

@@ -1,7 +1,7 @@
 """Report of an identification: estimates and checks in the units of the parameter set, new set, figures."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -16,7 +16,6 @@ from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
-from ppafo.identification.unit_check import FAR_FROM_SET
 from ppafo.identification.wording import in_shown_unit, interval_texts, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
@@ -32,6 +31,8 @@ from ppafo.wording import count_of
 
 _FAR = 2.0
 """Number of standard deviations above which a tolerance counts as contradicted by the recordings."""
+_FAR_FROM_SET = 5.0
+"""Ratio to the value of the set from which it is remarked on [-]: psi read as kPa makes 6.89."""
 _SHOWN = 0.05
 """Smallest share of a variance that the report shows [-]."""
 _ROW_HEAD = ("",) * 4
@@ -161,17 +162,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
             *([f"holds for this model only: {result.conflict}"] if result.conflict else []),
             *(f"{estimate.path}: {estimate.explanation}" for estimate in result.estimates),
         ]
-        for estimate in result.estimates:
-            entry = before.numbers.get(estimate.path)
-            value, unit = in_set_unit(estimate.value, estimate.path, estimate.unit, before)
-            if entry is None or not estimate.is_usable or not (entry.value > 0.0 and value > 0.0):
-                continue
-            ratio = value / entry.value
-            if not 1.0 / FAR_FROM_SET < ratio < FAR_FROM_SET:
-                times = f"{ratio:.3g} times the value of the set, {entry.value:.4g} {unit}".rstrip()
-                remarks.append(
-                    f"remark: {estimate.path} is {times}; no mistaken unit of pressure, angle or torque explains this"
-                )
+        remarks += _far_from_set(result.estimates, before)
         remarks += [f"remark: {remark}" for remark in result.remarks]
         rows = [estimate_row(estimate, before) for estimate in result.estimates]
         heading = f"{result.procedure}{kind}: {result.summary}"
@@ -208,6 +199,21 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     )
 
 
+def _far_from_set(estimates: Iterable[Estimate], before: ParameterSet) -> list[str]:
+    """Return a remark on each value far from that of the set, which is right for another device or a wrong unit."""
+    remarks = []
+    for estimate in estimates:
+        entry = before.numbers.get(estimate.path)
+        value, unit = in_set_unit(estimate.value, estimate.path, estimate.unit, before)
+        if entry is None or not estimate.is_usable or not (entry.value > 0.0 and value > 0.0):
+            continue
+        ratio = value / entry.value
+        if not 1.0 / _FAR_FROM_SET < ratio < _FAR_FROM_SET:
+            times = f"{ratio:.3g} times the value of the set, {entry.value:.4g} {unit}".rstrip()
+            remarks.append(f"remark: {estimate.path} is {times}; if the devices are alike, check the units")
+    return remarks
+
+
 def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Section:
     """Return the section of the trajectory fit: estimates, tolerances, remarks and proposed next experiments."""
     kind, fit = kind_of_fit(outcome.fit), outcome.fit
@@ -220,6 +226,7 @@ def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Sectio
             for estimate in fit.estimates
             if estimate.explanation != fit.conflict
         ),
+        *_far_from_set(fit.estimates, before),
         *_tolerances(fit.known, before),
         *(f"remark: {remark}" for remark in outcome.remarks),
     ]

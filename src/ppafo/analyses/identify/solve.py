@@ -1,6 +1,5 @@
 """Identification of a parameter set from a problem file: recordings, procedures in order, new parameter set."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +8,6 @@ from typing import NamedTuple
 from ppafo.analyses.identify.answer import Identification
 from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
 from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.estimate import WRONG_UNIT
 from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import DeviceProblem, ProblemFile
 from ppafo.identification.procedures import (
@@ -24,15 +22,13 @@ from ppafo.identification.procedures import (
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, source_of
 from ppafo.identification.tolerances import Tolerances, tolerances_of
 from ppafo.identification.trajectory.layout import ExperimentSection
-from ppafo.identification.trajectory.section import SectionContext, TrajectoryOutcome, solve_section
-from ppafo.identification.unit_check import FAR_FROM_SET, with_wrong_units
+from ppafo.identification.trajectory.section import SectionContext, solve_section
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
 from ppafo.progress import Report, report_nothing
 from ppafo.signals.recording import TIME
-from ppafo.simulation.recorded.channels import SUPPLY
 from ppafo.storage.column_map import MappedChannel
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.foreign import read_trials
@@ -74,10 +70,8 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
                 used=used,
                 tolerances=tolerances,
             )
-            trajectory = _with_checked_units(solve_section(problem.trajectory, section, progress), current)
-            # Values fitted together belong together: without one of them the others describe no device.
-            if all(estimate.verdict != WRONG_UNIT for estimate in trajectory.fit.estimates):
-                estimates += trajectory.fit.estimates
+            trajectory = solve_section(problem.trajectory, section, progress)
+            estimates += trajectory.fit.estimates
         new_set = with_estimates(before, estimates, valve)
         identification = Identification(problem.name, results, trajectory, before, new_set)
         described = replace(new_set, parameter_set=_described_set(identification, problem))
@@ -185,35 +179,9 @@ def _bench_results(
     for task in tasks:
         context = ProcedureContext(current, valve, task.label, tolerances)
         found = run_procedure(task.sources, task.procedure, context)
-        known = {item.path: number_in_si(current, item.path) for item in found.estimates}
-        recordings = [source.recording for source in task.sources]
-        results.append(replace(found, estimates=with_wrong_units(found.estimates, known, recordings)))
-        current = with_estimates(current, results[-1].estimates).parameter_set
+        results.append(found)
+        current = with_estimates(current, found.estimates).parameter_set
     return tuple(results), current
-
-
-def _with_checked_units(trajectory: TrajectoryOutcome, current: ParameterSet) -> TrajectoryOutcome:
-    """Return the trajectory fit with the verdict of a wrong unit where a unit mistake explains its estimates.
-
-    Estimates are compared with the values of the set, or with their start values if these are near: a start near the
-    estimate shows that the person expects the value.
-    """
-    fit = trajectory.fit
-    starts = {number.free.name: number.free.start for number in fit.numbers}
-    is_near = {
-        path: value > 0.0 and 1.0 / FAR_FROM_SET < starts[path] / value < FAR_FROM_SET
-        for path, value in fit.values.items()
-    }
-    known = {path: value if is_near[path] else number_in_si(current, path) for path, value in fit.values.items()}
-    recordings = [experiment.recording for experiment in fit.problem.experiments]
-    supplies = [experiment.scenario.device.supply for experiment in fit.problem.experiments]
-    supply = max(max(item.pressure, item.dorsiflexion_pressure) - item.atmospheric_pressure for item in supplies)
-    if any(SUPPLY in recording for recording in recordings) or any(
-        item.path.startswith("supply.") for item in fit.estimates
-    ):
-        supply = math.nan
-    estimates = with_wrong_units(fit.estimates, known, recordings, supply)
-    return replace(trajectory, fit=replace(fit, estimates=estimates))
 
 
 def _used_recordings(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:
