@@ -73,7 +73,7 @@ class RunCounter:
 
 @final
 class Runs:
-    """Runs of one scenario or model: ``run(columns)`` returns their rows and appends columns and rows to ``table``.
+    """Runs of one scenario or model: ``run(columns)`` returns their rows.
 
     ``evaluate`` computes the rows of at most ``at_once`` runs. ``count`` is the number of finished runs, ``failures``
     the number of runs that diverged or were refused; ``reason`` says why the first of these failed.
@@ -83,7 +83,6 @@ class Runs:
         self.metrics = tuple(metrics)
         self.count, self.failures, self.reason = 0, 0, ""
         self._evaluate, self._counter, self._at_once = evaluate, counter, at_once
-        self._parts: list[Rows] = []
 
     def run(self, columns: Mapping[str, Floats]) -> Rows:
         """Run the model with values [SI] by path, each column (runs,), and return the rows of metrics."""
@@ -101,18 +100,12 @@ class Runs:
             first, rate = first + size, size / max(time.monotonic() - started, 1.0e-6)
             size = max(1, min(self._at_once, int(_BETWEEN_REPORTS * rate)))
             parts.append(rows)
-            self._parts.append({**part, **rows})
             self.reason = self.reason or reason
             count, failures = rows[FAILED].size, int(rows[FAILED].sum())
             self.count += count
             self.failures += failures
             self._counter.add(count, failures)
         return joined(parts)
-
-    @property
-    def table(self) -> Rows:
-        """Table of all runs so far: columns of varied values and of metrics."""
-        return joined(self._parts) if self._parts else {}
 
     def check(self, rows: Rows, maximum_failed: float, subject: str, metrics: Sequence[str] = ()) -> None:
         """Raise StudyError if more than the fraction ``maximum_failed`` of the rows failed or lacks one of the metrics.
