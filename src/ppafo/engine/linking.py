@@ -1,4 +1,4 @@
-"""Linking of effect laws to their ports, and of an actuator's chambers to the observer of a walk."""
+"""Linking of effect laws to their ports."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -274,7 +274,7 @@ class Program:
 
     @property
     def has_phase(self) -> bool:
-        """True if the controller of a walk estimates the gait phase."""
+        """True if the controller of a walk detects the gait phase."""
         return hasattr(getattr(self.initial_controller_state, "phase", None), "phase")
 
     @property

@@ -18,29 +18,22 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
 
 MISTAKES = {
-    "controller.unload_threshold=80 N": "must be below controller.load_threshold = 60 N",
-    "controller.first_stride_time=5 s": "between half and twice the stride time of the gait, 1.0384 s",
-    "controller.push_off_end=0.39": "must be above controller.push_off_start = 0.4",
-    "actuator.angle_max=90 deg": "the gait needs 76 to 109 deg, but the upper stop is at 90 deg",
-    "controller.swing_angle=135 deg": "must be in the range of the device, 20 deg to 130 deg",
-    "wearer.shank_mass_centre=0.5 m": "lies beyond the ankle: wearer.shank_length = 0.46 m",
-    "wearer.toe_lever=0.08 m": "is not given and has its default, 0.09 m: lies beyond the toes",
-    "controller.unload_treshold=20 N": "has no value 'controller.unload_treshold', did you mean 'controller.unload_th",
-    "controller.load_threshold=60": "a number without a unit does not fit: a unit like 'N' is needed",
-    "controller.load_threshold=60 kg": "unit 'kg' does not fit: a unit like 'N' is needed",
-    "wearer.body_mass=5 kg": "must be at least 10 kg and at most 300 kg",
-    "controller.kind=event_of": "'event_of' is not known",
-    "controller.kind=hysteresis; controller.band=0.5 N m": "controller.kind = 'hysteresis' is not known",
-    "controller.kind=event_proportional": "not a solenoid valve: set device.valve to 'proportional', or cont",
-    "sensors.angle_bandwidth=-1 Hz": "must be at least 0 Hz and at most 1e",
-    "sensors.pressure_lost_share=2": "must be at least 0 and at most 1",
+    "controller.unload_threshold=80 N": "controller.load_threshold = 60 N",
+    "controller.first_stride_time=5 s": "1.0384 s",
+    "controller.push_off_end=0.39": "controller.push_off_start = 0.4",
+    "actuator.angle_max=90 deg": "76 to 109 deg",
+    "controller.swing_angle=135 deg": "20 deg to 130 deg",
+    "wearer.shank_mass_centre=0.5 m": "wearer.shank_length = 0.46 m",
+    "wearer.toe_lever=0.08 m": "0.09 m",
+    "controller.kind=event_proportional": "device.valve",
 }
+"""Overrides of the walk 'solenoid', and the other number that the refusal names."""
 PROFILE = {
-    "controller.peak_time=0.9; controller.fall_time=0.2": "the torque would end after the stride",
-    "controller.peak_time=0.95": "must be at least 0.1 and at most 0.9 .phase of the peak",
-    "controller.rise_time=0.6": "the torque would rise before the heel strike: controller.peak_time = 0.53",
-    "controller.peak_time=0.3": "the peak would be over before the push-off: controller.push_off_start = 0.4",
+    "controller.peak_time=0.9; controller.fall_time=0.2": "controller.fall_time",
+    "controller.rise_time=0.6": "controller.peak_time = 0.53",
+    "controller.peak_time=0.3": "controller.push_off_start = 0.4",
 }
+"""The same of the walk 'proportional'."""
 
 
 @pytest.mark.parametrize("overrides", MISTAKES)
@@ -96,31 +89,31 @@ def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> Non
     bare = replace(load_gait(), name="bare", vertical_force=None, ankle_moment=None, centre_of_pressure=None)
     path = tmp_path / "bare.toml"
     path.write_text(gait_toml(bare))
-    with pytest.raises(ScenarioError, match="gait 'bare' has no vertical_force; import the gait with ground"):
+    with pytest.raises(ScenarioError, match="vertical_force"):
         load_walk("solenoid", gait=path)
     assert walk_of(load_walk("off", gait=path)).gait.name == "bare"
 
 
 @pytest.mark.parametrize("minutes", [0.05, 61.0])
 def test_a_walk_too_short_or_too_long_is_refused(minutes: float) -> None:
-    with pytest.raises(ScenarioError, match=r"must be at least 0\.087 min \(5 strides\) and at most 60 min"):
+    with pytest.raises(ScenarioError, match=r"0\.087 min.* 60 min"):
         walk("solenoid", minutes=minutes)
 
 
 @pytest.mark.parametrize("minutes", [-1.0, float("nan"), float("inf")])
 def test_what_is_no_number_of_minutes_is_refused(minutes: float) -> None:
-    with pytest.raises(ArgumentError, match=rf"^minutes={minutes}: must be a number of minutes above 0"):
+    with pytest.raises(ArgumentError, match=rf"^minutes={minutes}: "):
         walk("solenoid", minutes=minutes)
 
 
 def test_overrides_beside_a_configuration_are_refused() -> None:
     configuration = load_walk("off")
-    with pytest.raises(ScenarioError, match="a loaded Scenario accepts no overrides"):
+    with pytest.raises(ScenarioError, match="overrides"):
         walk(configuration, minutes=0.1, overrides=["wearer.body_mass=80 kg"])
 
 
 def test_a_joint_whose_stops_the_gait_passes_is_refused_with_both_ranges() -> None:
-    with pytest.raises(ScenarioError, match=r"the gait needs 76 to 109 deg, but the upper stop is at 70 deg$"):
+    with pytest.raises(ScenarioError, match=r"76 to 109 deg.* 70 deg$"):
         load_walk("proportional", ["actuator.angle_max=70 deg"])
-    with pytest.raises(ScenarioError, match=r"the gait needs 76 to 109 deg, but the lower stop is at 85 deg$"):
+    with pytest.raises(ScenarioError, match=r"76 to 109 deg.* 85 deg$"):
         load_walk("proportional", ["actuator.angle_min=85 deg"])

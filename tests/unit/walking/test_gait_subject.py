@@ -53,14 +53,12 @@ def test_segments_follow_a_stature_that_is_given_and_the_body_mass_but_for_those
 
 def test_a_stature_beyond_those_of_adults_is_said() -> None:
     (adult,) = person_remarks(load_walk("solenoid", ["wearer.stature=1.75 m"]))
-    assert "; 1.75 m tall, segments scaled by mass and stature; the curves of the gait are not scaled" in adult
+    assert "1.75 m" in adult
     (child,) = person_remarks(load_walk("solenoid", ["wearer.stature=1.2 m", "wearer.body_mass=20 kg"]))
-    assert "1.2 m tall" in child
-    assert "in the proportions of adults of 1.45 to 2 m, extrapolated here" in child
-    assert "extrapolated outside 37 to 105 kg; better import a gait recorded of such a person" in child
+    assert all(number in child for number in ("1.2 m", "1.45 to 2 m", "37 to 105 kg"))
     (thin,) = person_remarks(load_walk("solenoid", ["wearer.body_mass=30 kg"]))
-    assert ", with the leg of the paper's subject, 72.5 kg; wearer.stature scales the leg; " in thin
-    with pytest.raises(ScenarioError, match=r"wearer.stature=3 m: must be at least 0.5 m and at most 2.5 m"):
+    assert "72.5 kg; wearer.stature" in thin
+    with pytest.raises(ScenarioError, match=r"wearer\.stature=3 m.* 2\.5 m"):
         load_walk("solenoid", ["wearer.stature=3 m"])
 
 
@@ -78,16 +76,12 @@ def test_a_stated_body_mass_wins_and_the_difference_is_said(tmp_path: Path) -> N
     path = gait_file(tmp_path, 85.07)
     found = load_walk("solenoid", ["wearer.body_mass=90 kg"], gait=path)
     assert walk_of(found).wearer.body_mass == 90.0
-    assert person_remarks(found) == [
-        "wearer: 90 kg, as wearer.body_mass states; the subject of gait 'mine' has 85.07 kg: moment and force of the "
-        "gait are scaled by body mass"
-    ]
-    same = load_walk("solenoid", ["wearer.body_mass=85.07 kg"], gait=path)
-    assert person_remarks(same) == ["wearer: 85.07 kg, as wearer.body_mass states"]
+    (said,) = person_remarks(found)
+    assert all(part in said for part in ("90 kg", "wearer.body_mass", "'mine'", "85.07 kg"))
+    (same,) = person_remarks(load_walk("solenoid", ["wearer.body_mass=85.07 kg"], gait=path))
+    assert "'mine'" not in same
 
 
 def test_a_subject_who_cannot_wear_the_device_is_refused_with_the_key(tmp_path: Path) -> None:
-    with pytest.raises(
-        ScenarioError, match=r"so wearer\.body_mass would be 6 kg, but it must be 10 to 300 kg; give wearer"
-    ):
+    with pytest.raises(ScenarioError, match=r"wearer\.body_mass.* 6 kg.* 10 to 300 kg"):
         load_walk("solenoid", gait=gait_file(tmp_path, 6.0))

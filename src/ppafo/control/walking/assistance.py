@@ -7,15 +7,13 @@ The profile has the four parameters of the exoskeleton literature, J. Zhang et a
 smooth rise to the peak, a smooth fall, zero; cubic with zero slope at its ends.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseState
 from ppafo.model.declaration import Quantity
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF
-from ppafo.model.sensors import GaitMeasurement
-from ppafo.model.valves.kind import VENT
 
 
 class TorqueProfile(NamedTuple):
@@ -118,17 +116,6 @@ class TorqueRequest(NamedTuple):
     torque: float = 0.0
 
 
-class _Assessment(NamedTuple):
-    """Evaluation of a sample by a walking controller, before the law computes the command."""
-
-    phase: PhaseState
-    request: TorqueRequest
-    continues: float
-    """1 where the task of the previous sample continues, 0 where another task starts."""
-    acts: float
-    """1 where the law commands the valve, 0 where both chambers are vented."""
-
-
 START = TorqueRequest()
 
 EASING_TIME = 0.1
@@ -165,33 +152,22 @@ def same_task(before: float, after: float) -> bool:
     return phases.lifts(before) == phases.lifts(after) and (before == PUSH_OFF) == (after == PUSH_OFF)
 
 
-def assess(parameters: Any, state: Any, measurement: GaitMeasurement, period: float) -> _Assessment:
-    """Assess a sample taken every ``period`` [s]: gait phase, requested torque [N m], and permission to act.
-
-    ``parameters`` and ``state`` are rows with the fields of ``LawParameters`` and ``LawState`` (``frame.py``).
-    """
-    heel, toe = measurement.heel_force, measurement.toe_force
-    phase = phases.next_phase_state(parameters.phases, state.phase, heel, toe, period)
-    rules: Assistance = parameters.assistance
-    last: TorqueRequest = state.request
+def next_request(
+    rules: Assistance, last: TorqueRequest, phase: PhaseState, angle: float, period: float
+) -> TorqueRequest:
+    """Requested torque after a sample of the angle [rad], taken every ``period`` [s], in the present phase."""
     # An angle of 0 marks that there was no sample before.
-    turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
+    turned = angle - last.angle if last.angle > 0.0 else 0.0
     # A filter of first order, with an implicit step: stable for any time constant.
     rate = last.rate + (turned - period * last.rate) / (period + rules.rate_filter)
-    torque = requested_torque(rules, phase, measurement.angle, rate)
+    return TorqueRequest(angle, rate, requested_torque(rules, phase, angle, rate))
+
+
+def acts(phase: PhaseState, torque: float) -> bool:
+    """Return whether the law commands the valve at a torque of the actuator [N m]; else both chambers are vented."""
     # A foot that lands on its toes turns far, and gas left in the chamber would then push on a loaded heel: the law
     # takes it off. A stance that began on the toes has been in mid-stance since its strike: it had no landing.
     on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
-    is_eased = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
+    is_eased = on_toes and phase.since_strike < EASING_TIME and torque > EASED
     has_task = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or is_eased
-    return _Assessment(
-        phase=phase,
-        request=TorqueRequest(measurement.angle, rate, torque),
-        continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
-        acts=1.0 if has_task and not phases.lacks_event(phase) else 0.0,
-    )
-
-
-def valve_command(assessment: _Assessment, command: float) -> float:
-    """Valve command [-]: the command of the law where the device acts, else ``VENT``."""
-    return command if assessment.acts > 0.5 else VENT
+    return has_task and not phases.lacks_event(phase)

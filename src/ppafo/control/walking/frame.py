@@ -1,7 +1,7 @@
 """Common frame of all torque laws in walking.
 
-The gait phase determines the requested torque, and the law tracks the request. Walking torque
-laws differ only in the law and in its state after a change of task.
+The gait phase determines the requested torque, and the law tracks the request. Walking torque laws differ only in the
+law and in its state after a change of task.
 """
 
 import functools
@@ -11,13 +11,14 @@ from typing import Any, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, phases
-from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest, assess
+from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
 from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import row_with
 from ppafo.model.sensors import GaitMeasurement, Measurement
+from ppafo.model.valves.kind import VENT
 
 
 class LawParameters(NamedTuple):
@@ -74,20 +75,22 @@ def law_that_walks_update(
     parts: _WalkingParts,
 ) -> tuple[float, LawState]:
     """Command from -1 to 1, or ``VENT``, and the next state; the reference is not used."""
-    assessment = assess(parameters, state, measurement, period)
-    requested = assessment.request.torque
+    heel, toe = measurement.heel_force, measurement.toe_force
+    phase = phases.next_phase_state(parameters.phases, state.phase, heel, toe, period)
+    request = assistance.next_request(parameters.assistance, state.request, phase, measurement.angle, period)
     # Before the update: what the law remembers of another task must not act on this one.
-    law = parts.restart(state.law, requested, assessment.continues)
+    continues = 1.0 if assistance.same_task(state.phase.phase, phase.phase) else 0.0
+    law = parts.restart(state.law, request.torque, continues)
     sample = Measurement(
         angle=measurement.angle,
         pressure_1=measurement.pressure_1,
         pressure_2=measurement.pressure_2,
         torque=measurement.torque,
     )
-    command, law = parts.update(parameters.law, law, requested, sample, period)
-    command = assistance.valve_command(assessment, command)
-    following: LawState = parts.state(phase=assessment.phase, request=assessment.request, law=law)
-    return command, following
+    command, law = parts.update(parameters.law, law, request.torque, sample, period)
+    sent = command if assistance.acts(phase, measurement.torque) else VENT
+    following: LawState = parts.state(phase=phase, request=request, law=law)
+    return sent, following
 
 
 def shared_settings(law: ControllerKind) -> set[str]:

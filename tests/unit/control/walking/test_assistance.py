@@ -83,14 +83,11 @@ def test_landing_and_swing_are_one_task_and_the_others_are_not() -> None:
 
 
 def test_the_rate_of_the_angle_is_filtered_and_has_no_kick_at_the_start() -> None:
-    kind = WALKING_CONTROLLERS["event_pid"]
-    parameters, state = default_parameters("event_pid"), kind.initial
-    first = assistance.assess(parameters, state, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
-    assert first.request.rate == 0.0
-    _, state = kind.update(parameters, state, 0.0, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
-    second = assistance.assess(parameters, state, seen(1.601, 0.0, 0.0, 0.0), PERIOD)
-    filter_time = parameters.assistance.rate_filter
-    assert second.request.rate == pytest.approx(0.001 / (PERIOD + filter_time))
+    rules = RULES._replace(rate_filter=0.006)
+    first = assistance.next_request(rules, assistance.START, at(SWING, 0.8), 1.6, PERIOD)
+    assert first.rate == 0.0
+    second = assistance.next_request(rules, first, at(SWING, 0.8), 1.601, PERIOD)
+    assert second.rate == pytest.approx(0.001 / (PERIOD + 0.006))
 
 
 def one_stride() -> list[GaitMeasurement]:
