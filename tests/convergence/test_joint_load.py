@@ -23,14 +23,13 @@ def bench_with(drag: float, stiffness: float, weight: float) -> type[peer.Bench]
     """The equations of ``tests/reference/bench.py``, which shares no code with the package, with the load."""
 
     class Loaded(peer.Bench):
-        def drive(self, y: Any) -> tuple[float, float]:
-            torque, pressed = super().drive(y)
-            return torque - stiffness * (y[0] - 0.5 * math.pi) + weight * math.sin(y[0]), pressed
+        def drive(self, y: Any) -> float:
+            return super().drive(y) - stiffness * float(y[0] - 0.5 * math.pi) + weight * math.sin(y[0])
 
-        def between(self, inside: float, warmth: float, outside: float, share: float) -> tuple[float, float]:
+        def between(self, inside: float, outside: float, share: float) -> float:
             # The supplies of the set have check valves.
             is_shut = outside in (self.rig.source_1, self.rig.source_2) and inside > outside
-            return (0.0, 0.0) if is_shut else super().between(inside, warmth, outside, share)
+            return 0.0 if is_shut else super().between(inside, outside, share)
 
         def rates(self, y: Any, way: float, opening: float) -> list[float]:
             found = super().rates(y, way, opening)
