@@ -9,7 +9,6 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.gait import at_speed, load_gait, walk_recording
 from ppafo.gait.recorded import ImportSettings, import_gait
-from ppafo.gait.recorded.mapping import Side
 from ppafo.signals.recording import Floats
 
 SHANK, ANKLE, MOMENT, FORCE = "shank_angle [rad]", "ankle_angle [rad]", "ankle_moment [N m/kg]", "vertical_force [-]"
@@ -116,26 +115,3 @@ def test_the_built_in_gait_at_other_speeds_has_no_remark(
     # The recording has no column of the knee, and nothing else is odd about it.
     (remark,) = import_gait([csv_of(given, walk.time)], ImportSettings(62.0)).remarks
     assert remark.startswith("no acceleration of the knee: ")
-
-
-@pytest.mark.parametrize("side", ["right", "left"])
-def test_real_angles_half_a_stride_or_50_ms_away_from_their_plates_are_said(
-    shared_data: Path, tmp_path: Path, side: Side
-) -> None:
-    folder = shared_data / "gait" / "opensim_subject01"
-    angles, plates = folder / "subject01_walk1_ik.mot", folder / "subject01_walk1_grf_15s.mot"
-    assert not any("clock" in line for line in import_gait([angles, plates], ImportSettings(72.6, side)).remarks)
-    lines = angles.read_text().splitlines()
-    first = next(number for number, line in enumerate(lines) if line.strip() == "endheader") + 2
-    rows = [line.split() for line in lines[first:] if line.strip()]
-    late = tmp_path / "late.mot"
-    moved = ["\t".join([f"{float(row[0]) + 0.05:.6f}", *row[1:]]) for row in rows]
-    late.write_text("\n".join([*lines[:first], *moved]) + "\n")
-    remarks = import_gait([late, plates], ImportSettings(72.6, side)).remarks
-    assert any(line.startswith("shank_angle and ankle_angle: about ") and " late " in line for line in remarks)
-    names = lines[first - 1].split()
-    own, other = (names.index(f"ankle_angle_{foot}") for foot in ("rl" if side == "right" else "lr"))
-    swapped = ["\t".join([*row[:own], row[other], *row[own + 1 :]]) for row in rows]
-    late.write_text("\n".join([*lines[:first], *swapped]) + "\n")
-    with pytest.raises(DataError, match="it belongs to the other foot"):
-        import_gait([late, plates], ImportSettings(72.6, side))

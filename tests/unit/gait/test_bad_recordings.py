@@ -186,25 +186,6 @@ def test_a_short_drop_out_in_one_stride_is_no_part_of_the_mean(
     assert any("differs from all other strides" in line for line in found.remarks)
 
 
-def test_what_is_wrong_at_several_stages_is_said_in_one_go(
-    csv_of: Callable[..., Path], columns: dict[str, Floats]
-) -> None:
-    wrong = columns | {FORCE: -columns[FORCE], MOMENT: -columns[MOMENT], UP: columns[UP] + 9.81}
-    wrong = {name.replace("rad", "deg"): values for name, values in wrong.items()}
-    with pytest.raises(DataError) as refused:
-        import_gait([csv_of(wrong)], ImportSettings())
-    said = (
-        "does not state the body mass",
-        "vertical_force peaks at -0.999 body weights, below 0, so its sign is reversed",
-        "shank_angle has a range of .* look like radians",
-        "knee_up has a mean of 9.81 m/s\\^2",
-        "ankle_angle has a range of .* look like radians",
-        "ankle_moment peaks at -1 N m/kg, in dorsiflexion",
-    )
-    assert len(refused.value.parts) == len(said)
-    assert all(re.search(text, part) for text, part in zip(said, refused.value.parts, strict=True))
-
-
 def test_a_reversed_shank_without_a_force_is_named_as_what_it_is(
     csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
@@ -252,14 +233,6 @@ def test_a_record_of_one_heel_strike_has_the_right_column(
     with pytest.raises(DataError, match=said) as refused:
         import_gait([csv_of(part, walk.time[first:last])], ImportSettings(62.0))
     assert "least_strides" not in str(refused.value)
-
-
-def test_radians_called_degrees_are_a_unit_and_no_sign_without_a_force_too(
-    csv_of: Callable[..., Path], columns: dict[str, Floats]
-) -> None:
-    called = changed(SHANK, lambda x: x, "shank_angle [deg]")({name: x for name, x in columns.items() if name != FORCE})
-    with pytest.raises(DataError, match=r"the numbers look like radians: give the unit 'rad'"):
-        import_gait([csv_of(called)], ImportSettings(62.0))
 
 
 def test_a_moment_file_without_a_whole_stride_is_named(opensim_files: dict[str, Path]) -> None:

@@ -1,6 +1,5 @@
 """OpenSim tables and markers as programs write them: names by path and side, plates, gaps, one cycle, mending."""
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -298,27 +297,6 @@ def test_a_damaged_plain_table_is_refused_in_one_line(tmp_path: Path, text: str,
     assert message in str(refused.value)
     assert str(refused.value).startswith(str(path))
     assert "\n" not in str(refused.value)
-
-
-def test_all_faults_of_a_mean_stride_over_percent_are_in_one_refusal_and_their_remedies_work(tmp_path: Path) -> None:
-    path = tmp_path / "percent.csv"
-    path.write_text("percent [%],ankle_angle [deg]\n" + "".join(f"{k},{90 + k % 20}\n" for k in range(101)))
-    with pytest.raises(DataError) as refused:
-        import_gait([path], ImportSettings(low_pass=0.5))
-    said = (
-        "a low pass at 0.5 Hz",
-        r"first column must be 'time', not 'percent'; or give one mean stride .* duration, such as stride_time=1\.1$",
-        "does not state the body mass",
-        "shank_angle: there is no column 'shank_angle' .* or add a file that has them",
-    )
-    assert len(refused.value.parts) == len(said)
-    assert all(re.search(text, part) for text, part in zip(said, refused.value.parts, strict=True))
-    # The remedies: time, a body mass, and the shank in a second file.
-    ankle, shank = tmp_path / "ankle.csv", tmp_path / "shank.csv"
-    for file, name in ((ankle, "ankle_angle"), (shank, "shank_angle")):
-        rows = np.column_stack([TIME, np.degrees(curve(name, TIME))]).tolist()
-        file.write_text(f"time [s],{name} [deg]\n" + "".join(f"{time!r},{angle!r}\n" for time, angle in rows))
-    assert import_gait([ankle, shank], PERSON).gait.origin == "imported"
 
 
 @pytest.mark.parametrize("names", [(*REQUIRED, "vertical_force"), REQUIRED], ids=["force", "shank"])

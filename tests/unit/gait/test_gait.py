@@ -234,15 +234,6 @@ def test_the_series_stay_as_near_to_the_data_as_the_notes_say(normative: Gait, s
     assert left.mean() < 0.2 * table[f"{column}_sd"].mean(), "far below what strides differ by"
 
 
-def test_the_notes_say_how_short_the_force_is(normative: Gait, shared_data: Path) -> None:
-    table = np.genfromtxt(
-        shared_data / "gait" / "falisse2019_derived" / "falisse2019_s1_1p33_stride.csv", delimiter=",", names=True
-    )
-    mean = table["vGRF_BW"][:-1].mean()
-    assert f"Its mean over the stride is {mean:.3f} body weights" in normative.notes
-    assert f"the force is {100.0 * (1.0 - mean / 0.5):.0f} % short of 62 kg" in normative.notes
-
-
 def test_the_rate_of_the_shank_is_the_recorded_one(normative: Gait, shared_data: Path) -> None:
     table = np.genfromtxt(
         shared_data / "gait" / "falisse2019_derived" / "falisse2019_s1_1p33_stride.csv", delimiter=",", names=True
@@ -303,21 +294,6 @@ def test_a_stature_is_written_and_read_and_its_limits_are_said() -> None:
 def imported(tmp_path: Path) -> ImportedGait:
     path = write_csv(tmp_path / "walk.csv", walk_recording(load_gait(), 5))
     return import_gait([path], ImportSettings(62.0))
-
-
-def test_every_curve_has_a_panel_with_its_events() -> None:
-    gait = load_gait()
-    figure = gait_finding(gait).plot()
-    assert len(figure.axes) == len(gait.curves) == 6
-    top = figure.axes[0]
-    assert {text.get_text() for text in top.texts} == {"heel strike", "toe-off"}
-    assert np.degrees(gait.shank_angle.values_at([0.25]))[0] == pytest.approx(top.lines[-1].get_ydata()[25])
-    assert [text.get_text() for text in figure.texts] == ["falisse2019-subject1: 62 kg, 1.33 m/s, stride 1.04 s"]
-    narrow = gait_finding(gait).plot(width="84 mm")
-    narrow.canvas.draw()
-    legend = narrow.axes[0].get_legend()
-    assert legend is not None
-    assert legend.get_window_extent().y0 >= narrow.axes[0].get_window_extent().y1, "above the curves"
 
 
 def test_the_ankle_angle_is_drawn_from_neutral_with_dorsiflexion_positive(imported: ImportedGait) -> None:

@@ -1,6 +1,5 @@
 """Text exports of motion capture: one walk written as each system writes it gives one gait."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -137,49 +136,6 @@ def test_a_marker_that_is_held_until_it_jumps_was_lost_and_one_at_rest_was_not(t
     assert any("'RKNE' was lost in 6 of" in remark and "position unchanged" in remark for remark in found.remarks)
     whole = import_gait([dflow(tmp_path / "whole.txt")], ImportSettings(MASS))
     assert not any("lost" in remark for remark in whole.remarks)
-
-
-@pytest.mark.parametrize(
-    ("write", "old", "new", "said"),
-    [
-        (motive, "Marker,", "Bone,", "has no marker positions; export the take with Markers and Position"),
-        (bts, "Point 3D tracks", "Emg tracks", "contains 'Emg tracks' instead of markers; export 'Point 3D tracks'"),
-    ],
-)
-def test_an_export_without_markers_says_what_to_export(
-    write: Callable[[Path], Path], old: str, new: str, said: str, tmp_path: Path
-) -> None:
-    path = write(tmp_path / ("walk.emt" if write is bts else "walk.csv"))
-    path.write_text(path.read_text().replace(old, new))
-    with pytest.raises(DataError) as refused:
-        import_gait([path], ImportSettings(MASS))
-    assert said in str(refused.value)
-
-
-def test_a_table_of_another_program_is_answered_with_the_line_of_pandas(tmp_path: Path) -> None:
-    path = tmp_path / "walk.xlsx"
-    path.write_bytes(b"PK")
-    with pytest.raises(DataError, match=r"write it as CSV: pandas.read_excel\('.*walk.xlsx'\).to_csv\("):
-        import_gait([path], ImportSettings(MASS))
-
-
-def standing(path: Path, sway: float) -> Path:
-    """One posture of the walk for 5 s, with the noise of markers, leaning by some degrees."""
-    still, noise = markers(np.array([0.3 * STRIDE])), np.random.default_rng(1).normal(0.0, 0.1, (3, TIME.size))
-    points = {name: point + noise for name, point in still.items()}
-    points["RKNE"][0] += 400.0 * np.radians(sway) * np.sin(TIME)
-    return trc(path, TIME, points)
-
-
-@pytest.mark.parametrize("sway", [0.0, 2.0])
-def test_of_a_standing_trial_it_is_said_alone_that_nobody_walks(sway: float, tmp_path: Path) -> None:
-    path = standing(tmp_path / "standing.trc", sway)
-    with pytest.raises(
-        DataError, match="deg in the whole recording \\(walking: at least 25 deg\\): give a recording of walking"
-    ) as refused:
-        import_gait([path], ImportSettings())
-    assert not refused.value.parts
-    assert "sign" not in str(refused.value)
 
 
 @pytest.mark.parametrize(

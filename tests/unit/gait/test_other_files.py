@@ -50,12 +50,6 @@ vertical_force = {{ terms = ["{prefix}vertical_force"], unit = "-" }}
         assert np.allclose(found.curve(name).cosines, wanted.curve(name).cosines)
 
 
-def test_a_matlab_file_without_a_time_says_what_it_has(tmp_path: Path) -> None:
-    scipy.io.savemat(tmp_path / "walk.mat", {"angle": np.arange(50.0)})
-    with pytest.raises(DataError, match=r"walk\.mat: there is no variable 'time' or 't'; available: angle"):
-        import_gait([tmp_path / "walk.mat"], ImportSettings(62.0))
-
-
 def trc(folder: Path, names: dict[str, Floats], file: str = "walk.trc") -> Path:
     """A file of markers as Cortex or Nexus writes it."""
     head = "\t".join(f"{name}\t\t" for name in names)

@@ -12,7 +12,7 @@ import scipy.io
 from ppafo.errors import DataError
 from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.foreign import read_foreign
-from ppafo.storage.matlab import open_matlab, read_matlab
+from ppafo.storage.matlab import read_matlab
 from ppafo.storage.reading import read_recording
 
 LVM = """LabVIEW Measurement\t
@@ -134,27 +134,6 @@ def test_a_unit_with_the_delimiter_is_one_cell_through_a_map_too(tmp_path: Path,
     if lines:
         with pytest.raises(DataError, match=r"line 3 contains this name: give skip_lines = 2"):
             read_foreign(path, columns(channels))
-
-
-def test_faults_of_several_columns_come_in_one_refusal(tmp_path: Path) -> None:
-    path = written(tmp_path, "flow.csv", "t,p,Q\n0,60,1\n1,120,1\n")
-    faults = {"time": {"column": "t", "unit": "bar_g"}, "pressure_1": {"column": "p", "unit": "psi"}}
-    with pytest.raises(DataError, match="3 things are wrong") as caught:
-        read_foreign(path, columns({**faults, "mass_flow": LITRES}), gas="0.044 kg/mol")
-    text = str(caught.value)
-    assert re.findall(r"\(\d\) channels\.(\w+)\.unit", text) == ["time", "pressure_1", "mass_flow"]
-    assert "write psi_g for gauge or psi_a for absolute" in text
-    assert "in a [[procedure]] where the gas is 0.044 kg/mol, give gas = 'air' too" in text
-    channels = {"time": {"column": "t", "unit": "s"}, "pressure_1": {"column": "p1"}, "mass_flow": {"column": "Q2"}}
-    with pytest.raises(
-        DataError, match=r"\(1\) channels\.pressure_1\.column = 'p1'.*\(2\) channels\.mass_flow\.column"
-    ):
-        read_foreign(path, columns(channels))
-    path = written(tmp_path, "header.csv", "time [s],pressure_1 [psi],mass_flow [L/min],command [V]\n0,60,1,0\n")
-    with pytest.raises(
-        DataError, match=r"3 things .*\[psi\]'.*\(2\) column 'mass_flow.*\(3\) .*'command' is dimensionl"
-    ):
-        read_recording(path)
 
 
 @pytest.mark.parametrize("mark", ["\t", ";", ","])
@@ -290,16 +269,6 @@ def test_a_variable_that_is_not_there_is_named_with_its_key(matlab: Path, column
         read_foreign(matlab, columns({**channels, "torque": {"column": "T", "unit": "N m"}}))
 
 
-def test_an_object_of_matlab_is_named_with_what_to_save(tmp_path: Path) -> None:
-    saved_v73(tmp_path / "run.mat")
-    assert read_matlab(tmp_path / "run.mat").objects == [("thing", "timeseries")]
-    channels = {"time": {"column": "thing.Time", "unit": "s"}}
-    with pytest.raises(
-        DataError, match=r"thing \(timeseries\) is an object .* t = thing\.Time; y = squeeze\(thing\.Data\)"
-    ):
-        read_foreign(tmp_path / "run.mat", columns(channels))
-
-
 @pytest.mark.parametrize(
     "content", [b"no matlab at all" * 50, b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + b"\xff" * 99]
 )
@@ -307,31 +276,3 @@ def test_what_is_no_matlab_file_is_one_line(tmp_path: Path, content: bytes) -> N
     with pytest.raises(DataError, match=r"a\.mat: ") as caught:
         read_matlab(written(tmp_path, "a.mat", content))
     assert "\n" not in str(caught.value)
-
-
-def test_a_matlab_file_without_a_map_says_what_it_needs(matlab: Path) -> None:
-    with pytest.raises(DataError, match="column map, columns="):
-        read_recording(matlab)
-
-
-@pytest.mark.parametrize(
-    ("kind", "line"),
-    [
-        ("timeseries", "t = log.Time; y = squeeze(log.Data); save('plain.mat', 't', 'y')"),
-        ("table", "T = log; s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')"),
-        ("containers.Map", "save plain.mat t y"),
-    ],
-)
-def test_an_object_of_an_older_file_is_named_with_the_line_that_saves_it_plainly(
-    kind: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "run.mat"
-    scipy.io.savemat(path, {"y": PRESSURE})
-    # As SciPy gives what MATLAB wrote: without a name of its own, and with what it is in its fields.
-    fields = [(name, object) for name in ("s0", "s1", "s2", "arr")]
-    thing = np.array([(b"log", b"MCOS", kind.encode(), np.zeros(6))], dtype=fields)
-    monkeypatch.setattr(scipy.io, "loadmat", lambda *_, **__: {"y": PRESSURE, "None": thing})
-    file = open_matlab(path)
-    assert file.objects == [("log", kind)]
-    assert f"log ({kind}) is an object that only MATLAB reads" in file.advice_on_objects()
-    assert line in file.advice_on_objects()

@@ -1,13 +1,10 @@
 """Result folders: complete, or not there."""
 
-import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import ppafo
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
 from ppafo.storage import check_result_folder, files, read_stored, write_result
@@ -40,11 +37,6 @@ def test_a_folder_is_read_back_exactly_from_either_file(tmp_path: Path) -> None:
         assert read_recording(place) == recording()
 
 
-def test_the_document_says_of_what_kind_the_recording_is(tmp_path: Path) -> None:
-    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
-    assert json.loads((folder / "run.json").read_text())["recording"]["kind"] == "simulated"
-
-
 def test_an_empty_folder_is_filled_and_an_earlier_result_is_replaced_whole(tmp_path: Path) -> None:
     folder = tmp_path / "task"
     folder.mkdir()
@@ -53,49 +45,6 @@ def test_an_empty_folder_is_filled_and_an_earlier_result_is_replaced_whole(tmp_p
     assert read_stored(folder).recording == recording(2.0)
     assert names(folder) == ["recording.csv", "recording.nc", "run.json"]
     assert names(tmp_path) == ["task"]
-
-
-def filled_with_something_else(folder: Path) -> str:
-    (folder / "thesis.txt").write_text("years of work")
-    return "is not empty and not a ppafo result"
-
-
-def filled_with_a_run_file_of_another_program(folder: Path) -> str:
-    (folder / "run.json").write_text('{"format": "other"}')
-    return "does not belong to a ppafo result"
-
-
-def filled_with_a_result_and_something_else(folder: Path) -> str:
-    write_result(folder, recording(), DOCUMENT, {})
-    (folder / "notes.txt").write_text("keep me")
-    return r"contains files that are not part of its ppafo result \(notes.txt\)"
-
-
-def filled_with_a_result_and_a_folder_by_the_name_of_a_file(folder: Path) -> str:
-    write_result(folder, recording(), DOCUMENT, {})
-    (folder / "figure.png").mkdir()
-    return r"contains files that are not part of its ppafo result \(figure.png\)"
-
-
-@pytest.mark.parametrize(
-    "fill",
-    [
-        filled_with_something_else,
-        filled_with_a_run_file_of_another_program,
-        filled_with_a_result_and_something_else,
-        filled_with_a_result_and_a_folder_by_the_name_of_a_file,
-    ],
-)
-def test_a_folder_with_anything_of_somebody_elses_is_refused_and_left_alone(
-    tmp_path: Path, fill: Callable[[Path], str]
-) -> None:
-    folder = tmp_path / "task"
-    folder.mkdir()
-    message = fill(folder)
-    before = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.is_file()}
-    with pytest.raises(DataError, match=message):
-        write_result(folder, recording(3.0), DOCUMENT, {})
-    assert {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.is_file()} == before
 
 
 def test_a_file_in_the_place_of_the_folder_or_above_it_is_refused(tmp_path: Path) -> None:
@@ -169,16 +118,6 @@ def test_an_interrupt_leaves_an_earlier_result_as_it_was(
     assert names(tmp_path) == ["task"]
 
 
-def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: Path, content: bytes) -> int:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(DataError, match="task: cannot be written: no space left on device"):
-        write_result(tmp_path / "task", recording(), DOCUMENT, {})
-    assert names(tmp_path) == []
-
-
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -225,12 +164,3 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
         read_recording(tmp_path / "nothing")
     with pytest.raises(DataError, match=r"contains no result of a walk or a simulation"):
         read_recording(tmp_path)
-
-
-def test_a_folder_of_an_analysis_is_no_result_of_a_run_and_says_what_reads_it(tmp_path: Path) -> None:
-    ppafo.audit("ppafo2011").save(tmp_path / "audit")
-    with pytest.raises(
-        DataError,
-        match="is a result of 'ppafo sets audit', not of a run; use its JSON file for numbers, read",
-    ):
-        ppafo.read_result(tmp_path / "audit")
