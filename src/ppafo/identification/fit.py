@@ -21,7 +21,7 @@ from ppafo.identification.conflict import Conflict, conflict_of, too_smooth
 from ppafo.identification.intervals import interval_ends, unidentified
 from ppafo.identification.noise import HIGHEST_ORDER, Noise
 from ppafo.identification.residuals import FitRuns, FitVariable, Flags, Indices, ResidualBlock, Residuals
-from ppafo.identification.whitened import Linear, cost_of, linear_at
+from ppafo.identification.whitened import SHORT, Linear, best_along, cost_of, fall_of, linear_at
 from ppafo.linear_algebra import on_one_thread
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import noise_of as white_noise_of
@@ -76,26 +76,18 @@ _LEFT_OUT = 0.01
 """Largest fraction of samples left out [-], for outliers and for samples affected by an event such as an impact."""
 _LEVERAGE = 0.1
 """Leverage of a single sample [-] above which the sample is left out."""
-_PASSES = 4
-"""Largest number of passes of the search; each pass uses the noise estimated by the previous one."""
-_SETTLED = 0.03
-"""Change of the logarithm of the noise between passes [-] below which the search ends."""
-_EVALUATIONS, _FEW_EVALUATIONS = 40, 10
-"""Largest number of residual evaluations in each of the first two passes, and in each later pass."""
+_EVALUATIONS = 40
+"""Largest number of residual evaluations in each pass of the search."""
 _ROUGH, _FINE = 1.0e-3, 1.0e-4
-"""Relative decrease of the squares [-] that ends the robust pass and the later passes; later steps are finer."""
-_LAST_STEPS = 12
+"""Relative decrease of the squares [-] that ends the robust pass of the search, and the second pass."""
+_STEPS = 40
 """Largest number of Gauss-Newton steps on whitened samples."""
-_SHARES = (1.0, 0.3, 0.1)
-"""Trial fractions of a Gauss-Newton step [-]; the first that lowers the cost is taken."""
-_GAIN = 0.05
-"""Decrease of the sum of squares [-] below which a step after whitening counts as converged."""
+_GAIN = 1.0e-4
+"""Decrease of the squares [-] below which a point is their minimum: a hundredth of a standard error."""
 _CONVERGED = 0.5
 """Decrease of the squares in the last step [-] below which the search has converged within the standard errors."""
 _AT_BOUND = 1.0e-6
 """Largest distance of a variable from its bound [-] that counts as at the bound, relative above 1."""
-_SHOWN = 0.01
-"""Least share of the variance [-] for a tolerance to be listed."""
 _BETTER = 1.0
 """Increase of the log-likelihood [-] above which another start replaces the result; equal optima do not."""
 _OTHER_STARTS = 32
@@ -219,15 +211,16 @@ def _shares_of_variance(runs: FitRuns, covariance: Floats) -> dict[str, tuple[tu
     names = [number.name for number in runs.numbers]
     fractions = np.square(covariance * runs.prior) / np.diag(covariance)[:, None]
     return {
-        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if row[other] >= _SHOWN)
+        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if runs.prior[other] > 0.0)
         for name, row in zip(names, fractions, strict=True)
     }
 
 
 def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
-    """Search for the least-squares point, alternating between estimation of the noise and minimisation.
+    """Search for the least-squares point with white noise, first with a robust loss, roughly.
 
-    Returns the scaled point, and for motion the rows of isolated outliers.
+    A variable at a bound can lose its gradient while the clock is still wrong, therefore the robust loss. Returns the
+    scaled point, and for motion the rows of isolated outliers.
     """
     point, outliers = np.clip(start, runs.low, runs.high), np.zeros(0, dtype=np.intp)
     residuals = runs.residuals_at(point)
@@ -235,28 +228,23 @@ def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
         raise IdentificationError(
             "every run fails at the start values; give other start values, or check the recordings"
         )
-    noise, _ = runs.deviations(residuals[:, None])
     started = time.monotonic()
-    for number in range(_PASSES):
-        runs.report(Progress("fit", number, _PASSES, noun="passes", elapsed=time.monotonic() - started))
-        weight = 1.0 / noise
+    for number, (loss, least) in enumerate([("soft_l1", _ROUGH), ("linear", _FINE)]):
+        runs.report(Progress("fit", number, 2, noun="passes", elapsed=time.monotonic() - started))
+        weight = 1.0 / runs.deviations(residuals[:, None])[0]
         weight[outliers] = 0.0
-        point, has_ended = _minimise(runs, point, weight, number)
+        point = _minimise(runs, point, weight, loss, least)
         residuals = runs.residuals_at(point).copy()
         if number == 0 and runs.is_motion:
             outliers = _outliers(runs, residuals)
         residuals[outliers] = 0.0
-        previous_noise, (noise, _) = noise, runs.deviations(residuals[:, None])
-        if number and has_ended and float(np.abs(np.log(noise / previous_noise)).max()) < _SETTLED:
-            break
     return point, outliers
 
 
-def _minimise(runs: FitRuns, point: Floats, weight: Floats, number: int) -> tuple[Floats, bool]:
-    """Minimise the squares of residuals, with ``weight`` [1/SI] by row, and priors, from a scaled point.
+def _minimise(runs: FitRuns, point: Floats, weight: Floats, loss: str, least: float) -> Floats:
+    """Return the scaled point with the least squares of residuals and priors, searched within the bounds from a point.
 
-    Returns the scaled minimum, and False if the search stopped at its largest number of evaluations. Pass ``number`` 0
-    uses a robust loss, because a variable at a bound can lose its gradient while the clock is still wrong.
+    ``weight`` [1/SI] is by row. The search ends at a relative decrease of the squares below ``least``.
     """
 
     def slopes(x: Floats) -> Floats:
@@ -273,11 +261,11 @@ def _minimise(runs: FitRuns, point: Floats, weight: Floats, number: int) -> tupl
         x_scale="jac",
         xtol=1.0e-9,
         gtol=None,
-        ftol=_FINE if number else _ROUGH,
-        loss="linear" if number else "soft_l1",
-        max_nfev=_FEW_EVALUATIONS if number > 1 else _EVALUATIONS,
+        ftol=least,
+        loss=loss,
+        max_nfev=_EVALUATIONS,
     )
-    return np.asarray(result.x), result.status > 0
+    return np.asarray(result.x)
 
 
 def _outliers(runs: FitRuns, residuals: Floats) -> Indices:
@@ -298,9 +286,9 @@ def _outliers(runs: FitRuns, residuals: Floats) -> Indices:
 
 
 class _SearchEnd(NamedTuple):
-    """End of the Gauss-Newton steps: scaled point, residuals [SI], linearisation at this point, and last step tried.
+    """End of a search: scaled point, residuals [SI], linearisation at this point, and the step to its minimum.
 
-    ``gain`` is the decrease of the cost by this step [-]: at most 0 if the step was not taken, -inf if no run succeeds.
+    ``gain`` is the decrease of the squares in the last step [-], -inf if no run succeeds after a short step.
     """
 
     point: Floats
@@ -311,40 +299,33 @@ class _SearchEnd(NamedTuple):
 
 
 def _settle(runs: FitRuns, point: Floats, outliers: Indices) -> _SearchEnd:
-    """Return the end of Gauss-Newton steps on whitened samples, starting from a scaled ``point``.
+    """Return the minimum by Gauss-Newton steps, for white noise and then for the noise of each channel.
 
-    Outliers are left out and, in a fit of motion, also samples of high leverage.
+    Outliers are left out and, in a fit of motion, also samples of high leverage. These and the kind and order of the
+    noise are chosen once, at the minimum for white noise: chosen on the way, they would depend on the start.
     """
-    residuals = runs.residuals_at(point)
-    left_out, is_checked = outliers, False
-    without_outliers = residuals.copy()
-    without_outliers[outliers] = 0.0
-    noise, _ = runs.deviations(without_outliers[:, None])
-    for number in range(_LAST_STEPS):
-        jacobian = runs.jacobian(point)
-        runs.adapt_steps(jacobian, 1.0 / noise)
-        linear, step = linear_at(runs, point, residuals, jacobian, left_out)
-        noise, cost = linear.noise, cost_of(runs, residuals, point, linear)
-        # A full step may overshoot, or leave the region in which runs succeed: shorter steps are tried then.
-        for share in _SHARES:
-            trial = np.clip(point + share * step, runs.low, runs.high)
-            trial_residuals = runs.residuals_at(trial)
-            has_run = np.isfinite(trial_residuals).all()
-            gain = cost - cost_of(runs, trial_residuals, trial, linear) if has_run else -math.inf
-            if gain > 0.0:
-                break
-        is_settled = gain < _GAIN
-        if (is_settled and (is_checked or not runs.is_motion)) or number == _LAST_STEPS - 1:
+    residuals, jacobian, left_out = runs.residuals_at(point), runs.jacobian(point), outliers
+    kinds, stage, last = {channel: Noise(1.0) for channel in runs.channels}, 0, 2 if runs.is_motion else 1
+    for _ in range(_STEPS):
+        linear, step = linear_at(runs, point, residuals, jacobian, left_out, kinds)
+        runs.adapt_steps(jacobian, 1.0 / linear.noise)
+        squares, fall = cost_of(runs, residuals, point, linear), fall_of(runs, point, linear, step)
+        reached, trial, trial_residuals = best_along(runs, point, residuals, step, linear.rows[:, 1:], linear)
+        gain = squares - reached
+        if gain > 0.0:
+            point, residuals = trial, trial_residuals
+        if min(gain, fall) >= _GAIN:
+            kinds, jacobian = linear.sensors, runs.jacobian(point)
+            continue
+        if stage == last:
             break
-        if is_settled:
-            is_checked = True
+        stage, kinds = stage + 1, {}
+        if stage == 2:
             # Near an impact the derivative holds on one side only, so that a sample would determine a variable falsely.
             leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
             highest = np.argsort(-leverage)[: int(_LEFT_OUT * len(leverage))]
             left_out = np.union1d(outliers, highest[leverage[highest] > _LEVERAGE])
-        if gain > 0.0:
-            point, residuals = trial, trial_residuals
-    return _SearchEnd(point=point, residuals=residuals, linear=linear, step=step, gain=gain)
+    return _SearchEnd(point=point, residuals=residuals, linear=linear, step=step, gain=min(gain, fall))
 
 
 def _edge(runs: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
@@ -353,7 +334,7 @@ def _edge(runs: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
     If every single step succeeds and only their combination fails, all unknowns are returned.
     """
     sought = np.flatnonzero((runs.prior == 0.0) & (step != 0.0))
-    moved = point[:, None] + _SHARES[-1] * np.diag(step)[:, sought]
+    moved = point[:, None] + SHORT * np.diag(step)[:, sought]
     residuals = runs.residuals_at_points(np.clip(moved, runs.low[:, None], runs.high[:, None]))
     fails = ~np.isfinite(residuals).all(axis=0)
     indices = sought[fails] if fails.any() else sought

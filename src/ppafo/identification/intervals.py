@@ -12,26 +12,20 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ppafo.identification.residuals import FitRuns
-from ppafo.identification.whitened import Linear, cost_of, squares_of, whitened_errors
+from ppafo.identification.whitened import Linear, best_along, cost_of, whitened_errors
 from ppafo.signals.recording import Floats
 
-_TRIES, _CORRECTIONS, _LINEARISATIONS = 6, 3, 4
-"""Largest numbers of trial points per limit, of steps with the fixed Jacobian, and of steps with a new Jacobian."""
+_TRIES, _STEPS = 10, 12
+"""Largest numbers of trial points per limit, and of Gauss-Newton steps of the other variables at each."""
 
-_SHARES = 0.5 ** np.arange(4.0)[:, None]
-"""Trial fractions of a step with a new Jacobian [-]; the best is taken."""
-
-_STILL = 0.3
+_STILL = 0.02
 """Decrease of the squares [-] below which the other variables have converged."""
 
-_FURTHER = 1.3
-"""Least factor by which a trial limit is moved outwards while the recordings are still explained [-]."""
+_CLOSE = 0.01
+"""Relative distance of the profile from its wanted value [-] from which a limit is extrapolated."""
 
-_NARROW = 0.1
-"""Relative width of the bracket of a limit [-] below which the limit is interpolated linearly."""
-
-_BENT = 1.1
-"""Least ratio of profile to linear distance [-] above which the limit follows the profile likelihood."""
+_AWAY = 0.1
+"""Least distance of a trial limit from both ends of its bracket, as a fraction of the bracket [-]."""
 
 _SHOWN_WEIGHT = 0.1
 """Least weight of a variable in a combination [-] for which it is listed."""
@@ -47,119 +41,82 @@ def interval_ends(runs: FitRuns, point: Floats, linear: Linear, times: float) ->
     covariance = linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))
     low, high = np.maximum(point - wide, runs.low), np.minimum(point + wide, runs.high)
-    least = cost_of(runs, runs.residuals_at(point), point, linear)
-    sides = [(number, ends) for number in np.flatnonzero(runs.prior == 0.0).tolist() for ends in (low, high)]
-    fixed = [number for number, _ in sides]
-    offsets = np.array([ends[number] - point[number] for number, ends in sides])
-    straight = point[:, None] + covariance[:, fixed] / covariance[fixed, fixed] * offsets
-    squares, points = _least_beside(runs, straight, fixed, linear)
-    for side, (number, ends) in enumerate(sides):
-        bound = float((runs.low if ends is low else runs.high)[number])
-        if offsets[side] != 0.0:
-            at_limit = float(squares[side]), points[:, side]
-            ends[number] = _end(runs, point, least, linear, number, bound, at_limit, times)
+    for number in np.flatnonzero(runs.prior == 0.0).tolist():
+        way = covariance[:, number] / covariance[number, number]
+        for ends, bound in ((low, runs.low[number]), (high, runs.high[number])):
+            if ends[number] != point[number]:
+                straight = point + way * (ends[number] - point[number])
+                straight[number] = ends[number]
+                ends[number] = _end(runs, point, straight, linear, number, float(bound), times)
     return low, high
 
 
 def _end(
-    runs: FitRuns,
-    point: Floats,
-    least: float,
-    linear: Linear,
-    number: int,
-    bound: float,
-    straight: tuple[float, Floats],
-    times: float,
+    runs: FitRuns, point: Floats, straight: Floats, linear: Linear, number: int, bound: float, times: float
 ) -> float:
     """Return one confidence limit of a variable by profile likelihood, searched from the linear limit to the bound.
 
-    ``least`` is the sum of squares at the estimate; ``straight`` is the sum of squares near the linear limit, and the
-    point at which it is reached.
+    ``straight`` is the point at the linear limit. The profile is the root of the increase of the squares: by how many
+    standard errors priors and samples tell a point from the estimate.
     """
-    inner, near = point, 0.0
-    outer: Floats | None = None
-    far, (squares, reached) = math.inf, straight
-    if math.sqrt(max(squares - least, 0.0)) > _BENT * times:
-        squares, reached = _least_along(runs, reached, number, linear)
+    least = cost_of(runs, runs.residuals_at(point), point, linear)
+    # Points with their profiles: the two last ones below the wanted profile, and the last one above it.
+    before = inner = point, 0.0
+    outer: tuple[Floats, float] | None = None
+    tried = straight
     # At the bound of an excess the samples may say nothing of its size, which the straight line then overestimates.
-    is_excess = bool(runs.base[number].any())
-    for _ in range(2 * _TRIES if is_excess else _TRIES):
-        # By how many standard errors priors and samples tell this point from the estimate.
-        parted = math.sqrt(max(squares - least, 0.0))
-        if parted * (_BENT if inner is point else 1.0) < times:
-            inner, near = reached, parted
-            if float(inner[number]) == bound:
-                return bound
-        elif inner is point and not is_excess:
-            return float(reached[number])
-        else:
-            outer, far = reached, parted
-        if outer is not None and abs(outer[number] - inner[number]) < _NARROW * abs(inner[number] - point[number]):
-            break
-        further = min(max(times / max(near, 0.1), _FURTHER), 2.0)
-        tried = point + further * (inner - point) if outer is None else 0.5 * (inner + outer)
+    is_least = not runs.base[number].any()
+    for _ in range(_TRIES):
         squares, reached = _least_along(runs, np.clip(tried, runs.low, runs.high), number, linear)
-    if outer is None:
-        return bound
-    share = (times - near) / (far - near)
-    return float(inner[number] + share * (outer[number] - inner[number]))
-
-
-def _least_beside(runs: FitRuns, points: Floats, fixed: list[int], linear: Linear) -> tuple[Floats, Floats]:
-    """Return the least sum of squares [-] at each scaled point with one variable fixed, and the points that reach it.
-
-    ``fixed`` is the index of the fixed variable of each point. The other variables take Gauss-Newton steps with the
-    Jacobian of the estimate. The minimum is infinite if no run succeeds.
-    """
-    covariance, slopes = linear.root @ linear.root.T, linear.rows[:, 1:]
-    low, high, each = runs.low[:, None], runs.high[:, None], np.arange(len(fixed))
-    tried = best = np.clip(points, low, high)
-    least = np.full(len(fixed), np.inf)
-    for _ in range(_CORRECTIONS + 1):
-        errors = whitened_errors(runs, runs.residuals_at_points(tried), linear)
-        squares = squares_of(runs, errors, tried)
-        is_less = squares < least
-        least, best = np.where(is_less, squares, least), np.where(is_less, tried, best)
-        pull = slopes.T @ errors + np.square(runs.prior)[:, None] * (tried - runs.start[:, None])
-        step = -covariance @ pull
-        # Of all steps, the one that leaves the number where it is held.
-        step -= covariance[:, fixed] / covariance[fixed, fixed] * step[fixed, each]
-        # To first order the squares fall by that much; where no run succeeds they are no numbers.
-        moves = -np.sum(pull * step, axis=0) > _STILL
-        if not moves.any():
-            break
-        tried = np.where(moves, np.clip(tried + step, low, high), tried)
-    return least, best
+        profile = math.sqrt(max(squares - least, 0.0))
+        if profile >= times and inner[0] is point and is_least:
+            return float(reached[number])
+        if abs(profile - times) <= _CLOSE * times:
+            end = point[number] + times / profile * (reached[number] - point[number])
+            return float(min(max(end, runs.low[number]), runs.high[number]))
+        if profile >= times:
+            outer = reached, profile
+        elif float(reached[number]) == bound:
+            return bound
+        else:
+            before, inner = inner, (reached, profile)
+        other = before if outer is None else outer
+        rise, missing = abs(other[1] - inner[1]), times - inner[1]
+        # Between two points the secant stays away from both; beyond them its distance from the estimate may double.
+        away = np.abs(np.array([inner[0][number] - point[number], other[0][number] - inner[0][number]]))
+        most = away[0] / away[1] if outer is None else 1.0 - _AWAY
+        share = min(missing / rise, most) if 0.0 < rise < math.inf else 0.5 * most
+        tried = inner[0] + (-share if outer is None else max(share, _AWAY)) * (other[0] - inner[0])
+    return bound if outer is None else float(tried[number])
 
 
 def _least_along(runs: FitRuns, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
     """Return the least sum of squares [-] with one variable of a scaled point fixed, and the point that reaches it.
 
-    The other variables take Gauss-Newton steps within their bounds, each with a new Jacobian, because far from the
-    estimate its Jacobian leads out of a curved valley. The minimum is infinite if no run succeeds.
+    The other variables take Gauss-Newton steps within their bounds, each with its own Jacobian, because far from the
+    estimate its Jacobian leads out of a curved valley. The sum is infinite if no run succeeds.
     """
-    errors = whitened_errors(runs, runs.residuals_at_points(point[:, None]), linear)
-    squares = float(squares_of(runs, errors, point[:, None])[0])
-    if not math.isfinite(squares):
+    residuals = runs.residuals_at_points(point[:, None])[:, 0]
+    if not np.isfinite(residuals).all():
         return math.inf, point
+    squares = cost_of(runs, residuals, point, linear)
     others = np.delete(np.arange(len(point)), number)
-    for _ in range(_LINEARISATIONS):
+    for _ in range(_STEPS):
         jacobian = runs.jacobian(point, is_central=False)
         runs.adapt_steps(jacobian, 1.0 / linear.noise)
         slopes = whitened_errors(runs, jacobian, linear)
+        slopes[:, number] = 0.0
+        errors = whitened_errors(runs, residuals[:, None], linear)[:, 0]
         axes, triangle = np.linalg.qr(np.concatenate([slopes, np.diag(runs.prior)])[:, others])
-        pull = axes.T @ np.concatenate([errors[:, 0], (point - runs.start) * runs.prior])
+        pull = axes.T @ np.concatenate([errors, (point - runs.start) * runs.prior])
         low, high = (end - point[others] for end in (runs.low[others], runs.high[others]))
         step = np.zeros(len(point))
         step[others] = lsq_linear(triangle, -pull, (low - 1.0e-300, high + 1.0e-300), method="bvls").x
-        tried = np.clip(point + _SHARES * step, runs.low, runs.high).T
-        all_errors = whitened_errors(runs, runs.residuals_at_points(tried), linear)
-        all_squares = squares_of(runs, all_errors, tried)
-        best = int(np.argmin(np.where(np.isfinite(all_squares), all_squares, np.inf)))
-        fall = squares - float(all_squares[best])
+        reached, tried, found = best_along(runs, point, residuals, step, slopes, linear)
+        fall = squares - reached
         if not fall > 0.0:
             break
-        point, errors, squares = tried[:, best], all_errors[:, [best]], float(all_squares[best])
+        point, residuals, squares = tried, found, reached
         if fall < _STILL:
             break
     return squares, point

@@ -35,7 +35,7 @@ class Noise:
     innovation: float = 1.0
 
 
-def burg(series: Sequence[Floats], highest: int = HIGHEST_ORDER) -> tuple[float, ...]:
+def burg(series: Sequence[Floats], highest: int = HIGHEST_ORDER, wanted_order: int | None = None) -> tuple[float, ...]:
     """Return the reflection coefficients [-] of an autoregression of several series (Burg), with order from AIC.
 
     The columns of a series (samples, columns) are summed in power, such as residuals and their uncertainty. There is at
@@ -58,25 +58,30 @@ def burg(series: Sequence[Floats], highest: int = HIGHEST_ORDER) -> tuple[float,
         backward = [b - coefficient * a for a, b in zip(ahead, behind, strict=True)]
         power *= 1.0 - coefficient**2
         best = min(best, (count * math.log(max(power, 1.0e-300)) + 2.0 * order, order))
-    return tuple(coefficients[: best[1]])
+    return tuple(coefficients[: best[1] if wanted_order is None else wanted_order])
 
 
-def noise_of(series: Sequence[Floats], highest: int = HIGHEST_ORDER, may_drift: bool = True) -> Noise:
+def noise_of(
+    series: Sequence[Floats], highest: int = HIGHEST_ORDER, may_drift: bool = True, like: Noise | None = None
+) -> Noise:
     """Return the noise model of several series [-] chosen by AIC: an autoregression, or white noise plus a random walk.
 
     The random walk is tried only if sensors ``may_drift``; an autoregression would need many coefficients for slow
-    drift. Columns are summed in power, as in ``burg``.
+    drift. Columns are summed in power, as in ``burg``. With ``like``, order and gain are those of that model.
     """
     count, size = sum(map(len, series)), sum(float(np.square(values).sum()) for values in series)
     # What is less than the floor is the engine's, and no noise.
     if size < 0.5 * count:
         return Noise(1.0)
-    reflection = burg(series, highest)
+    reflection = burg(series, highest, None if like is None else len(like.reflection))
     innovation = math.sqrt(math.prod(1.0 - coefficient * coefficient for coefficient in reflection))
     noise = Noise(1.0, reflection, 0.0, innovation)
     best = 2.0 * count * math.log(innovation) + 2.0 * len(reflection)
+    gains = _GAINS if may_drift and count >= SAMPLES_PER_COEFFICIENT else ()
+    if like is not None:
+        gains, best = ((like.gain,), math.inf) if like.gain > 0.0 else ((), best)
     previous = math.inf
-    for gain in _GAINS if may_drift and count >= SAMPLES_PER_COEFFICIENT else ():
+    for gain in gains:
         squares = sum(float(np.square(_without_level(values, gain)).sum()) for values in series)
         innovation = math.sqrt(squares / size)
         # With ever less gain the innovations fall, and grow again: what follows is larger still.

@@ -1,5 +1,6 @@
 """Whitened residuals and Jacobian: linearised least-squares problem at a point, and its solution."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,6 +16,12 @@ _OF_ANY_SIZE = 1.0e8
 _ROUNDS = 20
 """Largest number of iterations between noise and variables; most fits converge in a few."""
 
+SHORT = 0.1
+"""Shortest fraction of a step that is tried [-], from which its curvature is found too."""
+_SHARES = np.array([1.0, 0.5, 0.25])[:, None]
+"""Longer fractions of a step [-]; the best is taken."""
+_STILL = 1.0e-3
+"""Change of the step between iterations [standard errors] at which noise and variables agree."""
 _RANK = 1.0e-13
 """Least eigenvalue of the scaled curvature [-] for a direction to be observable."""
 
@@ -36,13 +43,13 @@ class Linear(NamedTuple):
 
 
 def linear_at(
-    runs: FitRuns, point: Floats, residuals: Floats, slopes: Floats, left_out: Indices
+    runs: FitRuns, point: Floats, residuals: Floats, slopes: Floats, left_out: Indices, like: Mapping[str, Noise]
 ) -> tuple[Linear, Floats]:
     """Return the whitened problem at a point, and the step to its least-squares solution within the bounds.
 
     Fitting absorbs part of the noise, which is then missing in the residuals. The expected part J C J' is added and the
     noise re-estimated until both agree (expectation maximisation), so that slow noise is not underestimated. Rows
-    ``left_out`` say nothing.
+    ``left_out`` say nothing. Kind and order of the noise are those of ``like`` by channel, if it has any.
     """
     step, hidden = np.zeros(len(point)), np.zeros((len(residuals), 0))
     limits = runs.low - point - 1.0e-300, runs.high - point + 1.0e-300
@@ -58,7 +65,8 @@ def linear_at(
         rows = np.column_stack([scaled, own_numbers])
         for channel in runs.channels:
             blocks = runs.rows_of(channel)
-            model = noise_of([series[block] / noise[block, None] for block in blocks], runs.memory, runs.is_motion)
+            own = [series[block] / noise[block, None] for block in blocks]
+            model = noise_of(own, runs.memory, runs.is_motion, like.get(channel))
             sensors[channel] = replace(model, deviation=sizes[channel])
             for block in blocks:
                 rows[block] = whiten(rows[block], model)
@@ -78,7 +86,7 @@ def linear_at(
             method="bvls",
         )
         step = np.asarray(solved.x)
-        if np.abs((step - before) @ np.linalg.pinv(root)).max() < 0.01 and series.shape[1] > 1:
+        if np.abs(np.linalg.pinv(root) @ (step - before)).max() < _STILL and series.shape[1] > 1:
             break
     return Linear(rows=rows, shared=shared, root=root, noise=noise, sensors=sensors), step
 
@@ -111,3 +119,35 @@ def squares_of(runs: FitRuns, errors: Floats, points: Floats) -> Floats:
 def cost_of(runs: FitRuns, residuals: Floats, point: Floats, linear: Linear) -> float:
     """Return the sum of squares [-] of priors and whitened residuals, given residuals [SI] (rows,) at a point."""
     return float(squares_of(runs, whitened_errors(runs, residuals[:, None], linear), point[:, None])[0])
+
+
+def fall_of(runs: FitRuns, point: Floats, linear: Linear, step: Floats) -> float:
+    """Return by how much the sum of squares [-] of a linearised problem falls along a step from its scaled point."""
+    errors = np.column_stack([linear.rows[:, 0], linear.rows[:, 0] + linear.rows[:, 1:] @ step])
+    before, after = squares_of(runs, errors, np.column_stack([point, point + step])).tolist()
+    return float(before - after)
+
+
+def best_along(
+    runs: FitRuns, point: Floats, residuals: Floats, step: Floats, slopes: Floats, linear: Linear
+) -> tuple[float, Floats, Floats]:
+    """Return the least sum of squares [-] along a step from a scaled point, its point, and the residuals [SI] there.
+
+    The way bends as the residuals do along the step (geodesic acceleration), because static friction trades off against
+    its fall along a curved valley. A variable without a step stays. ``slopes`` is the whitened Jacobian [-] at the
+    point. The sum is infinite if no run succeeds, even after a ``SHORT`` fraction of the step.
+    """
+    ends = np.clip(np.column_stack([point + SHORT * step, point - SHORT * step]).T, runs.low, runs.high).T
+    ahead, behind = runs.residuals_at_points(ends).T
+    curvature = whitened_errors(runs, ((ahead - residuals) + (behind - residuals))[:, None] / SHORT**2, linear)[:, 0]
+    bend = np.zeros(len(point))
+    if np.isfinite(curvature).all():
+        right_side = np.concatenate([curvature, bend])
+        bend -= np.linalg.lstsq(np.concatenate([slopes, np.diag(runs.prior)]), right_side, rcond=None)[0]
+        bend[step == 0.0] = 0.0
+    tried = np.clip(point + _SHARES * step + 0.5 * np.square(_SHARES) * bend, runs.low, runs.high).T
+    points = np.column_stack([tried, ends[:, 0]])
+    found = np.column_stack([runs.residuals_at_points(tried), ahead])
+    squares = squares_of(runs, whitened_errors(runs, found, linear), points)
+    best = int(np.argmin(np.where(np.isfinite(squares), squares, np.inf)))
+    return (float(squares[best]) if np.isfinite(squares[best]) else np.inf), points[:, best], found[:, best]
