@@ -16,8 +16,8 @@ _NOTHING, _NEAREST = 1.0e-6, 0.05
 """Fraction of an error [-] that is rounding, and least distance of an end from its value that sets digits [values]."""
 _SEVERAL = {"readings", "commands"}
 """Last words of group names that are plural."""
-_SHARE, _MOST_NAMED = 0.05, 3
-"""Least fraction of the variance [-] for which a tolerance is named, and largest number of tolerances named."""
+NAMED = 2
+"""Number of parts of a variance that are named, the largest ones: a least share would hide one that is near it."""
 
 
 def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, str]:
@@ -73,11 +73,12 @@ def interval_texts(value: float, low: float, high: float) -> tuple[str, str, str
 
 
 def widened_by(fitted: Fit, name: str) -> str:
-    """Return a phrase on the tolerances that widen the interval of a variable, largest first."""
-    named = [
-        f"{other} ({percentage(share, 2)})" for other, share in fitted.shares[name] if other != name and share >= _SHARE
-    ][:_MOST_NAMED]
-    return f"variance from {', '.join(named)}" if named else "interval from the scatter of the readings"
+    """Return a phrase on the largest parts of the variance of a variable, of tolerances and of the scatter."""
+    scatter = 1.0 - sum(share for _, share in fitted.shares[name])
+    parts = [("the scatter of the readings", scatter), *(part for part in fitted.shares[name] if part[0] != name)]
+    # Of parts that are shown as equal, such as those of both chambers, the name decides.
+    parts.sort(key=lambda part: (-float(f"{part[1]:.2g}"), part[0]))
+    return f"variance from {', '.join(f'{part} ({percentage(share, 2)})' for part, share in parts[:NAMED])}"
 
 
 def conflict_in_words(fitted: Fit, remedy: str) -> str:

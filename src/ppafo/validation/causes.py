@@ -54,8 +54,8 @@ _TRIED_IN_LONG_RECORDINGS = (
     "numbers of the set and effects)"
 )
 
-_AS_NEAR, _MOST_NAMED = 1.3, 3
-"""Largest ratio of the errors left by two causes [-] at which both are near, and largest number of near causes."""
+_NAMED = 3
+"""Number of causes that are named where none explains the recordings, the nearest ones."""
 
 _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 """Trial initial values of a channel whose first samples are wrong, as fractions of its range [-].
@@ -72,7 +72,7 @@ class ResidualCause:
     ``left`` is the largest RMS error of any channel divided by its noise [-] under the cause. ``numbers`` has the
     changed parameters by path, each a value with its SI unit. ``is_usual`` is true if the error is within the usual
     error of sensors. ``is_of_samples`` is true for faulty samples, which are visible without a model. ``same`` are
-    other causes that the recordings cannot distinguish from this one; of the nearest cause two that are as near.
+    other causes that the recordings cannot distinguish from this one; of the nearest cause, the two next ones.
     """
 
     name: str
@@ -258,12 +258,8 @@ def _unexplained(search: CauseSearch, tried: Sequence[SizedCause], kinds: str) -
     if not hints:
         return Diagnosis(tried=len(tried), kinds=kinds)
     nearest, *others = hints
-    near = tuple(
-        other
-        for other in others
-        if other.is_of_samples == nearest.is_of_samples and other.left <= _AS_NEAR * nearest.left
-    )
-    return Diagnosis(nearest=replace(nearest, same=near[: _MOST_NAMED - 1]), tried=len(tried), kinds=kinds)
+    next_ones = tuple(other for other in others if other.is_of_samples == nearest.is_of_samples)[: _NAMED - 1]
+    return Diagnosis(nearest=replace(nearest, same=next_ones), tried=len(tried), kinds=kinds)
 
 
 def _in_other_unit(

@@ -184,7 +184,7 @@ def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(bot
     assert smaller < error
     assert abs(fitted - stated) < 2.0 * error
     assert "g m^2" in text
-    assert re.search(r"\b\d+ other tolerances do not affect the intervals", text)
+    assert re.search(r"\b\d+ other tolerances affect the intervals less", text)
     assert "next experiment 1: slow: gain" in text
 
 
@@ -245,7 +245,7 @@ def test_the_interval_of_the_bench_can_be_the_prior_of_the_fit(solve: Solve) -> 
     known = outcome.results[0]["friction.static_torque"]
     given = next(one for one in outcome.trajectory.fit.numbers if one.path == "friction.static_torque").free
     assert given.start == known.value
-    assert given.deviation == pytest.approx(known.half_width / 1.96, rel=1e-3)
+    assert given.deviation == pytest.approx(known.half_width / 1.96, rel=1e-2)
     with pytest.raises(PpafoError, match="prior = 'bench' needs a value that a procedure of this problem identifies"):
         solve(FIT + prior)
 

@@ -16,7 +16,7 @@ from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
-from ppafo.identification.wording import in_shown_unit, interval_texts, with_error
+from ppafo.identification.wording import NAMED, in_shown_unit, interval_texts, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.report.finding import Finding, Section, columns_of
@@ -33,8 +33,6 @@ _FAR = 2.0
 """Number of standard deviations above which a tolerance counts as contradicted by the recordings."""
 _FAR_FROM_SET = 5.0
 """Ratio to the value of the set from which it is remarked on [-]: psi read as kPa makes 6.89."""
-_SHOWN = 0.05
-"""Smallest share of a variance that the report shows [-]."""
 _ROW_HEAD = ("",) * 4
 """Empty column heads for the rows of ``estimate_row``."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
@@ -245,13 +243,11 @@ def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Sectio
 
 
 def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> list[str]:
-    """Return sentences on tolerances that widen an interval or contradict the recordings, largest first."""
+    """Return sentences on the tolerances that widen an interval most, and on those that contradict the recordings."""
     is_far = {number.name: abs(number.after - number.before) > _FAR * number.before_error for number in known}
-    shown = sorted(
-        (number for number in known if number.share >= _SHOWN or is_far[number.name]), key=lambda number: -number.share
-    )
+    by_share = sorted(known, key=lambda number: (-float(f"{number.share:.2g}"), number.name))
     rows = []
-    for tolerance in shown:
+    for tolerance in (*by_share[:NAMED], *(number for number in by_share[NAMED:] if is_far[number.name])):
         # With its own error, as stated and as fitted.
         pairs = ((tolerance.before, tolerance.before_error), (tolerance.after, tolerance.after_error))
         texts = []
@@ -265,12 +261,12 @@ def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> lis
         entry = before.numbers.get(tolerance.name)
         default = " (the set states none)" if entry is not None and not entry.uncertainty else ""
         text = f"tolerance: {tolerance.name}: prior {texts[0]}{default}, fitted {texts[1]}"
-        if tolerance.share >= _SHOWN:
+        if tolerance.widens:
             text += f"; {percentage(tolerance.share, 2)} of the variance of {tolerance.widens}"
         rows.append(text)
-    if rest := len(known) - len(shown):
-        do = "does" if rest == 1 else "do"
-        rows.append(f"{count_of(rest, 'other tolerance')} {do} not affect the intervals")
+    if rest := len(known) - len(rows):
+        do = "affects" if rest == 1 else "affect"
+        rows.append(f"{count_of(rest, 'other tolerance')} {do} the intervals less")
     return rows
 
 
