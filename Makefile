@@ -31,12 +31,14 @@ test-long: $(READY)
 test-all: check
 	$(TESTS)
 
-# The short tests of what fits and compares, with the linear algebra of other processors, older than that of this computer.
-PROCESSORS ?= Haswell Nehalem
+# Whether fits and searches print the same by each kernel of linear algebra that this computer runs, and the short tests of
+# what fits and compares, by each.
+PROCESSORS ?= $(shell $(BIN)/python scripts/kernels.py)
 FITTING := $(addprefix tests/unit/,identification/bench identification/trajectory $(addprefix identification/test_,fit.py\
 	identify.py trajectory_section.py) $(addprefix validation/test_,causes.py compare_recording.py inputs.py)\
 	$(addprefix studies/test_,draws.py sampling.py))
 test-processors: $(READY)
+	$(BIN)/python scripts/kernels.py $(PROCESSORS)
 	set -e; for kernel in $(PROCESSORS); do OPENBLAS_CORETYPE=$$kernel $(TESTS) -m "not long" $(FITTING); done
 
 # The short tests of what a host program asks for, in one that has set decimals, errors of NumPy, locale and warnings in its own way.
