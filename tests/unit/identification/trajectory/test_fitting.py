@@ -182,6 +182,7 @@ def test_a_number_limited_to_one_recording_leaves_the_other_alone(
     assert less == pytest.approx(number_at(low, "supply.pressure"), rel=1e-3)
 
 
+@pytest.mark.short
 @pytest.mark.parametrize("is_right", [True, False], ids=["right model", "model that lacks a torque"])
 def test_a_fit_ends_at_the_same_numbers_from_several_starts(experiment: FittedExperiment, is_right: bool) -> None:
     """To a hundredth of each interval, also beside static friction, which trades off against its fall."""
