@@ -118,8 +118,11 @@ def failure_of(tests: list[str], source: Path, limit: float) -> str | None:
     return failed[0] if failed else "" if ended.returncode == 0 else f"exit {ended.returncode}"
 
 
-def fate_of(mutant: Mutant, source: Path, limit: float) -> tuple[str, str]:
-    """Return `killed`, `survived`, `late` or `gone`, and the test that failed, for the package with one fault."""
+def fate_of(mutant: Mutant, before: str, source: Path, limit: float) -> tuple[str, str]:
+    """Return `killed`, `survived`, `late` or `gone`, and the test that failed, for the package with one fault.
+
+    ``before`` is the test that found the fault in an earlier trial; its file is tried first.
+    """
     path = source / mutant.file
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
     rows = text.splitlines()
@@ -129,7 +132,8 @@ def fate_of(mutant: Mutant, source: Path, limit: float) -> tuple[str, str]:
     rows[places[min(mutant.occurrence, len(places) - 1)]] = mutant.faulty
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     try:
-        failed = failure_of(tests_for(mutant.file), source, limit)
+        first = [name for name in [before.partition("::")[0]] if name and (ROOT / name).is_file()]
+        failed = failure_of([*dict.fromkeys([*first, *tests_for(mutant.file)])], source, limit)
     finally:
         path.write_text(text, encoding="utf-8")
     if failed is None:
@@ -151,7 +155,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out/mutants.json"))
     given = parser.parse_args()
     if given.again:
-        drawn = [Mutant(*row[:4]) for row in json.loads(given.again.read_text(encoding="utf-8"))]
+        earlier = json.loads(given.again.read_text(encoding="utf-8"))
+        drawn, found = [Mutant(*row[:4]) for row in earlier], [row[5] for row in earlier]
     else:
         files = [
             path
@@ -159,14 +164,14 @@ def main() -> None:
             if not any(path.is_relative_to(ROOT / "src" / "ppafo" / name) for name in given.without)
         ]
         everything = [mutant for path in files for mutant in mutants_of(path)]
-        drawn = random.Random(given.seed).sample(everything, given.count)
+        drawn, found = random.Random(given.seed).sample(everything, given.count), [""] * given.count
     results: list[tuple[str | int, ...]] = []
     given.out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "src")
         shutil.copytree(ROOT / "src", source)
-        for number, mutant in enumerate(drawn, 1):
-            fate, failed = fate_of(mutant, source, given.limit)
+        for number, (mutant, before) in enumerate(zip(drawn, found, strict=True), 1):
+            fate, failed = fate_of(mutant, before, source, given.limit)
             results.append((*mutant, fate, failed))
             print(f"{number:3d} {fate:9s} {mutant.file}: {mutant.faulty.strip()[:80]}  {failed}", flush=True)
             given.out.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
