@@ -41,9 +41,9 @@ _OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_sta
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """End of a run: ``time`` [s] at which a diverged run stopped; ``message`` with its last state and the remedy."""
+    """End of a run: ``time`` [s] at which it stopped before its duration; ``message`` says why, and what to do."""
 
-    kind: Literal["completed", "diverged"]
+    kind: Literal["completed", "diverged", "ended early"]
     time: float | None = None
     message: str = ""
 

@@ -30,6 +30,9 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
     rows = state_row_numbers(run)
     failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
     status = status_of_walk(failed, bool(too_many_parts), outcome.states)
+    if status.is_completed and supply is not None and supply.ending.time < run.step * (run.step_count - 0.5):
+        ended, whole = supply.ending, scenario.run.duration
+        status = Status("ended early", ended.time, f"ended after {ended.time:.6g} of {whole:.6g} s: {ended.message}")
     time = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     # A recording has at least one sample, also of a walk that fails at once.
     end = time.size if status.time is None else max(int(np.searchsorted(time, status.time)), 1)

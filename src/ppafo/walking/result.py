@@ -49,7 +49,7 @@ class WalkResult:
     - ``strides``: numbers of each whole stride [SI], each (strides,), by name
     - ``averages``: mean curves over the stride, by channel
     - ``metrics``: numbers of the whole walk, by name
-    - ``status``: completed, or diverged with the time [s]
+    - ``status``: completed, or diverged or ended early by its bottle, with the time [s]
     - ``starts``: samples directly after each heel strike
     - ``supply``: gas bottle over the walk, None without a bottle
     """
@@ -99,9 +99,9 @@ class WalkResult:
         """Return status, verdict and metrics in display units, as printed by ``ppafo simulate``."""
         from ppafo.report.display_units import metrics_lines
 
-        head = [f"{self.scenario.name}: {self.status.kind}", self.scenario.origin.replaced]
+        head = [f"{self.scenario.name}: {self.status.message}", self.scenario.origin.replaced]
         head.append(changed_text(changes_in(self.scenario)))
-        if self.status.is_completed:
+        if self.status.kind != "diverged":
             head += [self.torque_sentence(self.tracking), limited_request(self.scenario), unlimited_switching(self)]
             toes = self.metrics.get("lowest_toes")
             if toes is not None and toes.value < 0.0:

@@ -111,7 +111,8 @@ def test_the_walk_ends_with_its_supply_and_says_why_and_when(kind: str) -> None:
     assert ending.time == pytest.approx(end, abs=2e-3)
     assert (end < 11.9) == (kind != "walk's end")
     assert f"{1e3 * found.recording['bottle_mass'][-1]:.3g} g " in ending.message
-    assert found.status.is_completed
+    assert found.status.kind == ("completed" if kind == "walk's end" else "ended early")
+    assert str(found).startswith(f"{WALK}: {found.status.message}\n")
     reached = found.recording["line_pressure_1"][found.recording.time > end - 1.0].max() - 101325.0
     if kind not in ("walk's end", "frozen"):
         assert reached < 0.9 * 344.74e3 * 1.001, "less than 90 % of the torque in the last stride"

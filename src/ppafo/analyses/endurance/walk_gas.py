@@ -73,7 +73,7 @@ def read_walk_gas(folder: Path) -> WalkGas:
     if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
         raise DataError(f"{path}: is not a result of 'ppafo walk' (its 'format' is not '{WALK_FORMAT}')")
     status = _table(path, document, "status").get("kind", "completed")
-    if status != "completed":
+    if status == "diverged":
         raise DataError(
             f"{path}: the walk {status}, so its gas demand cannot be repeated; give a walk that ran to its end"
         )

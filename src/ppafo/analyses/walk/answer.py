@@ -26,7 +26,6 @@ from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
-from ppafo.walking.bottle.course import duration_text, lasted
 from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
@@ -99,7 +98,9 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     ended = f"{scenario.name}: {worn.status.kind}, {strides} of {motion.gait.name}"
     verdict, gains = tried(scenario, worn.tracking), gains_of(scenario, law)
-    said = [ended, benefit_sentence(comparison), worn.torque_sentence(verdict), limited_request(scenario)]
+    cut_off = (walked for walked in (worn, comparison.without_device) if not walked.status.is_completed)
+    said = [ended, *(f"{walked.scenario.name}: {walked.status.message}" for walked in cut_off)]
+    said += [benefit_sentence(comparison), worn.torque_sentence(verdict), limited_request(scenario)]
     said += [unlimited_switching(worn), scenario.origin.replaced, "" if gains is None else gains.sentence]
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
@@ -166,24 +167,17 @@ def _files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
 
 
 def _remarks(comparison: WalkComparison) -> list[str]:
-    """Return remarks on wearer, bottle, pressures, and divergence."""
+    """Return remarks on wearer, bottle and pressures."""
     worn = comparison.with_device
-    diverged = [walked for walked in (worn, comparison.without_device) if not walked.status.is_completed]
-    remarks = (
-        *person_remarks(worn.scenario),
-        _bottle_remark(worn),
-        *_pressure_remarks(worn),
-        *(f"{walked.scenario.name}: {walked.status.message}" for walked in diverged),
-    )
+    remarks = (*person_remarks(worn.scenario), _bottle_remark(worn), *_pressure_remarks(worn))
     return [remark for remark in remarks if remark]
 
 
 def _bottle_remark(worn: WalkResult) -> str:
-    """Return a remark on the time that the bottle lasts, or on the argument for it; "" if no gas is used."""
+    """Return a remark on a bottle that outlasts the walk, or on the argument for one; "" if no gas is used."""
     if worn.supply is not None:
-        time = lasted(worn.supply)
-        duration = "" if time is None else f"lasts {duration_text(time)}: "
-        return f"bottle {worn.supply.supply.bottle.label}: {duration}{worn.supply.ending.message}"
+        said = f"bottle {worn.supply.supply.bottle.label}: {worn.supply.ending.message}"
+        return said if worn.status.is_completed else ""
     if "gas" not in worn.metrics or worn.metrics["gas"].value <= 0.0:
         return ""
     gas, names = worn.scenario.device.gas, (PAPER_BOTTLE, *list_bottles())

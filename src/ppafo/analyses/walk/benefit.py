@@ -38,13 +38,13 @@ RemedyTrials = tuple[str, Sequence[tuple[str, ...]], str]
 
 
 def benefit_sentence(comparison: WalkComparison) -> str:
-    """Return a sentence on whether the device helps, with the numbers of both walks; "" for a walk that diverged.
+    """Return a sentence on whether the device helps until the end of the walk; "" for a walk that diverged.
 
     The device helps by net work in push-off, toes above the ground, and an ankle closer to the healthy angle.
     """
     worn, bare = comparison.with_device, comparison.without_device
     numbers, without = ({name: metric.value for name, metric in walked.metrics.items()} for walked in (worn, bare))
-    if not comparison.is_completed or "net_push_off_work" not in numbers:
+    if "diverged" in (worn.status.kind, bare.status.kind) or "net_push_off_work" not in numbers:
         return ""
     has_work = numbers["net_push_off_work"] > 0.0
     drags, drags_without = (metrics.get("lowest_toes", 0.0) < 0.0 for metrics in (numbers, without))
@@ -57,6 +57,8 @@ def benefit_sentence(comparison: WalkComparison) -> str:
         verdict = "the device helps in push-off but not in swing"
     else:
         verdict = "the device helps" if has_work else "the device helps in swing alone"
+    if not worn.status.is_completed:
+        verdict = f"until then {verdict}"
     clauses = ", ".join(_compared(numbers, without))
     remedied = _remedied(worn, drags) if drags or not has_work else []
     return "; ".join([f"{verdict}, against the same walk without it: {clauses}", *remedied])

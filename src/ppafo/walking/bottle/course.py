@@ -102,11 +102,6 @@ class SupplyCourse:
         )
 
 
-def lasted(course: SupplyCourse) -> float | None:
-    """Return the time that a bottle lasted [s], or None if the walk ended or diverged before."""
-    return None if course.ending.kind in (WALKED, DIVERGED) else course.ending.time
-
-
 def duration_text(seconds: float) -> str:
     """Return a duration as text with three significant digits, in seconds to 2 min, in whole minutes from 1000 min."""
     kind = duration_kind(seconds)
