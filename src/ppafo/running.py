@@ -97,7 +97,7 @@ def simulate_many(
 
 
 class GivenCommands:
-    """Controller that repeats the commands [-] of a stepped run, and then holds the last one."""
+    """Controller that repeats the commands [-] of a stepped run as they are, and then holds the last one."""
 
     def __init__(self) -> None:
         self.commands: list[float] = []
@@ -107,7 +107,7 @@ class GivenCommands:
         """Begin at the first command."""
         self._sample = 0
 
-    def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
+    def update(self, time: float, reference: float, measurement: GaitMeasurement) -> float:  # noqa: ARG002 - a protocol
         """Return the command of the next sample."""
         self._sample += 1
         return self.commands[min(self._sample, len(self.commands)) - 1]
@@ -142,7 +142,10 @@ class SteppedRun:
 
     @property
     def reference(self) -> float:
-        """Reference at the present sample: torque [N m], angle [rad] or pressure [Pa], as ``reference.of`` says."""
+        """Reference at the present sample: torque [N m], angle [rad] or pressure [Pa], as ``reference.of`` says.
+
+        In a walk it is the torque that its controller would request, 0 if that requests none.
+        """
         return self._run.reference
 
     @property

@@ -8,11 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.kind import ControllerKind
+from ppafo.control.walking.catalog import PROPORTIONAL
 from ppafo.engine.channels import TRACED
 from ppafo.engine.loading import PYTHON
+from ppafo.engine.rows import rebuilt
+from ppafo.loading import load_scenario
 from ppafo.measuring import evaluate
+from ppafo.model.sensors import Measurement
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.ensemble.running import offered
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.reading import read_recording
 from tests.doors.of_python import (
     answer_of,
@@ -38,6 +46,37 @@ def test_compiled_code_has_the_bits_of_python(case: Case) -> None:
     assert list(found.channels) == list(answer.channels)
     assert_same_channels(found.channels, answer)
     assert found.metrics == answer.metrics
+
+
+class OfKind:
+    """A law of the catalogue as an object of Python."""
+
+    def __init__(self, law: ControllerKind, scenario: Scenario) -> None:
+        settings = scenario.controller.settings
+        self.law, self.period = law, scenario.controller.period
+        self.parameters = rebuilt(law.parameters, (settings[item.name] for item in law.quantities))
+
+    def reset(self) -> None:
+        """Begin as the law does."""
+        self.state = self.law.initial
+
+    def update(self, time: float, reference: float, measurement: Any) -> float:
+        """Command of the law [-]."""
+        sample = Measurement(**{name: getattr(measurement, name) for name in Measurement._fields})
+        command, self.state = self.law.update(self.parameters, self.state, reference, sample, self.period)
+        return float(command)
+
+
+@pytest.mark.parametrize(
+    ("name", "law", "duration"),
+    [("torque-task-proportional", CONTROLLERS["pid"], 0.5), ("proportional", PROPORTIONAL, 6.0)],
+)
+def test_an_object_of_python_is_told_what_its_law_is_told(name: str, law: ControllerKind, duration: float) -> None:
+    """Of a vane and of a walk, in which it is reset and its chambers are vented as the law's are."""
+    scenario = load_scenario(name, [f"run.duration={duration} s"])
+    told = simulate(scenario.controlled_by(OfKind(law, scenario)))
+    assert_same_channels({item: told[item] for item in told.recording.names}, answer_of(simulate(scenario)))
+    assert "reference" in told.recording.names
 
 
 def of_ensembles() -> list[Any]:

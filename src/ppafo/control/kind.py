@@ -121,8 +121,11 @@ class PythonController(Protocol):
 
         The reference is a torque [N m], or the quantity named by ``reference.of``: an angle [rad] or a pressure [Pa].
 
-        In a walk the measurement is a ``GaitMeasurement`` with the forces under heel and toes, the reference is 0, and
-        ``model.command.VENT`` is also a valid command: it connects both chambers to the atmosphere.
+        In a walk the measurement is a ``GaitMeasurement`` with the forces under heel and toes, and the reference is the
+        torque that the controller of the scenario requests, 0 if it requests none. As a compiled torque law, the object
+        is reset where another task starts, and both chambers are vented where no torque is requested. An ``update``
+        that annotates its measurement as ``GaitMeasurement`` is in charge of the whole gait: it is reset only once, and
+        its commands are used as they are; ``VENT`` (2) is one, which vents both chambers.
 
         A command above 0 connects chamber 1 to the supply and chamber 2 to the atmosphere, a command below 0 the
         reverse. At 0 a proportional valve is closed and both chambers keep their gas; a solenoid pair vents both.

@@ -11,6 +11,7 @@ import numpy as np
 from ppafo.control.kind import PythonController
 from ppafo.engine.lanes import Batch, BatchResult
 from ppafo.errors import SimulationError
+from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 from ppafo.simulation.sampled import SampledRun
 from ppafo.wording import nearest_name
@@ -28,19 +29,29 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     SimulationError for a command that is no finite number, and for a programming error in the controller.
     """
     run = SampledRun(batch)
+    is_framed = run.requests_torque and not _reads_gait(controller)
     # What an earlier run left behind in the object must not steer this one.
     try:
         controller.reset()
     except (NameError, AttributeError, TypeError) as error:
         raise _programming_error(controller, error) from error
     for _ in range(run.samples):
-        inputs = (run.time, run.reference, run.measurement())
+        measurement = run.measurement()
         try:
-            command = controller.update(*inputs)
+            if is_framed and not run.continues_task:
+                controller.reset()
+            command = controller.update(run.time, run.reference, measurement)
         except (NameError, AttributeError, TypeError) as error:
             raise _programming_error(controller, error) from error
-        run.advance(_valve_command(command, controller, run.time, batch.program.walks))
+        limited = _valve_command(command, controller, run.time, batch.program.walks)
+        run.advance(VENT if is_framed and run.vents(measurement) else limited)
     return run.result()
+
+
+def _reads_gait(controller: PythonController) -> bool:
+    """Tell whether an object detects gait phases: whether its ``update`` annotates a ``GaitMeasurement``."""
+    annotated = getattr(controller.update, "__annotations__", {}).get("measurement")
+    return annotated in (GaitMeasurement, GaitMeasurement.__name__)
 
 
 def _valve_command(command: Any, controller: PythonController, time: float, walks: bool) -> float:

@@ -3,6 +3,8 @@
 import math
 from typing import Any, final
 
+from ppafo.control.walking.assistance import acts, same_task
+from ppafo.control.walking.outside import OUTSIDE
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, effort_for, load_program, samples_in
 from ppafo.engine.rows import group_of, row_numbers
@@ -30,6 +32,10 @@ class SampledRun:
         self._reference, self._step = _parameter_group(batch, "reference"), _parameter_group(batch, "timing").step
         self._rows = row_numbers(program.state_rows())
         self._plant, self._sensors = (_parameter_group(batch, name) for name in ("plant", "sensors"))
+        self.requests_torque = program.controller is OUTSIDE
+        self._command_row = self._rows["controller_state.command" if self.requests_torque else "result.command"]
+        self._law = _parameter_group(batch, "controller") if self.requests_torque else None
+        self._before = self._requested = OUTSIDE.initial
         if program.walks:
             self._last_measurement = NOTHING_SEEN
             # Gas temperatures of a walk are kept inside the compiled program alone.
@@ -51,7 +57,10 @@ class SampledRun:
 
     @property
     def reference(self) -> float:
-        """Reference at the current sample [N m]."""
+        """Reference at the current sample [N m]; in a walk the torque requested for the last measurement."""
+        if self.requests_torque:
+            requested: float = self._requested.request.torque
+            return requested
         reference: float = self._batch.program.reference.value(self._reference, self.time)[0]
         return reference
 
@@ -72,7 +81,11 @@ class SampledRun:
         """
         program, clock = self._batch.program, self._batch.clock
         if program.walks:
-            return self._walk_measurement()
+            seen = self._walk_measurement()
+            if self.requests_torque:
+                self._before, period = self._requested, clock.steps_per_sample * self._step
+                self._requested = OUTSIDE.update(self._law, self._before, 0.0, seen, period)[1]
+            return seen
         # Delayed sensors show an earlier state.
         if program.late_signals and self.sample > 0:
             signals = self._block.late_signals(self.sample * clock.steps_per_sample)
@@ -88,11 +101,20 @@ class SampledRun:
             return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
         return measure(self._sensors, angle, pressure_1, pressure_2, self._plant, self.sample, parts=program.functions)
 
+    @property
+    def continues_task(self) -> bool:
+        """True if the gait has the same task as at the sample before."""
+        return same_task(self._before.phase.phase, self._requested.phase.phase)
+
+    def vents(self, measurement: GaitMeasurement) -> bool:
+        """Return whether a torque law is not in command of the valve at the last measurement, and the chambers vent."""
+        return not acts(self._requested.phase, measurement.torque)
+
     def advance(self, command: float) -> None:
         """Advance to the next sample with a command."""
         clock = self._batch.clock
         step = self.sample * clock.steps_per_sample
-        self._block.states[self._rows["result.command"]] = command
+        self._block.states[self._command_row] = command
         # The last sample of a run may have fewer steps.
         self._block.advance(min(clock.steps_per_sample, clock.step_count - step))
         self.sample += 1

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
 from ppafo.control.kind import OPEN_LOOP, PythonController
+from ppafo.control.walking.assistance import ASSISTING_QUANTITIES
 from ppafo.documents.json_text import plain
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
@@ -17,7 +18,7 @@ from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Number
 from ppafo.parameters.device import Device, Supply, held
 from ppafo.parameters.graph import Graph, outside
-from ppafo.simulation.motion_kind import MOTIONS, MotionKind
+from ppafo.simulation.motion_kind import MOTIONS, WALK, MotionKind
 
 if TYPE_CHECKING:
     from ppafo.control.kind import ControllerKind
@@ -428,7 +429,11 @@ class Scenario:
                     f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "
                     f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
                 )
-        return with_control(self, Control(PYTHON_CONTROLLER, {}, self.controller.period, controller))
+        settings = request_settings(self)
+        changed = with_control(self, Control(PYTHON_CONTROLLER, settings, self.controller.period, controller))
+        # What a walk requests still follows the device.
+        kept = {path: links for path, links in self.links.items() if path.removeprefix("controller.") in settings}
+        return replace(changed, links={**changed.links, **kept})
 
 
 def vane_motion(scenario: Scenario) -> VaneMotion:
@@ -444,6 +449,13 @@ def vane_motion(scenario: Scenario) -> VaneMotion:
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
     """Return the whole scenario with every number of the device, in SI units, as data that can be written as JSON."""
     return {"units": UNITS, **plain(scenario)}
+
+
+def request_settings(scenario: Scenario) -> dict[str, float]:
+    """Return the settings by which the controller of a walk requests a torque; {} if it requests none."""
+    settings, names = scenario.controller.settings, [quantity.name for quantity in ASSISTING_QUANTITIES]
+    requests = scenario.motion.motion_kind.layout == WALK and settings.keys() >= set(names)
+    return {name: settings[name] for name in names} if requests else {}
 
 
 def with_control(scenario: Scenario, control: Control) -> Scenario:

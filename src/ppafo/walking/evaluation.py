@@ -17,7 +17,7 @@ from ppafo.simulation.simulate import Status
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.contradictions import check_no_bottle
-from ppafo.walking.planning import requests_torque
+from ppafo.walking.planning import law_of, requests_torque
 from ppafo.walking.recording import recording_of_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import mean_curves, per_stride, stride_starts, walk_metrics
@@ -96,7 +96,7 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
         return "the metric needs the whole run over time, which a walk does not keep"
     if LED_SHANK in kind.needs:
         return "the metric needs a leg without ground contact, whose shank follows a gait"
-    law = scenario.law
-    if REQUESTED in kind.needs and (law is None or not requests_torque(law)):
+    is_asked = not scenario.controller.is_outside or scenario.controller.settings
+    if REQUESTED in kind.needs and not (is_asked and requests_torque(law_of(scenario))):
         return f"controller '{scenario.controller.kind}' requests no torque"
     return ""

@@ -7,6 +7,7 @@ from typing import Any
 from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import walking_controllers
+from ppafo.control.walking.outside import OUTSIDE
 from ppafo.engine.in_python import in_program
 from ppafo.engine.rows import of_each
 from ppafo.engine.run import Run, Walk, states_at_start
@@ -80,13 +81,13 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         sensors=sensors,
         initial=initial,
     )
-    # An object in charge is asked between the steps, so the program has no controller of its own.
-    is_outside = scenario.controller.is_outside
+    control = scenario.controller
     components = Components(
         device=device,
         valve=venting_valve(device.valve),
-        controller=None if is_outside else law_of(scenario),
-        settings={} if is_outside else scenario.controller.settings,
+        # Where no torque is requested, an object in charge is asked between the steps of a program without a law.
+        controller=None if control.is_outside and not control.settings else law_of(scenario),
+        settings=control.settings,
         reference=NO_REFERENCE,
         path=None,
         sensors=sensor_parameters(scenario),
@@ -203,10 +204,12 @@ def noise(scenario: Scenario) -> Any:
 
 
 def law_of(scenario: Scenario) -> ControllerKind:
-    """Return the controller of a walk.
+    """Return the controller of a walk; for an object of Python, the frame that requests torques of it.
 
     The controller with a constant command occurs only in an exported plant, not in a walk file.
     """
+    if scenario.controller.is_outside:
+        return OUTSIDE
     if scenario.controller.kind == switching.CONSTANT.name:
         return switching.CONSTANT
     return walking_controllers()[scenario.controller.kind]

@@ -60,6 +60,18 @@ def test_measurements_are_those_that_a_controller_object_is_given() -> None:
     assert seen == kept.seen
 
 
+def test_the_reference_of_a_stepped_walk_is_the_torque_that_its_controller_requests() -> None:
+    run, told = ppafo.start("proportional", {"run.duration": "6 s"}), {}
+    while not run.is_over:
+        told[run.time] = run.reference
+        run.step(2.0)
+    recorded = run.result()
+    at = np.searchsorted(recorded.recording.time, np.array(list(told)) - 1e-9)
+    assert list(told.values()) == recorded["reference"][at].tolist()
+    assert min(told.values()) < -1.0
+    assert max(told.values()) > 4.0
+
+
 def test_a_result_so_far_ends_at_the_present_sample() -> None:
     run = ppafo.start("torque-task-proportional")
     with pytest.raises(ppafo.SimulationError, match="no command"):
