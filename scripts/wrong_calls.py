@@ -128,27 +128,24 @@ class Function(NamedTuple):
     given: Mapping[str, Any]
     kinds: Mapping[str, str]
     optional: frozenset[str] = frozenset()
-    alone: str = ""
-    """The argument that takes the place of all others."""
 
 
 KINDS: Mapping[str, str] = {
     "object": "parameter_set parent recording result scenario study tuning",
     "overrides": "overrides",
     "name": (
-        "baseline bottle catalogue columns configuration folder gait method metric "
-        "motion part path problem such_that valve vary width"
+        "baseline bottle columns configuration folder gait method motion path problem profile such_that valve vary"
     ),
-    "names": "also configurations initial metrics recordings scenarios thresholds",
-    "positive": "atmosphere gas_per_stride mass minutes peak_flow pressure stature stride_time torque volume",
+    "names": "configurations initial metrics recordings scenarios thresholds",
+    "positive": "atmosphere gas_per_stride minutes peak_flow stride_time volume",
     "from zero": "longest longest_delay rest walk",
     "seed": "seed",
-    "count": "draws first_draws grid samples threads",
+    "count": "draws grid samples threads",
     "function": "progress",
     "fraction": "confidence maximum_failed",
     "content": "content tasks",
     "flag": "agreed check highest independent",
-    "number": "at toes",
+    "number": "at",
     "path": "out",
 }
 """Arguments by the kind that they have where a function does not say another one."""
@@ -200,10 +197,6 @@ ARGUMENTS: Mapping[str, str] = {
 """Arguments of every public function that takes some; ``?`` where None is right too, ``:KIND`` for another kind."""
 
 
-ALONE = {"design": "problem"}
-"""The argument of a function that takes the place of all others."""
-
-
 def right_values(recording: Path) -> dict[str, dict[str, Any]]:
     """Arguments that are right, by function; ``recording`` is a file that can be read."""
     return {
@@ -212,7 +205,7 @@ def right_values(recording: Path) -> dict[str, dict[str, Any]]:
         "bottle": {"gas_per_stride": 3e-4},
         "compare": {"configurations": [TASK, "torque-task-solenoid"], "draws": 64},
         "compare_walks": {"scenario": WALK},
-        "design": {"mass": 72.5, "torque": 2.5, "pressure": 4.46e5, "minutes": 5.0},
+        "design": {"problem": "push-off"},
         "endurance_of_walk": {"result": ppafo.walk(WALK, minutes=0.1)},
         "evaluate": {"recording": recording},
         "find": {
@@ -255,7 +248,7 @@ def functions(recording: Path) -> dict[str, Function]:
         kinds = {name: kind or kind_of[name] for name, _, kind in parts}
         if function in PLUGINS:
             kinds["plugins"] = "names"
-        known[function] = Function(right.get(function, {}), kinds, optional, ALONE.get(function, ""))
+        known[function] = Function(right.get(function, {}), kinds, optional)
     return known
 
 
@@ -290,8 +283,7 @@ def tried(call: Call, known: Mapping[str, Function]) -> Outcome:
     value = WRONG[call.value]()
     try:
         with _at_most(SECONDS):
-            given = {} if call.argument == function.alone else function.given
-            getattr(ppafo, call.function)(**{**given, call.argument: value})
+            getattr(ppafo, call.function)(**{**function.given, call.argument: value})
     except ppafo.PpafoError as error:
         is_named = names(str(error), call.argument) or begins(str(error), value)
         return Outcome("named" if is_named else "unnamed", str(error))

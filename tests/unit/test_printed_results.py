@@ -11,10 +11,10 @@ FEWEST_ANALYSES = 14
 
 
 def test_a_printed_answer_is_what_its_command_prints(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sets", "parts"]) == 0
-    found = ppafo.parts()
+    assert main(["bottle", "--gas-per-stride", "0.3 g", "--stride-time", "1 s"]) == 0
+    found = ppafo.bottle(gas_per_stride=3.0e-4, stride_time=1.0)
     assert capsys.readouterr().out == f"{found}\n"
-    assert repr(found) == f"<Parts: {found.title}>"
+    assert repr(found) == f"<{type(found.found).__name__}: {found.title}>"
 
 
 def test_every_analysis_returns_a_finding_which_prints_saves_and_draws_itself() -> None:
