@@ -40,7 +40,7 @@ from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_
 from ppafo.simulation.motion_kind import MOTIONS, RunTimes
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument
-from ppafo.simulation.profiles import reference_problem
+from ppafo.simulation.profiles import read_profile, reference_problem
 from ppafo.simulation.scenario import (
     Control,
     FreeMotion,
@@ -239,7 +239,7 @@ def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> t
     levels = [f"reference.{quantity.name}" for quantity in settings if quantity.unit == "Pa_a"]
     written = {path: value_at(reading.document, path) for path in levels}
     links = {path: gauge_link(path, *split_quantity(str(text))) for path, text in written.items() if text is not None}
-    choice = ProfileChoice(kind, reading.section("reference", settings, atmosphere))
+    choice = read_profile(reading, "reference", settings, atmosphere)
     return choice, {path: follow for path, follow in links.items() if follow}
 
 

@@ -183,7 +183,7 @@ LOCKED_MOTION = VaneKind(
 def _read_prescribed(
     reading: DocumentReader, device: Device, duration: float, step: float, _folder: Path
 ) -> PrescribedMotion:
-    profile = read_profile(reading, _PROFILE, ANGLE_LEVEL)
+    profile = read_profile(reading, _PROFILE, profile_settings(kind_at(reading.document, _PROFILE), ANGLE_LEVEL))
     problem = profile_problem(stops_of(device), profile, duration, step)
     if problem:
         raise ScenarioError(f"{reading.file}: {problem}")
@@ -215,7 +215,7 @@ def _read_leg(reading: DocumentReader, device: Device, _duration: float, _step: 
     numbers: dict[str, Any] = reading.section("motion", LEG)
     start = numbers.pop("angle"), numbers.pop("angular_velocity")
     kind = kind_at(reading.document, _SHANK)
-    shank = ProfileChoice(kind, reading.section(_SHANK, shank_settings(kind)))
+    shank = read_profile(reading, _SHANK, shank_settings(kind))
     if kind != GAIT_SHANK:
         if not PROFILES[kind].is_smooth:
             smooth = ", ".join([name for name, profile in PROFILES.items() if profile.is_smooth] + [GAIT_SHANK])

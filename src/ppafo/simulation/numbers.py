@@ -26,6 +26,7 @@ from ppafo.parameters.effects import number_under, part_of
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.simulation.declaration import LOCKED_ANGLE, changes_reach
+from ppafo.simulation.profiles import disordered_knots, profiles_of
 from ppafo.simulation.scenario import (
     Control,
     GasModel,
@@ -109,6 +110,10 @@ def check_parts(scenario: Scenario) -> None:
             is_good = False
         if not is_good:
             raise refusal(path, value, range_rule(quantity, quantity.unit))
+    for section, choice in profiles_of(scenario).items():
+        is_bad, line = disordered_knots(choice, section)
+        if is_bad:
+            raise ScenarioError(f"{scenario.name}: {line(0)}")
     _ACCEPTED.append(scenario)
 
 
@@ -213,12 +218,22 @@ def _numbers_of_other_form(device: Device) -> set[str]:
 
 
 def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
-    """Return the sections of orifices that change between area and sonic conductance."""
-    return [
-        section
-        for section in ORIFICES
-        if any(f"{section}.{name}" in paths for name in other_form(scenario.device, section))
-    ]
+    """Return the sections of orifices that change between area and sonic conductance; each needs both its numbers."""
+    changing = []
+    for section in ORIFICES:
+        form = [f"{section}.{name}" for name in other_form(scenario.device, section)]
+        missing = [path for path in form if path not in paths]
+        if not missing:
+            changing.append(section)
+        elif len(missing) < len(form):
+            # Declared are the numbers of both forms: those of the device's own are left.
+            own = [f"{section}.{quantity.name}" for quantity in ORIFICE]
+            raise ScenarioError(
+                f"{scenario.name}: the device is given by {' and '.join(path for path in own if path not in form)}; to "
+                f"give {' or '.join(path for path in form if path in paths)} instead, also give "
+                f"{' and '.join(missing)}, or first set {' and '.join(form)}"
+            )
+    return changing
 
 
 def path_of_locked_angle(scenario: Scenario) -> str | None:

@@ -1,19 +1,22 @@
 """Profiles of a scenario (functions of time): reading from a file, engine parameters, values and bounds."""
 
+from functools import reduce
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import PROFILES
 from ppafo.engine.in_python import over_samples
 from ppafo.engine.rows import rebuilt
+from ppafo.errors import ScenarioError
 from ppafo.model.catalog import VALVES
-from ppafo.model.columns import over_runs
+from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.signals.recording import OF_SECOND_CHAMBER
-from ppafo.simulation.declaration import profile_settings
 from ppafo.simulation.document import DocumentReader, kind_at
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 from ppafo.units.shown import in_units, shown_text
@@ -45,10 +48,41 @@ def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
     return lowest, highest
 
 
-def read_profile(reading: DocumentReader, section: str, prescribed: Quantity) -> ProfileChoice:
-    """Return a profile with all its settings in SI."""
-    kind = kind_at(reading.document, section)
-    return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))
+def read_profile(
+    reading: DocumentReader, section: str, quantities: tuple[Quantity, ...], atmosphere: float = STANDARD_ATMOSPHERE
+) -> ProfileChoice:
+    """Return a profile with all its settings in SI; ScenarioError for knots that are not in order."""
+    choice = ProfileChoice(kind_at(reading.document, section), reading.section(section, quantities, atmosphere))
+    is_bad, line = disordered_knots(choice, section)
+    if is_bad:
+        raise ScenarioError(f"{reading.file}: {line(0)}")
+    return choice
+
+
+def disordered_knots(choice: ProfileChoice, section: str) -> Problem:
+    """Problem of a table with a knot in use that is not later than the one before; of no other profile."""
+    times = {f"{section}.{name}": number for name, number in choice.settings.items() if name.startswith("time_")}
+    knots = [("the first knot", 0.0), *times.items()]
+    pairs = [
+        (earlier, later, np.logical_and(later[1] < choice.settings["period"], later[1] <= earlier[1]))
+        for earlier, later in pairwise(knots)
+    ]
+
+    def line(run: int) -> str:
+        earlier, later, _ = next(pair for pair in pairs if at(pair[-1], run))
+        before, time = (shown_text(at(knot[1], run), "s", ".9g") for knot in (earlier, later))
+        return f"{later[0]} = {time}: must be later than {earlier[0]}, {before}"
+
+    return reduce(np.logical_or, (is_bad for _, _, is_bad in pairs), False), line
+
+
+def profiles_of(scenario: Scenario) -> dict[str, ProfileChoice]:
+    """Return the profiles of a scenario by section."""
+    motion = scenario.motion
+    leg, path = getattr(motion, "leg", None), getattr(motion, "profile", None)
+    shank = None if leg is None else leg.shank
+    found = {"reference": scenario.reference, "motion.profile": path, "motion.shank": shank}
+    return {section: choice for section, choice in found.items() if isinstance(choice, ProfileChoice)}
 
 
 class Limits(NamedTuple):

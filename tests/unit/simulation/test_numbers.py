@@ -4,14 +4,18 @@ from collections import Counter
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 
+from ppafo.errors import ScenarioError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Orifice, SonicOrifice
 from ppafo.parameters.overrides import over
 from ppafo.simulation.clock import TIMES
+from ppafo.simulation.ensemble.columns import check_columns
+from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.numbers import declared_numbers, number_at, other_form, with_numbers
+from ppafo.simulation.numbers import check_parts, declared_numbers, number_at, other_form, with_numbers
 
 
 @cache
@@ -107,3 +111,22 @@ def test_the_gains_of_a_cascade_share_one_torque_loop_and_keep_their_bits() -> N
     for term in terms:
         whole = term.function(*term.arguments([number_at(scenario, source) for source in term.sources]))
         assert term.number(lambda path: number_at(scenario, path)) == whole
+
+
+def test_knots_out_of_order_or_at_one_time_are_refused_wherever_they_come_from() -> None:
+    name, last = "swing-foot-angle", "reference.time_03"
+    for time in (0.0198, 0.0099):
+        said = f"{last} = {time} s: must be later than reference.time_02, 0.0198 s"
+        with pytest.raises(ScenarioError, match=said):
+            load_scenario(name, [f"{last}={time} s"])
+        scenario = load_scenario(name)
+        with pytest.raises(ScenarioError, match=said):
+            check_parts(with_numbers(scenario, {last: time}))
+        assert screen_columns(check_columns(scenario, {last: np.array([0.03, time])})).reasons == {1: said}
+    with pytest.raises(ScenarioError, match=r"must be later than the first knot, 0 s"):
+        load_scenario(name, ["reference.time_02=0 s"])
+
+
+def test_half_of_the_other_form_of_an_orifice_is_refused() -> None:
+    with pytest.raises(ScenarioError, match=r"give valve.area instead, also give valve.discharge_coefficient"):
+        with_numbers(load_scenario("cylinder-servo"), {"valve.area": 4e-6})

@@ -10,11 +10,11 @@ from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import OF_SECOND_CHAMBER, ORIFICE, WHY_ONE_CHAMBER
+from ppafo.parameters.declaration import OF_SECOND_CHAMBER, WHY_ONE_CHAMBER
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import either, in_two_forms
 from ppafo.simulation.declaration import TEXTS, WALL_AREA
-from ppafo.simulation.numbers import ORIFICES, chosen_path, declared_numbers, moving_together, other_form
+from ppafo.simulation.numbers import chosen_path, declared_numbers, moving_together
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import nearest_name
 
@@ -77,17 +77,6 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     pair = in_two_forms(values)
     if pair is not None:
         raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' cannot both vary: {either(pair[0])}")
-    for section in ORIFICES:
-        form = [f"{section}.{name}" for name in other_form(base.device, section)]
-        missing = [path for path in form if path not in values]
-        if missing and len(missing) < len(form):
-            # Declared are the numbers of both forms: those of the device's own are left.
-            own = [f"{section}.{quantity.name}" for quantity in ORIFICE]
-            raise ScenarioError(
-                f"{base.name}: the device is given by {' and '.join(path for path in own if path not in form)}; to "
-                f"vary {' or '.join(path for path in form if path in values)} instead, also vary "
-                f"{' and '.join(missing)}, or first set {' and '.join(form)}"
-            )
     # An adiabatic scenario need not say its area, and runs that take up heat would go on as if they had none.
     gas, heat_varies = base.gas_model, "gas_model.heat_transfer_coefficient" in values
     if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:

@@ -15,13 +15,25 @@ from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, clock_with, time_text
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.numbers import path_of_locked_angle
-from ppafo.simulation.profiles import Limits, limits_of, profile_bounds, profile_problem, stops_of
+from ppafo.simulation.profiles import (
+    Limits,
+    disordered_knots,
+    limits_of,
+    profile_bounds,
+    profile_problem,
+    profiles_of,
+    stops_of,
+)
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 from ppafo.units.shown import shown_text
 
 
 def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
-    """Problems of a scenario of a vane alone: initial angle or profile beyond a limit, delay too long."""
+    """Problems of a scenario of a vane alone: knots not in order, angle or profile beyond a limit, delay too long."""
+    disordered = tuple(disordered_knots(choice, section) for section, choice in profiles_of(scenario).items())
+    # The bounds of a curve need its knots in order.
+    if any(np.any(is_bad) for is_bad, _ in disordered):
+        return disordered
     delay, step, device = scenario.sensors.delay, scenario.run.step, scenario.device
     motion, followed = vane_motion(scenario), CONTROLLED[scenario.controlled]
     profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
