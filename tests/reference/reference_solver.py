@@ -4,29 +4,22 @@ First the sampled controller beside a solution in continuous time, with what it 
 and stops as the modes between which the solver switches; then the solution; last how far the lanes are from it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.continuous_time import (
-    SAME_TIME,
-    Roots,
-    after_stop,
-    mode_at_rest,
-    roots_at_rest,
-    roots_sliding,
-    torque_at_rest,
-)
+from ppafo.engine.continuous_time import mode_at_rest, torque_at_rest
 from ppafo.engine.entries import with_arrays
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.errors import SimulationError
-from ppafo.model.ports import at_valve, friction_at_rest, shown_signals
+from ppafo.model.plant import PlantParameters
+from ppafo.model.ports import at_valve, friction_at_rest, rebound, shown_signals
 from ppafo.model.sensors import Measurement, measure
 from tests.interpreted import load_source
 from tests.reference.reference_slopes import (
@@ -36,8 +29,40 @@ from tests.reference.reference_slopes import (
     unknowns_before_valve,
 )
 
+SAME_TIME = 1.0e-12
+"""Difference [s] below which two instants count as equal."""
+SLOWEST_REBOUND = 1.0e-7
+"""Angular velocity [rad/s] below which a rebound is neglected."""
 Signals = tuple[float, float, float]
 """Angle [rad] and both absolute pressures [Pa]."""
+
+
+class Roots(NamedTuple):
+    """Two root functions, positive during a mode; the mode ends when one becomes zero."""
+
+    first: float
+    second: float
+
+
+def roots_at_rest(plant: PlantParameters, angle: float, torque: float) -> Roots:
+    """Margins of the torque to breakaway in both directions [N m]; a stop withstands any torque."""
+    # A constant has no zero: the solver never leaves the mode through a stop that holds.
+    towards_upper = 1.0 if angle >= plant.angle_max else plant.static_torque - torque
+    towards_lower = 1.0 if angle <= plant.angle_min else plant.static_torque + torque
+    return Roots(towards_upper, towards_lower)
+
+
+def roots_sliding(plant: PlantParameters, angle: float, angular_velocity: float, way: float) -> Roots:
+    """Speed in the direction of motion [rad/s], and distance to the next stop [rad]."""
+    ahead = plant.angle_max - angle if way > 0.0 else angle - plant.angle_min
+    return Roots(way * angular_velocity, ahead)
+
+
+def after_stop(run: Run, states: Mapping[str, Any], angular_velocity: float) -> float:
+    """Angular velocity [rad/s] after an impact on a stop; 0 for a negligible rebound."""
+    thrown_back = float(in_program(rebound, run.program, run.effects)(states, angular_velocity))
+    # Rebounds follow in ever shorter times: without a lowest speed the solver would restart without end.
+    return thrown_back if abs(thrown_back) > SLOWEST_REBOUND else 0.0
 
 
 class SampledControl:

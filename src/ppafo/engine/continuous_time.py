@@ -1,7 +1,6 @@
-"""Plant in continuous time for solvers and linear models: gas balance, unconstrained vane, and modes of motion.
+"""Plant in continuous time for solvers and linear models: gas balance and unconstrained vane.
 
-The flows are computed as in a step of the engine. A vane that sticks, slides or rests at a stop is in one of several
-modes; root functions detect the end of a mode.
+The flows are computed as in a step of the engine.
 """
 
 from collections.abc import Callable, Mapping
@@ -27,12 +26,8 @@ from ppafo.model.plant import (
     holds_still,
     vane_acceleration,
 )
-from ppafo.model.ports import friction_in_motion, rebound
+from ppafo.model.ports import friction_in_motion
 
-SAME_TIME = 1.0e-12
-"""Difference [s] below which two instants count as equal."""
-SLOWEST_REBOUND = 1.0e-7
-"""Angular velocity [rad/s] below which a rebound is neglected."""
 NEAR = 1.0e-4
 """Half-width [rad] of the central difference of volumes with respect to the angle."""
 
@@ -204,36 +199,8 @@ def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float
     return torque
 
 
-class Roots(NamedTuple):
-    """Two root functions, positive during a mode; the mode ends when one becomes zero."""
-
-    first: float
-    second: float
-
-
 def mode_at_rest(plant: PlantParameters, angle: float, torque: float) -> float:
     """Direction in which a vane at ``angle`` [rad] starts to move under ``torque`` [N m]: 1, -1, or 0 if it sticks."""
     if holds_still(torque, plant.static_torque, angle <= plant.angle_min, angle >= plant.angle_max):
         return 0.0
     return 1.0 if torque > 0.0 else -1.0
-
-
-def roots_at_rest(plant: PlantParameters, angle: float, torque: float) -> Roots:
-    """Margins of the torque to breakaway in both directions [N m]; a stop withstands any torque."""
-    # A constant has no zero: the solver never leaves the mode through a stop that holds.
-    towards_upper = 1.0 if angle >= plant.angle_max else plant.static_torque - torque
-    towards_lower = 1.0 if angle <= plant.angle_min else plant.static_torque + torque
-    return Roots(towards_upper, towards_lower)
-
-
-def roots_sliding(plant: PlantParameters, angle: float, angular_velocity: float, way: float) -> Roots:
-    """Speed in the direction of motion [rad/s], and distance to the next stop [rad]."""
-    ahead = plant.angle_max - angle if way > 0.0 else angle - plant.angle_min
-    return Roots(way * angular_velocity, ahead)
-
-
-def after_stop(run: Run, states: Mapping[str, Any], angular_velocity: float) -> float:
-    """Angular velocity [rad/s] after an impact on a stop; 0 for a negligible rebound."""
-    thrown_back = float(in_program(rebound, run.program, run.effects)(states, angular_velocity))
-    # Rebounds follow in ever shorter times: without a lowest speed the solver would restart without end.
-    return thrown_back if abs(thrown_back) > SLOWEST_REBOUND else 0.0

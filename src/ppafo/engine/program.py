@@ -173,11 +173,6 @@ class Program:
         return self.shank is not None and self.shank.name == "gait"
 
     @property
-    def effect_rows(self) -> dict[str, type]:
-        """Groups of rows available to the laws of effects, by name: parameters and states."""
-        return {effect.name: effect.parameters for effect in self.effects} | self.effect_states
-
-    @property
     def stated(self) -> dict[str, State]:
         """States of effects, by effect name."""
         return {effect.name: effect.state for effect in self.effects if effect.state is not None}

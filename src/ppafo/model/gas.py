@@ -65,31 +65,6 @@ def subsonic_flow_constant(heat_capacity_ratio: float, gas_constant: float, temp
     return math.sqrt(2.0 * k / (gas_constant * temperature * (k - 1.0)))
 
 
-def gas_temperature(energy: float, mass: float, heat_capacity: float) -> float:
-    """Temperature [K] of ``mass`` [kg] with an internal energy [J]; ``heat_capacity`` is c_v [J/(kg K)]."""
-    return energy / (mass * heat_capacity)
-
-
-def gas_energy(mass: float, temperature: float, heat_capacity: float) -> float:
-    """Internal energy [J] of ``mass`` [kg] at a temperature [K], 0 at 0 K; the inverse of ``gas_temperature``."""
-    return mass * heat_capacity * temperature
-
-
-def heat_capacity_at_constant_volume(gas_constant: float, heat_capacity_ratio: float) -> float:
-    """Specific heat c_v = R/(k - 1) [J/(kg K)] of an ideal gas; ``gas_constant`` is the specific one."""
-    return gas_constant / (heat_capacity_ratio - 1.0)
-
-
-def heat_from_wall(temperature: float, wall_temperature: float, heat_transfer_coefficient: float, area: float) -> float:
-    """Heat [W] into the gas through a wall of ``area`` [m^2]; positive where the wall is warmer."""
-    return heat_transfer_coefficient * area * (wall_temperature - temperature)
-
-
-def energy_rate(enthalpy_flow: float, pressure: float, volume_rate: float, heat: float) -> float:
-    """Time derivative [W] of a chamber's energy: enthalpy inflow [W], minus work P dV/dt, plus heat [W]."""
-    return enthalpy_flow - pressure * volume_rate + heat
-
-
 def wall_exchange(
     heat_transfer_coefficient: float, area_per_volume: float, heat_capacity_ratio: float, gas_constant: float
 ) -> float:

@@ -106,13 +106,13 @@ class Kind:
         """Return a difference of two values, given in SI, as text in the display unit, without the unit."""
         return without_exponent(display_difference(value, self.quantity, self.given), form)
 
-    def interval(self, interval: ConfidenceInterval, form: str = "") -> str:
+    def interval(self, interval: ConfidenceInterval) -> str:
         """Return an estimate with the limits of its confidence interval, given in SI, as text without unit."""
-        return _interval_text(interval, form or self.form, self.number)
+        return _interval_text(interval, self.form, self.number)
 
-    def change_interval(self, interval: ConfidenceInterval, form: str = "") -> str:
+    def change_interval(self, interval: ConfidenceInterval) -> str:
         """Return a difference with the limits of its confidence interval, given in SI, as text without unit."""
-        return _interval_text(interval, form or self.form, self.change_number)
+        return _interval_text(interval, self.form, self.change_number)
 
 
 def _interval_text(interval: ConfidenceInterval, form: str, number: Callable[[float, str], str]) -> str:

@@ -6,7 +6,7 @@ If the joint angle is unknown, the chambers are evaluated at a right angle or, i
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.actuators.kind import Chambers, Range, mean_growth
+from ppafo.model.actuators.kind import Chambers, Range
 from ppafo.model.actuators.vane import VaneSettings
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS
@@ -144,27 +144,15 @@ def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: 
     return parts.at(settings, stops, around, usual_place(stops.angle_min, stops.angle_max))
 
 
-def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) -> float:
-    """Volume displaced per angle in chamber 1 of a vane [m^3/rad], independent of the angle."""
-    return settings.displacement_per_radian
-
-
-def shaped_growth(settings: Any, stops: Range, around: Surroundings, *, parts: _ShapedParts) -> float:
-    """Mean volume displaced per angle [m^3/rad] in chamber 1 between the stops, for an actuator with a shape."""
-    gauge = around.supply_pressure - around.atmospheric_pressure
-    return mean_growth(parts.shape(settings, stops), stops, gauge, parts.chambers)
-
-
 class _ChambersOf(NamedTuple):
-    """Functions for an actuator's chambers at the usual angle and at any angle, and for its mean displacement.
+    """Functions for an actuator's chambers at the usual angle and at any angle.
 
     ``sources`` are the paths of their arguments and ``rows`` the types into which these are grouped. ``at`` takes the
-    angle [rad] as an additional last argument; ``growth`` is in m^3/rad.
+    angle [rad] as an additional last argument.
     """
 
     function: Any
     at: Any
-    growth: Any
     sources: tuple[str, ...]
     rows: tuple[type, ...]
 
@@ -183,15 +171,14 @@ def chambers_of(device: Device) -> _ChambersOf:
     )
     if actuator.kind == VANE:
         usual = made_of(usual_chambers, "usual_chambers_of_vane", _ChamberParts(vane_at))
-        return _ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
+        return _ChambersOf(function=usual, at=vane_at, sources=sources, rows=rows)
     name, model, shape = actuator.kind, kind.model, kind.model.prepare
     if actuator.table is not None:
         shape = made_of(measured_shape_of, f"shape_of_{name}", _MeasuredParts(model.prepare, actuator.table))
     shaped = _ShapedParts(shape, model.chambers, model.torque)
     at = made_of(shaped_at, f"chambers_at_of_{name}", shaped)
     middle = made_of(usual_chambers, f"usual_chambers_of_{name}", _ChamberParts(at))
-    growth = made_of(shaped_growth, f"growth_of_{name}", shaped)
-    return _ChambersOf(function=middle, at=at, growth=growth, sources=sources, rows=rows)
+    return _ChambersOf(function=middle, at=at, sources=sources, rows=rows)
 
 
 def quicker_at(device: Device, angle: float, controlled: str) -> float:

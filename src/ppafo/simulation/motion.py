@@ -62,7 +62,6 @@ class VaneKind:
     command: ClassVar[str] = "simulate"
     python_call: ClassVar[str] = "ppafo.simulate({name!r}, [{overrides}])"
     is_measured_at_once: ClassVar[bool] = False
-    reads_forces: ClassVar[bool] = False
     is_repeated_for_its_error: ClassVar[bool] = True
 
     def contradictory_numbers(self, scenario: Scenario) -> "tuple[Problem, ...]":

@@ -88,10 +88,6 @@ class MotionKind(Protocol[ScenarioType_contra]):
         """True if the status of a run depends on its metrics, which are then computed at once, not on first use."""
 
     @property
-    def reads_forces(self) -> bool:
-        """True if controllers read the forces under the foot in addition to angle and pressures."""
-
-    @property
     def is_repeated_for_its_error(self) -> bool:
         """True if runs are short enough to be repeated for an error estimate without request."""
 

@@ -31,7 +31,6 @@ _MASS_FLOW, _SAME_DENSITY = "kg/s", 5.0e-3
 def read_foreign(
     path: str | Path,
     columns: ColumnMap,
-    label: str | None = None,
     atmosphere: float = STANDARD_ATMOSPHERE,
     map_name: str = "",
     gas: str = "",
@@ -40,7 +39,7 @@ def read_foreign(
 
     Gauge pressure is relative to ``atmosphere`` [Pa absolute]. Raises DataError if the map selects several trials.
     """
-    recordings = read_trials(path, columns, label, atmosphere, map_name, gas)
+    recordings = read_trials(path, columns, atmosphere, map_name, gas)
     if len(recordings) > 1:
         with refused_as(DataError, path, DataError), in_map(map_name):
             raise DataError(
@@ -53,7 +52,6 @@ def read_foreign(
 def read_trials(
     path: str | Path,
     columns: ColumnMap,
-    label: str | None = None,
     atmosphere: float = STANDARD_ATMOSPHERE,
     map_name: str = "",
     gas: str = "",
@@ -91,7 +89,7 @@ def read_trials(
         for suffix_of_label, rows in trials.items():
             check_clock(time[rows], table.rows[rows], table.noun)
             trial = {name: replace(channel, values=channel.values[rows]) for name, channel in channels.items()}
-            trial_label = f"{label or one_line(Path(path).stem)}{suffix_of_label}"
+            trial_label = f"{one_line(Path(path).stem)}{suffix_of_label}"
             # A synthetic recording stays one through a column map.
             recording = Recording(trial_label, time[rows], trial, table.kind)
             with in_map(map_name):

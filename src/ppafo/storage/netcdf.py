@@ -6,7 +6,6 @@ NetCDF files are written without xarray, whose import takes longer than a simula
 import io
 import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
@@ -14,7 +13,6 @@ from ppafo.errors import ArgumentError
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
-from ppafo.storage.files import write_file
 from ppafo.units import conversion
 
 if TYPE_CHECKING:
@@ -75,11 +73,6 @@ def channel_attributes(recording: Recording, name: str, joint: JointNames = ANKL
     between = recording.channels[name].between
     declared = {} if between is None else {BETWEEN: between}
     return {"units": PLAIN_NUMBER_IN_NETCDF if unit == PLAIN_NUMBER else unit, "long_name": summary, **declared}
-
-
-def write_netcdf(path: str | Path, recording: Recording, scenario: Mapping[str, Any] | None = None) -> Path:
-    """Write a recording as NetCDF. Returns the path."""
-    return write_file(path, netcdf_bytes(recording, scenario))
 
 
 def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None) -> bytes:

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import StudyError
+from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_configuration, load_study
-from ppafo.studies.sampling import NOISE, correlate, uniform_numbers, with_noise
+from ppafo.studies.sampling import correlate, uniform_numbers, with_noise
 from ppafo.studies.study import Configuration, RandomValue, SamplingPlan, Study, with_followers
 from ppafo.wording import known_names
 
@@ -52,21 +53,19 @@ class Uncertainty:
         sample = SamplingPlan("random", first + count, seed)
         return self.columns(uniform_numbers(sample, len(self.drawn), first, count))
 
-    def replicated_columns(self, first: int, count: int, seed: int) -> Columns:
-        """Return draws ``first`` to ``first + count - 1`` of randomised Sobol replicates.
+    def replicated_columns(self, count: int, seed: int) -> Columns:
+        """Return ``count`` draws of randomised Sobol replicates.
 
         Draw j is point j // REPLICATES of scramble j % REPLICATES. The scrambles are independent, so that the spread
         between their means estimates the error of a mean (Owen, 1997).
         """
         # Dealt out in turn: any number of draws from the start has all replicates to within one draw.
-        numbers = np.arange(first, first + count)
         uniform = np.empty((count, len(self.drawn)))
-        for replicate in range(REPLICATES):
-            own = numbers % REPLICATES == replicate
-            if own.any():
-                start, length = int(numbers[own][0]) // REPLICATES, int(np.count_nonzero(own))
-                sample = SamplingPlan("sobol", start + length, replicate_seed(seed, replicate))
-                uniform[own] = uniform_numbers(sample, len(self.drawn), start, length)
+        for replicate in range(min(REPLICATES, count)):
+            own = slice(replicate, count, REPLICATES)
+            length = len(range(count)[own])
+            sample = SamplingPlan("sobol", length, replicate_seed(seed, replicate))
+            uniform[own] = uniform_numbers(sample, len(self.drawn), 0, length)
         return self.columns(uniform)
 
     def with_noise_of(self, scenarios: Iterable[Scenario]) -> "Uncertainty":
@@ -77,7 +76,7 @@ class Uncertainty:
     @property
     def has_noise(self) -> bool:
         """True if each draw has its own seed of the sensor noise."""
-        return NOISE in self.paths
+        return NOISE_SEED in self.paths
 
 
 def replicate_seed(seed: int, replicate: int) -> int:
@@ -85,13 +84,13 @@ def replicate_seed(seed: int, replicate: int) -> int:
     return int(np.random.SeedSequence([seed, replicate]).generate_state(1, np.uint64)[0])
 
 
-def seeds_of_noise(scenarios: Iterable[Scenario], paths: Sequence[str], first: int, count: int, seed: int) -> Floats:
-    """Return seeds of ``count`` noise streams (streams,), from stream ``first`` of the sequence given by ``seed``.
+def seeds_of_noise(scenarios: Iterable[Scenario], paths: Sequence[str], count: int, seed: int) -> Floats:
+    """Return seeds of the first ``count`` noise streams (streams,) of the sequence given by ``seed``.
 
     The array is empty if no controller of the scenarios receives noise, or if the noise is among the varied ``paths``.
     """
     noise = Uncertainty(with_noise((), None, scenarios, paths)[0])
-    return noise.random_columns(first, count, seed)[NOISE] if noise.has_noise else np.zeros(0)
+    return noise.random_columns(0, count, seed)[NOISE_SEED] if noise.has_noise else np.zeros(0)
 
 
 def study_of(

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
 from ppafo.studies.study import RandomValue, SamplingPlan
@@ -43,8 +44,6 @@ _MAXIMUM_ENGINES = 64
 """Number of cached engines; the oldest one is dropped first."""
 _LEAST_SPREAD = 1.0e-6
 """Smallest conditional standard deviation of a normal score, given the others, for a positive definite correlation."""
-NOISE = "sensors.seed"
-"""Path of the noise seed of a run."""
 _NOISE_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise", "sensors.force_noise")
 _KEY = 1
 """Seed of the permutation that maps a noise seed to the seed of another noise stream."""
@@ -152,9 +151,9 @@ def with_noise(
     for scenario in closed:
         level = scenario.motion.motion_kind.noise(scenario)
         is_noisy = is_noisy or bool(np.any(np.asarray(level) > 0.0))
-    if NOISE in paths or not is_noisy:
+    if NOISE_SEED in paths or not is_noisy:
         return drawn, scores
-    noise = RandomValue(NOISE, WholeNumbersBetween(0.0, float(LARGEST_SEED)))
+    noise = RandomValue(NOISE_SEED, WholeNumbersBetween(0.0, float(LARGEST_SEED)))
     if scores is None:
         return (*drawn, noise), None
     alone = (*(0.0,) * len(drawn), 1.0)
@@ -164,7 +163,7 @@ def with_noise(
 def with_new_noise(columns: Mapping[str, Floats]) -> dict[str, Floats]:
     """Return the first ``NOISE_DRAWS`` draws, each with another noise stream and otherwise unchanged."""
     first = {path: column[:NOISE_DRAWS] for path, column in columns.items()}
-    return first | {NOISE: other_noise(first[NOISE])}
+    return first | {NOISE_SEED: other_noise(first[NOISE_SEED])}
 
 
 def other_noise(seeds: Floats) -> Floats:

@@ -201,12 +201,12 @@ def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float 
     return f"{number} {unit.removesuffix('_d')}".rstrip()
 
 
-def written_text(value: float, si_unit: str, atmosphere: float | None = None, unit: str = "") -> str:
+def written_text(value: float, si_unit: str) -> str:
     """Format an SI value in its display unit for reading back, without conversion errors.
 
     >>> written_text(206842.71879504 + 101325.0, "Pa_a"), written_text(3.929e-9, "m^3/(s Pa)")
     ('30 psi_g', '0.3929 L/(s bar)')
     """
-    unit = unit or shown_unit(si_unit)
-    number = shown_value(value, si_unit, unit, atmosphere)
+    unit = shown_unit(si_unit)
+    number = shown_value(value, si_unit, unit)
     return f"{float(f'{number:.{_DIGITS}g}')!r}".removesuffix(".0") + f" {unit}".rstrip()

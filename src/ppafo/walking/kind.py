@@ -22,7 +22,6 @@ class WalkKind:
     command: ClassVar[str] = "walk"
     python_call: ClassVar[str] = "ppafo.walk({name!r}, overrides=[{overrides}])"
     is_measured_at_once: ClassVar[bool] = True
-    reads_forces: ClassVar[bool] = True
     is_repeated_for_its_error: ClassVar[bool] = False
 
     plan = staticmethod(planning.plan_walks)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from ppafo.engine.in_python import in_program, over_samples, over_samples_in
-from ppafo.engine.row_functions import row_functions
 from ppafo.model.plant import Openings, PlantParameters, blended_ports
 from ppafo.model.ports import load_torque
 from ppafo.simulation.loading import load_scenario
@@ -42,24 +41,3 @@ def test_a_function_over_samples_has_the_effects_and_their_numbers() -> None:
 def test_what_python_refuses_goes_on_as_compiled_code_does() -> None:
     found = over_samples(root_over, np.array([4.0, -1.0, 1.0]), np.array([2.0, 1.0, 0.0]))
     assert np.array_equal(found, [1.0, math.nan, math.inf], equal_nan=True)
-
-
-@pytest.mark.parametrize("backend", ["", "python"])
-def test_a_function_of_rows_is_called_with_arrays_by_every_backend(
-    backend: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PPAFO_BACKEND", backend)
-    (shared,) = row_functions(halves)
-    found = np.zeros(4)
-    shared(np.array(OPEN), found, 0.5)
-    assert found.tolist() == [0.5, 0.0, 0.0, 0.5]
-
-
-def halves(openings: Openings, share: float) -> Openings:
-    """A share of openings."""
-    return Openings(
-        source_1=share * openings.source_1,
-        vent_1=share * openings.vent_1,
-        source_2=share * openings.source_2,
-        vent_2=share * openings.vent_2,
-    )

@@ -80,7 +80,8 @@ def test_every_shape_can_be_drawn() -> None:
 def test_an_interval_has_as_many_digits_as_tell_its_limits_apart() -> None:
     kind = Kind("", "", form=".3g")
     assert kind.interval(ConfidenceInterval(0.25, 0.2499, 0.2501)) == "0.25 [0.2499, 0.2501]"
-    assert kind.change_interval(ConfidenceInterval(0.07293, 0.0728, 0.0731), "+.2g") == "+0.0729 [+0.0728, +0.0731]"
+    change = Kind("", "", form="+.2g")
+    assert change.change_interval(ConfidenceInterval(0.07293, 0.0728, 0.0731)) == "+0.0729 [+0.0728, +0.0731]"
     assert kind.interval(ConfidenceInterval(0.0, 0.0, 0.0)) == "0 [0, 0]"
     assert kind.interval(ConfidenceInterval(1.0, 0.9, 1.1)) == "1 [0.9, 1.1]"
     assert kind.interval(ConfidenceInterval(1.0, 1.0 - 1e-12, 1.0 + 1e-12)) == "1 [1, 1]"

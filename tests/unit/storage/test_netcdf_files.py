@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
-from ppafo.storage import dataset_of, write_netcdf
+from ppafo.storage import dataset_of
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.storage.netcdf_reading import read_netcdf
 
@@ -18,8 +18,14 @@ def recording() -> Recording:
     return Recording("bench é", np.array([0.0, 0.1]), channels, "synthetic")
 
 
+def written(folder: Path, recording: Recording) -> Path:
+    path = folder / "bench.nc"
+    path.write_bytes(netcdf_bytes(recording))
+    return path
+
+
 def test_a_file_is_read_back_exactly(tmp_path: Path) -> None:
-    assert read_netcdf(write_netcdf(tmp_path / "bench.nc", recording())) == recording()
+    assert read_netcdf(written(tmp_path, recording())) == recording()
 
 
 def test_the_same_recording_gives_the_same_bytes() -> None:
@@ -29,7 +35,8 @@ def test_the_same_recording_gives_the_same_bytes() -> None:
 def test_xarray_opens_the_file_as_the_dataset_that_python_gets(tmp_path: Path) -> None:
     import xarray
 
-    path = write_netcdf(tmp_path / "bench.nc", recording(), {"name": "task", "note": "x" * 200_000})
+    path = tmp_path / "bench.nc"
+    path.write_bytes(netcdf_bytes(recording(), {"name": "task", "note": "x" * 200_000}))
     with xarray.open_dataset(path, engine="h5netcdf") as opened:
         xarray.testing.assert_identical(opened.load(), dataset_of(recording(), {"name": "task", "note": "x" * 200_000}))
 
@@ -67,8 +74,8 @@ def test_an_empty_file_is_refused_as_empty(tmp_path: Path) -> None:
         read_netcdf(path)
 
 
-def changed(path: Path, variable: str, units: str) -> Path:
-    write_netcdf(path, recording())
+def changed(folder: Path, variable: str, units: str) -> Path:
+    path = written(folder, recording())
     with h5netcdf.File(path, "a") as file:
         file.variables[variable].attrs["units"] = units
     return path
@@ -76,9 +83,9 @@ def changed(path: Path, variable: str, units: str) -> Path:
 
 def test_a_wrong_unit_is_refused_by_file_and_channel(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"bench\.nc: .*channel 'angle' must be in 'rad', not in 'deg'"):
-        read_netcdf(changed(tmp_path / "bench.nc", "angle", "deg"))
+        read_netcdf(changed(tmp_path, "angle", "deg"))
     with pytest.raises(DataError, match=r"'time' must be in 's', not in 'ms'"):
-        read_netcdf(changed(tmp_path / "bench.nc", "time", "ms"))
+        read_netcdf(changed(tmp_path, "time", "ms"))
 
 
 def test_a_dataset_of_something_else_is_refused(tmp_path: Path) -> None:
@@ -103,4 +110,4 @@ def test_a_channel_of_two_dimensions_is_refused(tmp_path: Path) -> None:
 def test_what_a_channel_declares_between_its_samples_is_an_attribute(tmp_path: Path) -> None:
     supply = Channel(np.array([4.0e5, 5.0e5]), "Pa", "hold")
     declared = Recording("bench", np.array([0.0, 1.0]), {"supply_pressure": supply})
-    assert read_netcdf(write_netcdf(tmp_path / "bench.nc", declared)) == declared
+    assert read_netcdf(written(tmp_path, declared)) == declared

@@ -9,10 +9,11 @@ import pytest
 
 import ppafo
 from ppafo.analyses.compare.question import compare
+from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.studies.draws import uncertainty_of
 from ppafo.studies.intervals import noise_interval
 from ppafo.studies.loading import load_study
-from ppafo.studies.sampling import NOISE, other_noise
+from ppafo.studies.sampling import other_noise
 from ppafo.study.blocks import drawn_values
 
 NOISY = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
@@ -53,8 +54,8 @@ def test_without_noise_nothing_is_drawn_for_it() -> None:
     quiet = changed()
     for item in quiet["configurations"]:
         item["overrides"] = [text for text in item["overrides"] if "noise" not in text]
-    assert NOISE not in load_study(quiet).paths
-    assert NOISE in load_study(changed()).paths
+    assert NOISE_SEED not in load_study(quiet).paths
+    assert NOISE_SEED in load_study(changed()).paths
     assert not compare(
         {"a": ppafo.load_scenario("step-response"), "b": ppafo.load_scenario("step-response")}
     ).found.draws
@@ -67,20 +68,20 @@ def test_the_noise_is_independent_of_what_is_correlated_and_leaves_its_correlati
     document["vary"].append({"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"})
     document["correlations"] = [{"between": ["supply.pressure", "valve.area"], "coefficient": 0.8}]
     columns = uncertainty_of(load_study(document)).random_columns(0, 4000, 1)
-    ranks = np.array([stats.rankdata(columns[path]) for path in ("supply.pressure", "valve.area", NOISE)])
+    ranks = np.array([stats.rankdata(columns[path]) for path in ("supply.pressure", "valve.area", NOISE_SEED)])
     found = np.corrcoef(ranks)
     assert found[0, 1] == pytest.approx(6.0 / np.pi * np.arcsin(0.4), abs=0.02)
     assert found[:2, 2] == pytest.approx([0.0, 0.0], abs=0.05)
-    assert np.array_equal(columns[NOISE], np.floor(columns[NOISE]))
+    assert np.array_equal(columns[NOISE_SEED], np.floor(columns[NOISE_SEED]))
 
 
 def test_a_seed_varies_as_whole_numbers() -> None:
     document = changed(configurations=DOCUMENT["configurations"][:1])
-    document["vary"].append({"path": NOISE, "kind": "whole_numbers", "minimum": 3, "maximum": 5})
-    values = drawn_values(load_study(document), np.arange(64))[NOISE]
+    document["vary"].append({"path": NOISE_SEED, "kind": "whole_numbers", "minimum": 3, "maximum": 5})
+    values = drawn_values(load_study(document), np.arange(64))[NOISE_SEED]
     assert set(values) == {3.0, 4.0, 5.0}
-    document["vary"][-1] = {"path": NOISE, "kind": "list", "values": [1, 2]}
-    assert set(drawn_values(load_study(document), np.arange(128))[NOISE]) == {1.0, 2.0}
+    document["vary"][-1] = {"path": NOISE_SEED, "kind": "list", "values": [1, 2]}
+    assert set(drawn_values(load_study(document), np.arange(128))[NOISE_SEED]) == {1.0, 2.0}
 
 
 def test_the_share_of_noise_is_the_planted_one_and_its_interval_holds() -> None:

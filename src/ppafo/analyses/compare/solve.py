@@ -13,12 +13,13 @@ from ppafo.progress import Report
 from ppafo.remedy_trials import tried
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate_many
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import Uncertainty, uncertainty_of
-from ppafo.studies.sampling import NOISE, with_new_noise
+from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import Configuration, Study, configurations_with
 from ppafo.studies.varying import value_at, varied_path
 from ppafo.study.runs import FAILED, Rows, RunCounter, scenario_runs, unvaried
@@ -115,7 +116,7 @@ def compared(
         draws=draws.count if drawn else 0,
         seed=seed if drawn else 0,
         remarks=[],
-        varied=[path for path in uncertainty.paths if path != NOISE],
+        varied=[path for path in uncertainty.paths if path != NOISE_SEED],
         confidence=draws.confidence,
         tasks=[
             _task_result(task, overrides, [cases[task, name] for name in names], baseline, metrics, draws.confidence)
@@ -155,7 +156,7 @@ def _check_different_values(study: Study, scenarios: Scenarios) -> None:
     """Raise StudyError for a path that the study draws once for scenarios whose declared values differ."""
     for path in study.paths:
         # Orifices of different valves are meant to differ: what the study draws replaces the value of each.
-        if path.startswith("valve.") or path == NOISE:
+        if path.startswith("valve.") or path == NOISE_SEED:
             continue
         declared = [value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)]
         values = [value for value in declared if value is not None]
@@ -178,15 +179,15 @@ def _runs_over_draws(
     seed: int,
 ) -> dict[tuple[str, str], _DrawnRuns]:
     """Return the runs of every scenario over the same draws; StudyError if too many of them fail."""
-    columns = uncertainty.replicated_columns(0, draws.count, seed)
+    columns = uncertainty.replicated_columns(draws.count, seed)
     renoised_columns = with_new_noise(columns) if uncertainty.has_noise else {}
-    runs_of_scenario = draws.count + len(renoised_columns.get(NOISE, ()))
+    runs_of_scenario = draws.count + len(renoised_columns.get(NOISE_SEED, ()))
     counter = RunCounter(runs_of_scenario * len(scenarios), draws.progress)
     drawn = {}
     for (task, name), scenario in scenarios.items():
         runs = scenario_runs(scenario, metrics, counter, uncertainty.gauge, draws.threads)
         # The noise is in all configurations, even if the study varies other paths in some of them only.
-        paths = [path for path in columns if study is None or path == NOISE or study.varies(path, name)]
+        paths = [path for path in columns if study is None or path == NOISE_SEED or study.varies(path, name)]
         rows = runs.run({path: columns[path] for path in paths} or unvaried(scenario, draws.count))
         runs.check(rows, draws.maximum_failed, f"configuration '{name}', task '{task}'")
         # Read before the runs with other noise, which may overwrite it.

@@ -22,10 +22,9 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.law_signals import IN_SCENARIO
-from ppafo.simulation.numbers import number_at
+from ppafo.simulation.numbers import NOISE_SEED, number_at
 from ppafo.simulation.tracking import REVERSALS
 from ppafo.studies.draws import seeds_of_noise
-from ppafo.studies.sampling import NOISE
 from ppafo.study.runs import oscillating
 
 Limit = Literal["torque", "flow", "control", "pressure"]
@@ -95,7 +94,7 @@ class Trials:
         self.runs = 0
         self.failures: Counter[str] = Counter()
         # The scenario's own seed plays no part, so that two scenarios are judged in the same noise.
-        self.seeds = seeds_of_noise([problem.scenario], (), 0, STREAMS, _SEED)
+        self.seeds = seeds_of_noise([problem.scenario], (), STREAMS, _SEED)
         self._threads = threads
 
     def run(self, valve: CandidateValve, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
@@ -111,7 +110,7 @@ class Trials:
             rows = slice(start, start + chunk)
             tiled = {path: np.tile(values[rows], streams) for path, values in columns.items()}
             if self.seeds.size:
-                tiled[NOISE] = np.repeat(self.seeds, pressure[rows].size)
+                tiled[NOISE_SEED] = np.repeat(self.seeds, pressure[rows].size)
             # The error limit of the design judges the tracking: no other tracking metric is needed.
             result = run_ensemble(scenario, tiled, (ERROR, GAS, REVERSALS), threads=self._threads)
             # A loop that oscillates is no design, whatever its error is.

@@ -16,7 +16,7 @@ from ppafo.running import simulate
 from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.gains import remark_on_following_gains
-from ppafo.simulation.numbers import declared_numbers
+from ppafo.simulation.numbers import NOISE_SEED, declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
 from ppafo.simulation.tracking import Tracking
@@ -27,7 +27,6 @@ from ppafo.simulation.tracking.shortfall import shortfall
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
-from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, given_in, varied_path
 from ppafo.study.runs import RunCounter, Runs, excess, is_to_follow, scenario_runs, settled, with_companions
@@ -173,7 +172,7 @@ class FindResult:
         metric, shape = self.condition.metric, (max(1, seeds.size), values.size)
         columns = {self.path.path: np.tile(values, shape[0])}
         if seeds.size:
-            columns[NOISE] = np.repeat(seeds, values.size)
+            columns[NOISE_SEED] = np.repeat(seeds, values.size)
         rows = self.runs.run(columns)
         # One instant of a value that swings may meet the condition by chance.
         judged = settled(rows, metric)
@@ -224,7 +223,7 @@ def outermost(
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     # The same streams for all values, so that neighbours differ by the value alone.
-    seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
+    seeds = seeds_of_noise([base], [path.path], _STREAMS, _SEED)
     counter = RunCounter(grid * max(1, seeds.size), progress)
     runs = scenario_runs(base, with_companions([condition.metric], base), counter, (), threads)
     remarks = (remark_on_following_gains(base, [path.path]), base.origin.replaced)

@@ -126,7 +126,7 @@ class _RecordingReader(NamedTuple):
         if row_time is not None and not (TIME in column_map.channels or column_map.direction or column_map.trial):
             time = MappedChannel(rate=f"{1.0 / row_time!r} Hz")
             column_map = column_map.model_copy(update={"channels": {TIME: time, **column_map.channels}})
-        recordings = read_trials(path, column_map, None, atmosphere, f"{self.file}:{columns}", flowing)
+        recordings = read_trials(path, column_map, atmosphere, f"{self.file}:{columns}", flowing)
         return tuple(source_of(path, recording, recording.label.removeprefix(path.stem)) for recording in recordings)
 
     def read_experiment(self, experiment: ExperimentSection) -> RecordingSource:

@@ -15,11 +15,11 @@ from ppafo.analyses.sensitivity.methods import EvaluatedBlocks, Indices, Method,
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.simulation.gains import remark_on_following_gains
+from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.limits import CONFIDENCE, check_fraction
-from ppafo.studies.sampling import NOISE
 from ppafo.study.runs import Runs, tracking_violation
 from ppafo.wording import argument_text
 
@@ -155,7 +155,7 @@ def analyse(
     runs.check(rows, settings.maximum_failed, "sensitivity", requested)
     ends = np.array([number.distribution.values(np.array(_ENDS)) for number in uncertainty.drawn]).T
     # A seed has no order: from its 5 to its 95 % quantile nothing changes.
-    ends[:, [path == NOISE for path in uncertainty.paths]] = np.nan
+    ends[:, [path == NOISE_SEED for path in uncertainty.paths]] = np.nan
     inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
     blocks = np.repeat(np.arange(settings.samples), design.shape[0] // settings.samples)
     # The design of all metrics, without the values of one.

@@ -15,7 +15,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION, font_size
 from ppafo.signals.recording import CHANNELS
-from ppafo.studies.sampling import NOISE
+from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.study.store import FOLLOWS
 from ppafo.units.shown import quantity_of_unit
 
@@ -65,7 +65,7 @@ def figure_of(results: StudyResults, sentences: Sequence[str], remarks: Sequence
     # No more configurations than distinguishable colours.
     names = results.configurations[:MOST_CONFIGURATIONS]
     # The value of a seed has no meaning.
-    varied = [path for path in results.varied if path != NOISE]
+    varied = [path for path in results.varied if path != NOISE_SEED]
     grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED]
     # Over two paths each configuration has a panel of each metric, a map or points; else all share one panel.
     is_mapped = 2 in (len(grid), len(varied))

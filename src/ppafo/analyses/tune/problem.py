@@ -18,13 +18,12 @@ from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.simulation.numbers import changes_in
+from ppafo.simulation.numbers import NOISE_SEED, changes_in
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Floats, LogUniformBetween, UniformBetween
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
 from ppafo.studies.loading import list_studies, load_study, read_source
-from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, in_its_unit, value_at, varied_path
 from ppafo.wording import first_twice
 
@@ -371,7 +370,7 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
             raise ScenarioError(
                 f"scenario '{scenario.name}' has no value for '{gain.path}'; set it in the scenario or by an override"
             )
-    if gain.path == NOISE:
+    if gain.path == NOISE_SEED:
         raise StudyError(
             f"search '{gain.path}': cannot be searched, because all candidates use the same noise; omit this search"
         )

@@ -45,7 +45,7 @@ def test_configurations_that_are_equally_good_are_called_different_no_more_often
     normals = Uncertainty(tuple(RandomValue(f"x{number}", NormalAround(0.0, 1.0)) for number in range(6)))
     differs, is_better = [], []
     for seed in range(300):
-        drawn = normals.replicated_columns(0, 256, seed)
+        drawn = normals.replicated_columns(256, seed)
         shared = drawn["x0"] ** 2 + drawn["x1"]
         first = shared + 0.3 * drawn["x2"] + 0.2 * drawn["x4"] ** 3
         item = compare_pairs("x", first, shared + 0.3 * drawn["x3"] + 0.2 * drawn["x5"] ** 3, -1, 0.95)

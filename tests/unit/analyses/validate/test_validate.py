@@ -12,7 +12,8 @@ from ppafo.cli.main import main
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
-from ppafo.storage import read_csv, write_csv, write_netcdf
+from ppafo.storage import read_csv, write_csv
+from ppafo.storage.netcdf import netcdf_bytes
 
 CHAMBERS = ("pressure_1", "pressure_2")
 SUPPLY = ["--set", "supply.pressure=55 psi_g", "--set", "supply.dorsiflexion_pressure=55 psi_g"]
@@ -32,7 +33,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     channels["command"] = Channel(run["command"], "-")
     recording = Recording("step", run.time, channels, "synthetic")
     write_csv(folder / "step.csv", recording)
-    write_netcdf(folder / "step.nc", recording)
+    (folder / "step.nc").write_bytes(netcdf_bytes(recording))
     return folder
 
 
