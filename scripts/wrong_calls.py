@@ -78,7 +78,6 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
     "names": (),
     "overrides": (),
     "flag": ("True", "False"),
-    "whole": ("zero",),
     "seed": ("zero",),
     "count": (),
     "fraction": ("zero",),
