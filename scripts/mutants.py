@@ -170,6 +170,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "src")
         shutil.copytree(ROOT / "src", source)
+        # Tests that look up pages from the package find them beside the copy.
+        Path(folder, "docs").symlink_to(ROOT / "docs")
         for number, (mutant, before) in enumerate(zip(drawn, found, strict=True), 1):
             fate, failed = fate_of(mutant, before, source, given.limit)
             results.append((*mutant, fate, failed))

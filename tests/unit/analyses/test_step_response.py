@@ -45,6 +45,12 @@ def test_a_recording_that_goes_as_the_text_tells_shows_every_sentence() -> None:
     assert [name for name, holds in held(recording()).items() if not holds] == []
 
 
+def test_every_observation_says_where_the_paper_tells_it_and_which_numbers_decide() -> None:
+    observations = step_observations(recording(), LEVELS, step_events(recording()))
+    assert all(item.source and item.evidence and item.statement.endswith(".") for item in observations)
+    assert "40.0 psig" in next(item.evidence for item in observations if item.id == "pressure_1_rises_until_breakaway")
+
+
 @pytest.mark.parametrize(
     ("broken", "channel", "points"),
     [

@@ -12,7 +12,7 @@ import scipy.io
 from ppafo.errors import DataError
 from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.foreign import read_foreign
-from ppafo.storage.matlab import read_matlab
+from ppafo.storage.matlab import open_matlab, read_matlab
 from ppafo.storage.reading import read_recording
 
 LVM = """LabVIEW Measurement\t
@@ -276,3 +276,17 @@ def test_what_is_no_matlab_file_is_one_line(tmp_path: Path, content: bytes) -> N
     with pytest.raises(DataError, match=r"a\.mat: ") as caught:
         read_matlab(written(tmp_path, "a.mat", content))
     assert "\n" not in str(caught.value)
+
+
+def test_an_older_file_has_its_variables_and_names_objects_that_only_matlab_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scipy.io.savemat(tmp_path / "plain.mat", {"t": SECONDS[:, None], "p1": PRESSURE[:, None]})
+    variables = read_matlab(tmp_path / "plain.mat").columns
+    np.testing.assert_array_equal(variables["t"], SECONDS)
+    np.testing.assert_array_equal(variables["p1"], PRESSURE)
+    # As SciPy gives what MATLAB wrote: without a name of its own, and with what it is in its fields.
+    fields = [(name, object) for name in ("s0", "s1", "s2", "arr")]
+    thing = np.array([(b"log", b"MCOS", b"timeseries", np.zeros(6))], dtype=fields)
+    monkeypatch.setattr(scipy.io, "loadmat", lambda *_, **__: {"y": PRESSURE, "None": thing})
+    assert open_matlab(tmp_path / "plain.mat").objects == [("log", "timeseries")]
