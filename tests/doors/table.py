@@ -170,7 +170,7 @@ VANE_FEATURES: dict[str, Feature] = {
     "sliding mode": _feature("controller.kind=sliding_mode", needs="law"),
     "damped": _feature("controller.kind=damped_proportional", needs="law"),
     "feedback linearisation": _feature("controller.kind=feedback_linearisation", needs="law"),
-    "cascade": _feature(needs="motion law reference", base="cylinder-servo"),
+    "cascade": _feature(needs="motion law reference area", base="cylinder-servo"),
     "fixed point": _feature("controller.kind=pid_fixed_point", needs="law"),
     "fixed point on/off": _feature("controller.kind=on_off_fixed_point", needs="law"),
     "fixed point dead zone": _feature(
@@ -189,7 +189,7 @@ VANE_FEATURES: dict[str, Feature] = {
     ),
     "table": _feature("reference.kind=tabulated", *_KNOTS, needs="reference"),
     "smooth": _feature("reference.kind=smooth", *_KNOTS, needs="reference"),
-    "angle": _feature("controller.kind=sliding_mode", needs="motion law reference", base="cylinder-servo"),
+    "angle": _feature("controller.kind=sliding_mode", needs="motion law reference area", base="cylinder-servo"),
     "pressure 1": _feature(needs="law reference", base="pressure-loop"),
     "pressure 2": _feature("reference.of=pressure_2", needs="law reference", base="pressure-loop"),
     "difference": _feature(
@@ -198,7 +198,7 @@ VANE_FEATURES: dict[str, Feature] = {
         base="pressure-loop",
     ),
     # Actuators.
-    "cylinder": _feature("device.set=cylinder-lever", needs="actuator"),
+    "cylinder": _feature("device.set=cylinder-lever", needs="actuator area"),
     "bladder": _feature(f"device.set={BLADDER}", needs="actuator area"),
     "muscle pair": _feature(f"device.set={MUSCLES}", needs="actuator"),
 }
