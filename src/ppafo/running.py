@@ -171,7 +171,10 @@ class SteppedRun:
         """
         if self.is_over:
             raise SimulationError(f"{self._scenario.name}: the run is over at t = {self.time:.6g} s; start another one")
-        given = float(command)
+        try:
+            given = float(command)
+        except (TypeError, ValueError):
+            given = float("nan")  # no number is refused as this one is
         lowest, highest, *vent = self._allowed
         if not (lowest <= given <= highest or given in vent):
             also = f", or {VENT:g} to vent both chambers" if vent else ""

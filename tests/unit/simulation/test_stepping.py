@@ -85,13 +85,15 @@ def test_a_result_so_far_ends_at_the_present_sample() -> None:
 @pytest.mark.parametrize(
     ("name", "command", "said"),
     [
+        ("step-response", None, "None"),
+        ("step-response", [0.1], "0.1"),
         ("step-response", 1.5, "1.5"),
         ("step-response", math.nan, "nan"),
         ("step-response", 2, "must be -1 to 1$"),
         ("solenoid", 3, "or 2 to vent"),
     ],
 )
-def test_a_command_beyond_the_valve_is_refused(name: str, command: float, said: str) -> None:
+def test_a_command_beyond_the_valve_is_refused(name: str, command: Any, said: str) -> None:
     with pytest.raises(ppafo.SimulationError, match=said):
         ppafo.start(name).step(command)
 
