@@ -155,6 +155,8 @@ def torque_of_gait(text: str, folder: Path, where: str) -> tuple[Floats, Floats]
     given = {key.strip(): value.strip() for key, _, value in (setting.partition("=") for setting in settings)}
     for key in given.keys() - _OF_WEARER:
         raise StudyError(f"{where}: '{text}': there is no '{key}'{known_names(key, _OF_WEARER)}")
+    if len(given) < len(settings):
+        raise StudyError(f"{where}: '{text}': give mass and share once")
     if missing := [key for key in _OF_WEARER if key not in given]:
         raise StudyError(f"{where}: '{text}': {' and '.join(missing)} missing; write for example '{FROM_GAIT}'")
     with refused_as(StudyError, f"{where}: '{text}'", DataError, UnitError):

@@ -251,6 +251,7 @@ def test_a_profile_that_is_given_replaces_that_of_the_file_and_its_paths_count_f
         ("gait:falisse2019-subjct1,mass=70 kg,share=0.1", "did you mean 'falisse2019-subject1'"),
         ("gait:falisse2019-subject1,mas=70 kg,share=0.1", "did you mean 'mass'?; available: mass, share"),
         ("gait:falisse2019-subject1,mass=70 kg", "share missing; write for example 'gait:"),
+        ("gait:falisse2019-subject1,mass=70 kg,mass=80 kg,share=0.1", "give mass and share once"),
         ("gait:falisse2019-subject1,mass=70,share=0.1", "kg"),
         ("gait:falisse2019-subject1,mass=70 kg,share=1.1", "at most 1"),
         ("gait:falisse2019-subject1,mass=70 kg,share=0", "above 0"),
