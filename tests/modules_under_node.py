@@ -116,6 +116,9 @@ def drawn(module: WasmModule, draws: int, spread: tuple[float, float] = (0.7, 1.
     }
     for key, values in times.items():
         found[1:, column[key]] = values[1:]
+    # Knots of a profile stay in their order.
+    knots = [place for key, place in column.items() if ".time_" in key]
+    found[:, knots] = found[0, knots]
     if _wants_a_place(module):
         # An angle that is wanted stays between the stops, a pressure below the supply's, where a file has to have it.
         kept = [place for key, place in column.items() if key.startswith(("reference.", "actuator.angle_m", "supply."))]

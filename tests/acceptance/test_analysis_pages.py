@@ -14,7 +14,7 @@ HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 NUMBER = r"[+-]?\d[\d,]*\.?\d*(?:e[+-]?\d+)?"
 PRINTED_BY_PYTHON = {
     "compare.md": "256 True\n",
-    "uncertainty.md": "['supply.pressure', 'actuator.torque_constant']\nTrue 0.87 N m\n",
+    "uncertainty.md": "['supply.pressure', 'actuator.torque_constant']\n",
     "optimise.md": "498700.0 1\nTrue True {}\n",
 }
 

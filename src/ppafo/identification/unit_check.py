@@ -35,10 +35,10 @@ def with_tried_units(
 ) -> BenchResult:
     """Return the result, with the verdict of a wrong unit where a repetition in another unit of pressure does better.
 
-    A unit is accused if the readings scatter far less in another one, or if they give a discharge coefficient that no
-    orifice has and, in the other unit, one near that of the set with no more scatter. A value far from the set alone is
-    no evidence: the set may be of another device. ``atmosphere`` [Pa absolute] is the zero of gauge pressures; ``run``
-    repeats the procedure with other recordings.
+    A unit is accused if the readings give a discharge coefficient that no orifice has and, in the other unit, one near
+    that of the set with no more scatter. Far less scatter in another unit is a remark, since another law may scatter
+    less as well, and so is a value far from the set, which may be of another device. ``atmosphere`` [Pa absolute] is
+    the zero of gauge pressures; ``run`` repeats the procedure with other recordings.
     """
     impossible = [
         estimate.path
@@ -65,14 +65,15 @@ def with_tried_units(
         is_as_good = tried.scatter <= result.scatter + _ROUNDING
         if (is_smoother or (is_near and is_as_good)) and tried.scatter < least:
             least = tried.scatter
-            verb = "seem" if len(names) > 1 else "seems"
             text = (
-                f"{' and '.join(names)} {verb} to be {mistake}, a factor of {max(factor, 1.0 / factor):.4g}; the "
-                f"scatter would be {percentage(tried.scatter, 2)} of the largest reading instead of "
-                f"{percentage(result.scatter, 2)}; correct the unit in the header or the column map"
+                f"with {' and '.join(names)} as {mistake}, a factor of {max(factor, 1.0 / factor):.4g}, the scatter is "
+                f"{percentage(tried.scatter, 2)} of the largest reading instead of {percentage(result.scatter, 2)}"
             )
-            doubted = (replace(estimate, verdict=WRONG_UNIT, explanation=text) for estimate in result.estimates)
-            found = replace(result, estimates=tuple(doubted))
+            found = replace(result, remarks=(*result.remarks, f"{text}; check the unit, and the law"))
+            if is_near and is_as_good:
+                text = f"{text}; correct the unit in the header or the column map"
+                doubted = (replace(estimate, verdict=WRONG_UNIT, explanation=text) for estimate in result.estimates)
+                found = replace(result, estimates=tuple(doubted))
     return found
 
 

@@ -37,15 +37,15 @@ def written_by_others(folder: Path) -> str:
     return f"device.set={folder / 'others.toml'}"
 
 
-def assert_helps(result: WalkResult) -> None:
-    """A device begins with vented chambers, has gas of a possible pressure, and helps."""
+def assert_walks(result: WalkResult) -> None:
+    """A device begins with vented chambers, has gas of a possible pressure, and takes gas to the end."""
     supply = result.scenario.device.supply
     recording = result.recording
     pressures = np.array([recording[name] for name in ("pressure_1", "pressure_2") if name in recording])
     assert result.status.is_completed
     assert pressures[:, 0] == pytest.approx([supply.atmospheric_pressure] * len(pressures))
     assert pressures.min() > 0.4 * supply.atmospheric_pressure
-    assert result.metrics["net_push_off_work"].value > 0.0
+    assert result.metrics["gas"].value > 0.0
 
 
 def test_the_vane_of_another_package_walks_as_the_built_in_one(tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_the_vane_of_another_package_walks_as_the_built_in_one(tmp_path: Path) -
 @pytest.mark.parametrize("chambers", [1, 2])
 def test_a_soft_actuator_helps_a_walk_and_nothing_stops_it(walked: str, chambers: int, tmp_path: Path) -> None:
     result = walk(load_walk(walked, [soft(tmp_path, chambers), "supply.pressure=50 psi_g", *NOISY]), minutes=MINUTES)
-    assert_helps(result)
+    assert_walks(result)
     assert result.metrics["net_push_off_work"].value > 0.5
     assert 0.02 < result.metrics["gas"].value / 1.0e-3 < 3.0
 
@@ -76,7 +76,7 @@ def test_a_soft_actuator_helps_a_walk_and_nothing_stops_it(walked: str, chambers
 def test_a_cylinder_and_a_bladder_walk_and_nothing_stops_them(walked: str, actuator: str) -> None:
     compared = compare_walks(load_walk(walked, [actuator, *NOISY]), minutes=MINUTES)
     result, bare = compared.with_device, compared.without_device
-    assert_helps(result)
+    assert_walks(result)
     # Also of one chamber, which has no second pressure to draw or to store, with the device or without it.
     chambers = {"pressure_1"} if actuator == BLADDER else {"pressure_1", "pressure_2"}
     for channels in (result.recording.names, bare.recording.names, bare.averages):
