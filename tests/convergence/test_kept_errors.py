@@ -8,7 +8,7 @@ from ppafo.simulation.loading import scenario_from_dict
 from tests.convergence.kept_errors import kept
 from tests.convergence.tasks import TASKS, task
 
-SEED, DRAWS = 1, 4
+SEED, DRAWS = 1, 8
 
 
 @pytest.mark.long
