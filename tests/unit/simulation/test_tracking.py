@@ -16,7 +16,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking import tracking_in
 from ppafo.simulation.tracking.pair_step import coarse_pair
-from ppafo.simulation.tracking.rule import failure_of_task
+from ppafo.simulation.tracking.rule import failure_of_task, most_reversals
 from ppafo.simulation.tracking.settled import SettledPart, settled_task
 from ppafo.study.runs import excess, with_companions
 
@@ -526,3 +526,8 @@ def test_the_criterion_that_decided_is_named_with_its_value_and_its_limit_on_bot
     assert verdict.allowed == pytest.approx(0.05 * 1.08 * most, rel=1e-3)
     assert "does not follow its reference: the reference exceeds the largest available torque by 0.4" in verdict.found
     assert " N m (0.27 N m allowed) from 5 s on" in verdict.found
+
+
+def test_a_command_may_turn_ten_times_a_second_and_twice_for_each_turn_of_the_reference() -> None:
+    sine = ["reference.kind=sine", "reference.amplitude=1 N m", "reference.frequency=6 Hz", "run.duration=2 s"]
+    assert most_reversals(load_scenario("torque-task-slow-valve", sine)) == 10.0 * 2.0 + 2.0 * 2.0 * 6.0 * 2.0

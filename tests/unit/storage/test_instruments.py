@@ -283,8 +283,7 @@ def test_an_older_file_has_its_variables_and_names_objects_that_only_matlab_read
 ) -> None:
     scipy.io.savemat(tmp_path / "plain.mat", {"t": SECONDS[:, None], "p1": PRESSURE[:, None]})
     variables = read_matlab(tmp_path / "plain.mat").columns
-    np.testing.assert_array_equal(variables["t"], SECONDS)
-    np.testing.assert_array_equal(variables["p1"], PRESSURE)
+    np.testing.assert_array_equal([variables["t"], variables["p1"]], [SECONDS, PRESSURE])
     # As SciPy gives what MATLAB wrote: without a name of its own, and with what it is in its fields.
     fields = [(name, object) for name in ("s0", "s1", "s2", "arr")]
     thing = np.array([(b"log", b"MCOS", b"timeseries", np.zeros(6))], dtype=fields)
