@@ -8,7 +8,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce validation test test-long test-all test-processors test-host coverage quick check format bench bits dist page site lock clean
+.PHONY: reproduce validation test test-long test-all test-processors test-host coverage quick check format bench bits dist site lock clean
 
 reproduce: $(LEAN)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -87,12 +87,6 @@ dist: $(READY)
 site: $(READY)
 	$(call install,requirements-docs.lock)
 	$(BIN)/python -m scripts.website out/site
-
-# Script and style of the page that simulates, from page/ into the package; needs node, which nobody else does.
-page:
-	npm ci --prefix page --no-audit --no-fund
-	npm run --prefix page check
-	npm run --prefix page build
 
 # The environment of `make reproduce`: what a run needs.
 $(LEAN): requirements.lock requirements-uv.lock pyproject.toml

@@ -79,9 +79,7 @@ def steps_of_run(scenario: str, folder: Path) -> list[dict[str, Any]]:
     result = state["run"]
     step("imports to draw", importlib.import_module("ppafo.report.drawing").load_drawing)
     finding = command.finding_of(command.assessed(result, False))
-    step(
-        "figure and page, the part that simulates included", lambda: load("ppafo.report.finding")[0].page_files(finding)
-    )
+    step("figure and page", lambda: load("ppafo.report.finding")[0].page_files(finding))
     step("files", lambda: result.save(folder, state[found[-1]["step"]]))
     return found
 

@@ -11,7 +11,6 @@ Prints a line for each item and door, and settings that differ; the status is 1 
 
 import argparse
 import ctypes
-import json
 import random
 import subprocess
 import sys
@@ -19,7 +18,6 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -33,8 +31,6 @@ from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import library_files
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
-from ppafo.page.content import page_content, program_content
-from ppafo.page.wasm.description import description_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import check_columns
@@ -233,55 +229,10 @@ def _numbers_in_si(base: Scenario, words: Words) -> dict[str, float]:
     return {path: parse_quantity(text, declared[path].unit, counts_from(path, zero)) for path, text in words.items()}
 
 
-def at_page(name: str, count: int, seed: int) -> Judged:
-    """Texts typed on the page that simulates: its script makes numbers of them, which a program is given."""
-    found, base = Judged(), load_scenario(name)
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        built = BuiltLibrary(base, folder)
-        told = description_of(base, built.library)
-        simulated = SimpleNamespace(module=SimpleNamespace(description=told), scenario=base, label=name)
-        content = page_content(name, "page", (), [{**program_content(simulated, "", {}), "usual": {}}])  # type: ignore[arg-type]
-        every = [
-            {path: text for path, text in words.items() if path in built.places}
-            for words in settings_of(name, count, seed)
-        ]
-        (folder / "content.json").write_text(json.dumps(content))
-        (folder / "configurations.json").write_text(json.dumps(every))
-        for words, line in zip(every, _page_values(folder), strict=True):
-            alone = single(name, words)
-            if isinstance(alone, str):
-                found.refused += 1
-            elif line.startswith("refused") and ("must stay" in line or "does not fit here" in line):
-                found.other += 1
-            elif line.startswith("refused"):
-                found.compare(words, alone, line)
-            else:
-                numbers = np.frombuffer(bytes.fromhex(line), dtype=np.float64).copy()
-                door = built.planned(numbers, alone, follows=False)
-                if door == OTHER_PROGRAM:
-                    found.other += 1
-                else:
-                    found.compare(words, alone, door)
-    return found
-
-
-def _page_values(folder: Path) -> list[str]:
-    """Lines of ``page_values.mjs``; the script of the page is bundled first."""
-    page, here = Path(__file__).parents[1] / "page", Path(__file__).parent
-    options = "{entryPoints: ['source/settings.ts'], bundle: true, format: 'esm', outfile: process.argv[1]}"
-    build = f"require('esbuild').buildSync({options})"
-    subprocess.run(["node", "-e", build, str(folder / "settings.mjs")], cwd=page, check=True)
-    files = [str(folder / name) for name in ("settings.mjs", "content.json", "configurations.json")]
-    done = subprocess.run(["node", str(here / "page_values.mjs"), *files], check=True, capture_output=True, text=True)
-    return done.stdout.splitlines()
-
-
 Door = Callable[[str, int, int], Judged]
 DOORS: Mapping[str, tuple[Door, Sequence[str]]] = {
     "study": (at_study, (*list_scenarios(), *list_walks())),
     "numbers": (at_numbers, (*list_scenarios(), *list_walks())),
-    "page": (at_page, (*list_scenarios(), *list_walks())),
     "library": (at_library, (*list_scenarios(), *list_walks())),
 }
 """Doors by name, and the items that can be taken through them."""

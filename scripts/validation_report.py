@@ -215,8 +215,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
         "c": tested("The library in C and C++", "gcc, clang", "tests/unit/exports/test_c_library.py"),
         "fmu": tested("FMUs, FMI 2.0 and 3.0", "FMPy and its checker", "tests/unit/exports/test_fmu.py"),
         "platforms": tested("FMUs for other computers", "Wine, QEMU", "tests/unit/exports/test_fmu_platforms.py"),
-        "wasm": tested("WebAssembly", "node", "tests/unit/exports/test_wasm.py"),
-        "page": tested("The page that simulates", "Chromium, Firefox, WebKit; axe-core; Python", "tests/unit/live"),
+        "page": tested("The page that simulates", "Chromium; Python", "tests/unit/page"),
         "firmware": tested("The controller on its processor", "mspdebug", "tests/unit/exports/test_firmware.py"),
     },
     "Identification and statistics": {

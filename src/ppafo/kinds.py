@@ -154,7 +154,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
 
 
 def package_of(location: str) -> str:
-    """Return the package of a location: ``ppafo.page`` for ``ppafo.page.workbench:live_part``."""
+    """Return the package of a location: ``ppafo.page`` for ``ppafo.page.commands:workbench``."""
     return ".".join(location.partition(":")[0].split(".")[:2])
 
 

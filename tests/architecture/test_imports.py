@@ -1,6 +1,5 @@
 """No circle of imports: under TYPE_CHECKING, inside functions and by the names of modules neither."""
 
-import re
 import runpy
 from pathlib import Path
 
@@ -49,13 +48,6 @@ def test_no_modules_import_each_other() -> None:
     graph = HOUSE["imports"](ROOT / "src" / "ppafo")
     assert len(graph) > 100
     assert HOUSE["circles"](graph) == []
-
-
-def test_no_modules_of_the_page_import_each_other_for_types_neither() -> None:
-    texts = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "page" / "source").glob("*.ts")}
-    graph = {name: frozenset(re.findall(r'from "\./(\w+)"', text)) & texts.keys() for name, text in texts.items()}
-    assert {"engine", "panels"} <= graph["app"]
-    assert HOUSE["circles"]({"": frozenset(), **graph}) == []
 
 
 def test_no_module_imports_the_package_itself() -> None:

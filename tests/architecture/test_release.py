@@ -1,6 +1,5 @@
 """What a release says of itself: the code of others in it, with version and licence."""
 
-import json
 import re
 import runpy
 import shutil
@@ -15,24 +14,6 @@ from hatchling.builders.wheel import WheelBuilder
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[2]
-
-
-def test_the_bill_of_materials_has_what_is_vendored_in_its_version() -> None:
-    vendored = ROOT / "page" / "vendor"
-    bill = json.loads((vendored / "vendored.cdx.json").read_text(encoding="utf-8"))
-    stated = {item["name"]: item["version"] for item in bill["components"]}
-    assert sorted(stated) == sorted(folder.name.lower() for folder in vendored.iterdir() if folder.is_dir())
-    head = (vendored / "uplot" / "uPlot.esm.js").read_text(encoding="utf-8")[:500]
-    found = re.search(r"\(v([\d.]+)\)", head)
-    assert found is not None
-    assert found[1] == stated["uplot"]
-
-
-def test_the_licences_of_what_is_vendored_go_with_the_wheel_and_stand_in_the_page() -> None:
-    licence = (ROOT / "page" / "vendor" / "uplot" / "LICENSE").read_text(encoding="utf-8")
-    assert '"page/vendor/uplot/LICENSE"' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    bundle = (ROOT / "src" / "ppafo" / "page" / "bundle" / "page.js").read_text(encoding="utf-8")
-    assert " ".join(licence.split()) in " ".join(bundle[:3000].split())
 
 
 def test_the_page_of_licences_lists_the_packages_of_the_lock() -> None:

@@ -27,10 +27,8 @@ from ppafo.exports.fmu.unit import functional_unit
 from ppafo.identification.trajectory.numbers import declaration_of
 from ppafo.identification.trajectory.numbers import with_numbers as with_fitted
 from ppafo.model.catalog import EFFECTS
-from ppafo.page.wasm import module_of
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import json_schema, parse_parameter_set
-from ppafo.report.setting_names import setting_names
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
@@ -39,7 +37,6 @@ from ppafo.walking import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import walk
 from tests.built_once import shared_library
-from tests.modules_under_node import compared, drawn
 from tests.page_code import with_the_effect_of_the_page
 from tests.reference.reference_solver import compare_with_reference
 
@@ -197,15 +194,6 @@ def test_a_unit_has_its_settings_and_the_bits_of_python(tmp_path: Path) -> None:
     )
     for name in ("torque", "mass_1"):
         np.testing.assert_array_equal(found[name], moved.recording[name])
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
-def test_the_page_has_its_words_and_the_bits_of_python() -> None:
-    module = module_of(load_scenario(NAME, (*SHORT, *ICE)))
-    (entry,) = [item for item in module.description["settings"] if item["key"] == GROWTH]
-    assert entry["description"] == MEANING
-    assert GROWTH not in setting_names(), "a page needs no words of its own for it"
-    assert compared(NAME, module, drawn(module, 3))
 
 
 def test_it_walks() -> None:

@@ -79,7 +79,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: evil\nVersion: 1.0\n", encoding="utf-8")
     groups = ("controllers", "walking_controllers", "profiles", "metrics", "valves", "actuators", "effects", "motions")
-    more = ("gait_forms", "commands", "live_parts")
+    more = ("gait_forms", "commands")
     text = "".join(f"[ppafo.{group}]\nevil = evil:KIND\n" for group in (*groups, *more))
     (about / "entry_points.txt").write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)

@@ -9,21 +9,18 @@ import numpy as np
 import pytest
 
 from ppafo.errors import PpafoError
-from ppafo.exports.c_library import c_library
+from ppafo.exports.c_library import c_library, library_of
 from ppafo.exports.c_library.library import c_identifier
 from ppafo.exports.fmu.interface import closed_loop
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
 from ppafo.loading import load_scenario
-from ppafo.page.wasm import module_of
 from ppafo.simulation.ensemble import REFUSED as REFUSED_RUN
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import declared_numbers
 from scripts.instances import Instance
 from tests.built_once import shared_library
 from tests.doors.table import NOT_EXPORTED, REFUSED, VANE_BASE
-from tests.modules_under_node import REFUSED as REFUSED_IN_MODULE
-from tests.modules_under_node import driven
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 refused = pytest.mark.parametrize(("path", "value", "named"), REFUSED, ids=[path for path, _, _ in REFUSED])
@@ -55,7 +52,7 @@ def test_a_library_names_the_setting_that_python_names(
     library: ctypes.CDLL, path: str, value: float, named: str
 ) -> None:
     own = c_identifier(VANE_BASE)
-    names = [item["key"] for item in module_of(load_scenario(VANE_BASE)).description["settings"]]
+    names = [setting.path for setting in library_of(load_scenario(VANE_BASE)).settings]
     settings = (ctypes.c_double * len(names))()
     library[f"{own}_defaults"](settings)
     settings[names.index(path)] = value
@@ -86,23 +83,11 @@ def test_a_unit_names_the_parameter_that_python_names(
     assert re.search(r"= .+ (is out of range: (at least|at most|above) .|contradicts another parameter)", refusal)
 
 
-@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
-def test_a_module_of_the_page_names_the_settings_that_python_names() -> None:
-    module = module_of(load_scenario(VANE_BASE))
-    keys = [item["key"] for item in module.description["settings"]]
-    settings = np.tile([item["value"] for item in module.description["settings"]], (len(REFUSED), 1))
-    for row, (path, value, _) in zip(settings, REFUSED, strict=True):
-        row[keys.index(path)] = value
-    given = driven(module, settings)
-    assert [keys[ran.checked] for ran in given.runs] == [named for _, _, named in REFUSED]
-    assert {ran.status for ran in given.runs} == {REFUSED_IN_MODULE}
-
-
 @pytest.mark.parametrize("what", NOT_EXPORTED)
 def test_what_does_not_leave_python_is_refused_by_every_export_in_the_same_words(what: str, tmp_path: Path) -> None:
     scenario = NOT_EXPORTED[what].load()
     said = set()
-    for door in (c_library, closed_loop, module_of):
+    for door in (c_library, closed_loop):
         with pytest.raises(PpafoError) as refusal:
             door(scenario)
         said.add(str(refusal.value))

@@ -1,18 +1,15 @@
 """A setting means the same at every door: words of a user, drawn, against the single run with them."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 
 from ppafo.simulation import numbers
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
-from scripts.one_meaning import at_library, at_page, at_study
+from scripts.one_meaning import at_library, at_study
 
-PAGE = Path(__file__).parents[2] / "page" / "node_modules" / "esbuild"
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
-needs_node = pytest.mark.skipif(shutil.which("node") is None or not PAGE.exists(), reason="no script of the page")
 
 
 @pytest.mark.parametrize("name", [*list_scenarios(), *list_walks()])
@@ -26,15 +23,6 @@ def test_columns_of_a_study_are_single_runs_with_the_same_words(name: str) -> No
 @pytest.mark.parametrize("name", ["torque-task-slow-valve", "proportional-regulators"])
 def test_settings_of_a_library_are_single_runs_with_the_same_words(name: str) -> None:
     found = at_library(name, 24, seed=13)
-    assert found.differing == []
-    assert found.same > 8
-
-
-@needs_gcc
-@needs_node
-@pytest.mark.parametrize("name", ["torque-task-proportional", "solenoid"])
-def test_texts_on_a_page_are_single_runs_with_the_same_words(name: str) -> None:
-    found = at_page(name, 20, seed=14)
     assert found.differing == []
     assert found.same > 8
 

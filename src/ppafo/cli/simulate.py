@@ -156,10 +156,9 @@ def _write(report: _RunReport, folder: Path) -> str:
 
 
 def finding_of(report: _RunReport) -> "Finding[None]":
-    """Return the content of the report page: metrics, figure, and interactive run."""
+    """Return the content of the report page: metrics and figure."""
     from ppafo.report.display_units import metric_text, metric_words
     from ppafo.report.finding import Finding, Section, columns_of
-    from ppafo.report.live_parts import live_part
 
     result, check = report.result, report.check
     scenario, status = result.scenario, result.status
@@ -187,7 +186,6 @@ def finding_of(report: _RunReport) -> "Finding[None]":
             *(Section("Command with the remedy", code=text) for text in report.usage),
         ),
         found=None,
-        live=lambda: live_part([scenario]),
     )
 
 

@@ -1,1 +1,1 @@
-"""Interactive page: one HTML file with WebAssembly programs, controls and plots, without network access."""
+"""Page that simulates: one HTML file with the C of scenarios as WebAssembly, and their numbers as sliders."""

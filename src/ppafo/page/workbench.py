@@ -1,239 +1,238 @@
-"""Workbench page: scenarios and walks in tabs, with labels and content."""
+"""Page that simulates: content, WebAssembly module, and HTML file.
 
-import contextlib
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+No rule of a scenario is repeated here or in ``page.js``: ranges, followers, default gains and metrics are those of the
+C library that ``ppafo export c`` writes.
+"""
+
+import base64
+import hashlib
+import json
+import math
+import shlex
+import zlib
+from collections.abc import Callable, Collection, Sequence
+from html import escape
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from ppafo.arguments import Overrides, checked
-from ppafo.errors import PpafoError, ScenarioError, UnitError
+from ppafo.errors import ScenarioError
+from ppafo.exports import filled, template
+from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.files import OUTPUTS
+from ppafo.exports.c_library.library import ExportParameter, Library
 from ppafo.loading import load_scenario
-from ppafo.page.content import PageSimulation, page_content, program_content, usual_values
-from ppafo.page.html import block_of, packed_once, page_of
-from ppafo.page.motions import is_walk, tab_title, usual_changes
-from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
-from ppafo.page.setting import Interval
-from ppafo.page.still import still_of
-from ppafo.page.wasm import module_of
-from ppafo.page.words import stored_data, words
-from ppafo.parameters.joint import ANKLE, JointNames
+from ppafo.model.controlled import CONTROLLED
+from ppafo.page.module import module_of
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.report.finding import LivePart
+from ppafo.report.display_units import metric_quantity, metric_words
+from ppafo.report.setting_names import label_of
+from ppafo.running import simulate
+from ppafo.signals.recording import Recording
 from ppafo.simulation.scenario import Scenario
-from ppafo.units import from_si, parse_quantity, split_pressure_kind
-from ppafo.units.shown import shown_in, shown_unit
+from ppafo.units import conversion
+from ppafo.units.shown import QUANTITIES, quantity_of_unit, shown_in, shown_unit, unit_of
+from ppafo.version import __version__
 
-TITLE = "The powered ankle-foot orthosis, live"
-"""Title of a page of ankle devices."""
-DEFAULT = ("torque-task-solenoid", "torque-task-proportional", "step-response", "solenoid")
-MOST_SCENARIOS = 24
-_OPEN = 2
-"""Number of configurations displayed initially in a tab."""
-_LABELS = {
-    "torque-task-solenoid": "Solenoid pair",
-    "torque-task-proportional": "Proportional valve",
-    "torque-task-slow-valve": "Slow valve",
-    "torque-task-anti-windup": "Anti-windup",
-    "torque-task-moving-ankle": "Moving ankle",
-    "step-response": "Step response",
-    "solenoid": "Solenoid pair",
-    "proportional": "Proportional valve",
-    "off": "Without help",
-}
+DEFAULT = ("torque-task-solenoid", "torque-task-proportional")
+FIRST = (
+    *("reference.level", "reference.ramp_time", "supply.pressure", "valve.area", "valve.sonic_conductance"),
+    *("controller.period", "controller.proportional_gain", "controller.largest_torque", "controller.command"),
+    *("motion.angle", "wearer.body_mass"),
+)
+"""Settings shown first unless others are asked for."""
+_HIDDEN = ("run.step", "run.output_interval", "run.tolerance", "sensors.seed")
+_LONGER = 4.0
+"""Longest run on a page, as a multiple of its duration as written: a browser waits for a run."""
+_PANELS = (
+    *(("Torque", ("torque", "reference")), ("Angle", ("angle", "reference_angle"))),
+    ("Pressures, chamber 2 dashed", ("pressure_1", "pressure_2", "reference_pressure_1", "reference_pressure_2")),
+    *(("Command to the valve", ("command",)), ("Gas taken from the supply", ("supplied_mass",))),
+)
+"""Panels: title and channels, of which all but the first are dashed."""
+_HEADLINES = ("rms_error", "gas_supplied", "gas", "positive_push_off_work")
+"""Metrics that are said after each change."""
+_WORDS = {"_g": " gauge", "_a": " abs", "_d": "", "^2": "²", "^3": "³"}
 
 
 @checked
-def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = (), plugins: Plugins = ()) -> bytes:
-    """Create an interactive HTML page that simulates scenarios again as their numbers change.
+def workbench(
+    scenarios: Sequence[str | Path] = DEFAULT,
+    *,
+    overrides: Overrides = (),
+    sliders: Sequence[str] = (),
+    plugins: Plugins = (),
+) -> bytes:
+    """Create one HTML page that simulates scenarios again as their numbers change.
 
-    Scenarios with the same kind of motion share a tab. The first two scenarios of a tab are displayed initially.
+    The page needs a browser and nothing else. It checks that its unchanged run has the samples of Python to the bit.
 
     Arguments:
         scenarios: names or files of scenarios and walks
         overrides: changes of all scenarios, as texts or a dictionary
+        sliders: paths of the settings that come first, such as ``valve.area``
         plugins: modules of your own, files or names, whose objects files may name
 
     Returns:
         the page, in UTF-8
 
     Raises:
-        ScenarioError: no scenario, too many, or two of one name
-        ProgramError: a program that the page needs and that cannot be built here
+        ScenarioError: no scenario, two of one name, or a slider that no scenario has
+        ProgramError: no compiler for WebAssembly, or code that cannot be translated
 
     >>> import ppafo
-    >>> ppafo.workbench("torque-task-proportional")[:15]
+    >>> ppafo.workbench(["torque-task-proportional"])[:15]
     b'<!DOCTYPE html>'
     """
     name_plugins(plugins)
-    content, modules, still = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")
-    return page_of(content["title"], content, modules, still)
-
-
-def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
-    """Return a page section with the most important controls; None if a program cannot be built.
-
-    Of several scenarios with the same name only the first is included.
-    """
-    # Backwards, so that of two with one name the first stays.
-    named = {
-        named_scenario if isinstance(named_scenario, str) else named_scenario.name: named_scenario
-        for named_scenario in reversed(scenarios)
+    simulations = [_simulation(str(name), tuple(overrides), sliders) for name in scenarios]
+    names = [simulation["name"] for simulation in simulations]
+    if len({*names}) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ScenarioError(f"two scenarios are named '{twice}'; a page needs different names")
+    found = {setting["path"] for simulation in simulations for setting in simulation["settings"]}
+    if not simulations or not found.issuperset(sliders):
+        missing = ", ".join(sorted({*sliders} - found)) or "no scenario"
+        raise ScenarioError(f"{missing}: a page needs scenarios, and settings that one of them has and may change")
+    content = json.dumps({"simulations": simulations}, ensure_ascii=False, separators=(",", ":"))
+    script = _own("page.js")
+    words = {
+        "title": escape(", ".join(names)),
+        "digest": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        "style": _own("page.css"),
+        "content": content.replace("<", "\\u003c"),
+        "script": script,
+        "version": __version__,
     }
-    try:
-        content, modules, _ = _content(list(reversed(named.values())), (), "block")
-    except PpafoError:
-        return None
-    remark = ""
-    for named_scenario in named.values():
-        shorter = usual_values(named_scenario).get("run.duration") if isinstance(named_scenario, Scenario) else None
-        if isinstance(named_scenario, Scenario) and shorter is not None and shorter < named_scenario.run.duration:
-            part = f"{shorter:g} s of the {named_scenario.run.duration:g} s above"
-            remark = max(remark, f"The workbench begins with {part}: increase run.duration to compare the numbers.")
-    html, policy = block_of(content, modules)
-    return LivePart(policy, html, remark)
+    return filled(template("ppafo.page", "page.html"), words).encode()
 
 
-def _content(
-    scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], form: str
-) -> tuple[dict[str, Any], dict[str, str], str]:
-    """Return page or block content, packed modules by name, and the picture of the first tab.
+def _own(name: str) -> str:
+    return files("ppafo.page").joinpath(name).read_text(encoding="utf-8")
 
-    Identical programs share one module. Raises ScenarioError for no scenario, too many, or two of one name.
-    """
-    if not 1 <= len(scenarios) <= MOST_SCENARIOS:
-        raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
-    loaded = [load_scenario(scenario, overrides) if isinstance(scenario, str) else scenario for scenario in scenarios]
-    repeated = [name for name, count in Counter(scenario.name for scenario in loaded).items() if count > 1]
-    if repeated:
-        raise ScenarioError(f"two scenarios are named '{repeated[0]}'; a workbench needs different names")
-    simulated = []
-    for scenario in loaded:
-        with shown_in(scenario.device.shown):
-            module = module_of(scenario)
-        # A name of one's own stays as it is.
-        known = scenario.name in _LABELS
-        label = scenario.device.joint.said(_LABELS[scenario.name]) if known else scenario.name
-        simulated.append(PageSimulation(scenario, module, label))
-    intervals = known_intervals()
-    names: dict[str, str] = {}
-    programs = []
-    for program in simulated:
-        name = names.setdefault(packed_once(program.module.wasm), f"module-{len(names) + 1}")
-        with shown_in(program.scenario.device.shown):
-            programs.append(program_content(program, name, intervals))
-    joints = {program.scenario.device.joint.name for program in simulated}
-    joint = joints.pop() if len(joints) == 1 else ""
-    title = (
-        TITLE if joint == ANKLE.name else f"The powered {joint} orthosis, live" if joint else "Powered orthoses, live"
+
+def _simulation(name: str, overrides: Sequence[str], sliders: Sequence[str]) -> dict[str, Any]:
+    """Return all that the page needs of a scenario, as plain data for JSON."""
+    scenario = load_scenario(name, overrides)
+    library, recording = library_of(scenario), simulate(scenario).recording
+    outputs = library.program.outputs
+    with shown_in(scenario.device.shown):
+        return {
+            "name": scenario.name,
+            "description": library.description,
+            "command": shlex.join(
+                ["ppafo", "simulate", name, *(word for text in overrides for word in ("--set", text))]
+            ),
+            "settings": _settings(scenario, library, sliders or FIRST),
+            "channels": [
+                {"name": output, "label": _sentence(OUTPUTS[output][1], library), **_shown(OUTPUTS[output][0])}
+                for output in outputs
+            ],
+            "panels": [
+                {"title": title, "channels": [channel for channel in channels if channel in outputs]}
+                for title, channels in _PANELS
+                if not set(outputs).isdisjoint(channels)
+            ],
+            "metrics": [
+                {
+                    "name": kind.name,
+                    "short": metric_words(kind.name),
+                    "label": _sentence(kind.summary, library),
+                    **_shown(kind.unit),
+                }
+                for kind in library.program.metrics
+            ],
+            "headlines": [kind.name for kind in library.program.metrics if kind.name in _HEADLINES],
+            "compared": [output for output in outputs if output in recording.names],
+            "samples": len(recording),
+            "checksum": _checksum(recording, outputs),
+            "wasm": base64.b64encode(module_of(library)).decode(),
+        }
+
+
+def _checksum(recording: Recording, channels: Sequence[str]) -> int:
+    """Return the CRC-32 of all samples of the channels that a recording has."""
+    check = 0
+    for name in channels:
+        if name in recording.names:
+            # A sum with 0 has no negative zero.
+            check = zlib.crc32((recording[name] + 0.0).astype("<f8").tobytes(), check)
+    return check
+
+
+def _settings(scenario: Scenario, library: Library, first: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the settings of a library in their order; those that are not to be changed have no slider."""
+    # Above 0, these need functions that the module does not have.
+    absent = {name for names, is_above in library.switches if not is_above for name in names}
+    words = CONTROLLED[scenario.controlled].words
+    order = {path: place for place, path in enumerate(first)}
+    return [
+        {
+            "path": setting.path,
+            "label": library.worded(label_of(setting.path, words)),
+            "summary": library.worded(setting.quantity.summary or setting.quantity.name),
+            "si": "" if setting.quantity.unit == "1" else setting.quantity.unit,
+            "value": setting.value,
+            "first": order.get(setting.path, -1),
+            **_slider(setting, scenario.device.supply.atmospheric_pressure, absent),
+        }
+        for setting in library.settings
+    ]
+
+
+def _slider(setting: ExportParameter, atmosphere: float, absent: Collection[str]) -> dict[str, Any]:
+    """Return how a setting is shown, with the ends of its slider in this unit: from 0 to 2.5 times its value."""
+    quantity = setting.quantity
+    shown = _shown(quantity.unit, quantity_of_unit, is_absolute=setting.path == ATMOSPHERE_PATH)
+    zero = float(shown["offset"]) + (atmosphere if shown["gauge"] else 0.0)
+    value, low, high = (
+        (number - zero) / float(shown["scale"]) for number in (setting.value, quantity.minimum, quantity.maximum)
     )
-    content = page_content(title, form, _tabs(simulated), programs, joint or "joint")
-    by_name = {program.scenario.name: program for program in simulated}
-    described = {program["name"]: program for program in programs}
-    stills = []
-    for tab in content["tabs"]:
-        started = [by_name[entry["program"]] for entry in tab["start"]]
-        shown = [described[entry["program"]] for entry in tab["start"]]
-        # A report computes nothing: a block opens like the shipped scenario.
-        openings = [
-            opening_like(program.module)
-            if form == "block"
-            else opening_of(program.scenario, program.module, usual_values(program.scenario), tab["claims"])
-            for program in started
-        ]
-        tab["first"] = first_settings(openings, shown)
-        # A question is asked where one of the programs has all the settings that it changes, in their units.
-        units = [
-            {entry["key"]: entry["unit"] for entry in program["settings"] if entry["kept"] != "zero"}
-            for program in shown
-        ]
-        tab["questions"] = [
-            question
-            for question in tab["questions"]
-            if any(_fits(question["changes"], units_of_program) for units_of_program in units)
-        ]
-        with shown_in(started[0].scenario.device.shown):
-            stills.append(still_of(tab, openings, shown, joint))
-    return content, {name: text for text, name in names.items()}, stills[0]
+    size = _round_up(2.5 * abs(value)) if value else 1.0
+    if setting.path == "run.duration":
+        size = high = _LONGER * value
+    start, end = max(low, -size if value < 0.0 else 0.0), min(high, size)
+    start, end = min(start, value), max(end, value)
+    step = _round_up((end - start) / 250.0)
+    if not quantity.minimum_allowed and start <= low:
+        start = low + step
+    is_hidden = setting.path in _HIDDEN or setting.name in absent
+    return {
+        **shown,
+        "from": start,
+        "to": end,
+        "step": step,
+        "hidden": is_hidden,
+        "longest": setting.path == "run.duration",
+    }
 
 
-def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Compute the initial states of bundled scenarios and walks on a page, by name."""
-    openings = {}
-    for name in names:
-        simulated = PageSimulation(load_scenario(name), module_of(load_scenario(name)), name)
-        content = page_content(TITLE, "page", _tabs([simulated]), [program_content(simulated, "", {})])
-        claims = content["tabs"][0]["claims"]
-        openings[name] = computed_opening(
-            simulated.scenario, simulated.module, usual_values(simulated.scenario), claims
-        )
-    return openings
+def _round_up(value: float) -> float:
+    """Return the next number of 1, 2, 5 times a power of ten."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return float(f"{next(n * decade for n in (1.0, 2.0, 5.0, 10.0) if n * decade >= value * (1.0 - 1e-9)):.1g}")
 
 
-def known_intervals() -> Mapping[str, Interval]:
-    """Return 95 % intervals [SI] by key, for numbers without a stated uncertainty in the set.
+def _shown(
+    si: str, quantity_of: Callable[[str], str] = metric_quantity, *, is_absolute: bool = False
+) -> dict[str, Any]:
+    """Return the display unit of an SI unit, with scale and offset as decimals, as ``ppafo.units`` computes.
 
-    ``scripts/known_intervals.py`` writes them to a file, because the underlying study takes long to read.
+    SI value = offset + scale * shown value, for a gauge pressure plus the atmosphere.
     """
-    return {path: (low, high) for path, (low, high) in stored_data("intervals.json").items()}
+    si = {"-": "1", "Pa": "Pa_a"}.get(si, si)
+    quantity = quantity_of(si)
+    unit = unit_of(quantity) if quantity == "gas mass" else shown_unit(si)
+    unit = f"{unit[:-2]}_a" if is_absolute else unit
+    scale, offset, is_gauge = conversion(unit, "" if si == "1" else si)
+    for ending, word in _WORDS.items():
+        unit = unit.replace(ending, word)
+    zero = QUANTITIES[quantity].zero if quantity else 0.0
+    return {"unit": unit, "scale": str(scale), "offset": str(offset), "gauge": is_gauge, "zero": zero}
 
 
-def _fits(changes: Mapping[str, str], units: Mapping[str, str]) -> bool:
-    """Return whether all changed settings are among ``units`` [SI], with fitting units."""
-    with contextlib.suppress(KeyError, UnitError):
-        for key, text in changes.items():
-            parse_quantity(text, units[key] or "1")
-        return True
-    return False
-
-
-def _question(question: Mapping[str, Any], atmosphere: float) -> dict[str, Any]:
-    """Return text and changes of a question, with the supply pressure in its display unit."""
-    text, changes = question["text"], dict(question["changes"])
-    key, unit = "supply.pressure", shown_unit("Pa_a")
-    bare, kind = split_pressure_kind(unit)
-    if key in changes:
-        # Rounded: a supply of 65 psi is one of 4.5 bar.
-        level = from_si(parse_quantity(changes[key], "Pa_a", atmosphere), unit, "Pa_a", atmosphere)
-        level = float(f"{level:.2g}")
-        changes[key] = f"{level:.15g} {unit}"
-        text = text.replace(f"{{{key}}}", f"{level:.15g} {bare}{' abs' if kind == 'a' else ''}")
-    return {"text": text, "changes": changes}
-
-
-def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
-    groups: dict[tuple[str, JointNames], list[PageSimulation]] = {}
-    for program in simulated:
-        groups.setdefault((tab_title(program.scenario), program.scenario.device.joint), []).append(program)
-    tabs = []
-    for (title, _), group in groups.items():
-        alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
-        starts = [program.scenario for program in group[:_OPEN]]
-        device = group[0].scenario.device
-        atmosphere = device.supply.atmospheric_pressure
-        # No supply far above the device's own: another device has its limits elsewhere, for example a measured one.
-        highest = 2.0 * device.supply.pressure - atmosphere
-        with shown_in(device.shown):
-            questions = [
-                _question(question, atmosphere)
-                for question in words()["questions"]
-                if title in question["tabs"]
-                and parse_quantity(question["changes"].get("supply.pressure", "0 Pa_a"), "Pa_a", atmosphere) < highest
-            ]
-        tabs.append(
-            {
-                "title": device.joint.said(title),
-                "summary": alone or _SUMMARIES.get(title, ""),
-                "programs": [program.scenario.name for program in group],
-                "start": [{"program": scenario.name, "changes": usual_changes(scenario)} for scenario in starts],
-                "claims": words()["claims_of_walks" if is_walk(starts[0]) else "claims"],
-                "questions": questions,
-            }
-        )
-    return tabs
-
-
-_SUMMARIES = {
-    "Torque task": "The foot stays flat on the ground while the actuator follows a torque that ramps up and stays.",
-    "Walk": "A leg that walks with the device; the dashed line is what a healthy ankle would do.",
-}
+def _sentence(summary: str, library: Library) -> str:
+    text = library.worded(summary)
+    return text[:1].upper() + text[1:]

@@ -157,19 +157,6 @@ class Section:
         return draw_panels(panels, self.across, self.size, self.title, self.note, kind)
 
 
-@dataclass(frozen=True, slots=True)
-class LivePart:
-    """Interactive simulation on a page: HTML with its script, and the content security policy for this script alone.
-
-    ``remark`` says how the initial state of its runs differs from the runs of the page, empty if it does not. Without
-    ``html``, it gives the reason that nothing can be simulated.
-    """
-
-    policy: str = ""
-    html: str = ""
-    remark: str = ""
-
-
 _in_own_units = in_units(lambda finding, *_, **__: finding.units)
 
 
@@ -185,7 +172,6 @@ class Finding(Generic[T_co]):
     - ``parts``: sections
     - ``passed``: False if a check failed
     - ``files``: functions that return further files, by name
-    - ``live``: function that returns the interactive part of the page, or None
     - ``kind``: origin of the numbers: simulated, synthetic or measured
     - ``page``: function that makes a special page from the drawn figures
     - ``units``: display units by SI unit, by default the ones active at creation
@@ -201,7 +187,6 @@ class Finding(Generic[T_co]):
     passed: bool = True
     files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)
     command: str = ""
-    live: Callable[[], LivePart | None] | None = None
     kind: RecordingKind = "simulated"
     page: Callable[[Mapping[str, bytes]], bytes] | None = None
     units: Mapping[str, str] = field(default_factory=units_in_force)
@@ -311,6 +296,5 @@ def page_files(finding: Finding[Any]) -> dict[str, bytes]:
         "parts": parts,
         "origin": _ORIGINS[finding.kind],
         "versions": f"ppafo {__version__}",
-        "live": None if finding.live is None else finding.live(),
     }
     return files | {REPORT: render_page("finding.html.jinja", values).encode()}

@@ -49,6 +49,7 @@ def test_a_finding_is_text_json_page_figure_and_folder(tmp_path: Path) -> None:
     found.save(tmp_path / "out")
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"gas.png", "gas.svg", "ppafo.json", "report.html", "trial.json", "trial.txt"}
+    assert "<script" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_every_shape_can_be_drawn() -> None:

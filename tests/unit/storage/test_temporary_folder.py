@@ -10,14 +10,14 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.exports.fmu import platforms
-from ppafo.page import wasm
+from ppafo.page import module
 from ppafo.processor.simulated import try_firmware
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage.files import temporary_folder
 
 BUILDERS: dict[str, Callable[[], object]] = {
     "unit": lambda: platforms.build("linux64", {"unit.c": b"int"}, "unit.c"),
-    "page": lambda: wasm.build("int"),
+    "page": lambda: module.built({"module.c": b"int"}),
     "firmware": lambda: try_firmware(load_scenario("torque-task-solenoid"), 1),
     "study": lambda: temporary_folder("ppafo-study", {"a/b": b"x"}),
 }
@@ -32,7 +32,6 @@ def test_a_full_temporary_folder_is_said_in_one_line_by_all_that_build_in_one(
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(platforms, "compiler_for", lambda _name: ["cc"])
-    monkeypatch.setattr(wasm, "check_can_build", lambda: None)
     monkeypatch.setattr("ppafo.processor.simulated.missing_tools", lambda: ())
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(DataError, match=r"^temporary files cannot be written: no space left on device; .*TMPDIR"):

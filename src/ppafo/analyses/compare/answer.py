@@ -13,7 +13,6 @@ from ppafo.metrics import Metric
 from ppafo.report.display_units import display_difference
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import ConfidenceInterval, Kind, of_metric
-from ppafo.report.live_parts import live_part
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, COLOURS, GREY, look_of_valve
 from ppafo.simulation.gains import gains_of, remark_on_following_gains
@@ -175,7 +174,6 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
         ),
         found=comparison,
         passed=all(case.status.is_completed for task in comparison.tasks for case in task.cases),
-        live=partial(live_part, [case.scenario for task in comparison.tasks for case in task.cases]),
     )
 
 

@@ -22,7 +22,6 @@ from ppafo.documents.json_text import fields_of
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report.display_units import metric_level
-from ppafo.report.live_parts import live_part
 from ppafo.report.writing import inline_figure, quantity, render_page, sentence
 
 TEMPLATE = "reproduction.html.jinja"
@@ -100,7 +99,6 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
         "step_figure": inline_figure(drawn[STEP_FIGURE]),
         "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
-        "live": live_part([run.scenario for run in runs]),
         "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
     }
     return render_page(TEMPLATE, values, "ppafo.analyses.reproduce").encode()

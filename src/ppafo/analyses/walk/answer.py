@@ -17,7 +17,6 @@ from ppafo.parameters.bottles.fluid import list_fluids
 from ppafo.remedy_trials import tried
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import Kind
-from ppafo.report.live_parts import live_part
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import UNITS
@@ -123,7 +122,6 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
         found=_walk_data(comparison, verdict),
         passed=comparison.is_completed,
         files=_files(comparison),
-        live=partial(live_part, [scenario]),
         overrides=changes_in(scenario),
     )
 
