@@ -12,7 +12,7 @@ from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.cycle import wrap_cycle
-from ppafo.gait.recorded.mapping import Side
+from ppafo.gait.recorded.mapping import FrameClock, GaitMap, Side
 from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.source import read_table
 from ppafo.signals import Channel, Recording
@@ -265,18 +265,21 @@ def test_a_real_trial_of_one_stride_and_two_plates_is_imported(real_trial: list[
         ("\t", "time", " (deg)", False),
         (";", "time [s]", " [deg]", False),
         ("\t", "time [s]", " [deg]", True),
+        (",", "Frame", " [deg]", False),
     ],
 )
 def test_a_plain_table_with_opensims_names_is_read(
     tmp_path: Path, delimiter: str, time: str, unit: str, comma: bool
 ) -> None:
     columns = {f"{name}{unit}": values for name, values in angles(TIME).items()} | {"ground_force_r_vy": force(TIME)}
-    rows = [delimiter.join(f"{cell:.6f}" for cell in row) for row in np.column_stack([TIME, *columns.values()])]
+    clock = 7.0 + np.arange(TIME.size) if time == "Frame" else TIME
+    rows = [delimiter.join(f"{cell:.6f}" for cell in row) for row in np.column_stack([clock, *columns.values()])]
     text = "\n".join([delimiter.join([time, *columns]), *rows]) + "\n"
     path = tmp_path / "walk.csv"
     path.write_text("# synthetic: a walk\n" + (text.replace(".", ",") if comma else text))
     assert read_table(path).kind == "synthetic"
-    assert_true(import_gait([path], PERSON).gait)
+    counted = GaitMap(time=FrameClock(rate=f"{1.0 / (TIME[1] - TIME[0]):.9g} Hz")) if time == "Frame" else None
+    assert_true(import_gait([path], replace(PERSON, columns=counted)).gait)
 
 
 @pytest.mark.parametrize(

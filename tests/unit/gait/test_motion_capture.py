@@ -1,5 +1,6 @@
 """Text exports of motion capture: one walk written as each system writes it gives one gait."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -124,16 +125,23 @@ def test_a_lost_marker_is_the_same_gap_however_it_is_written(lost: str, tmp_path
     assert np.degrees(filled.gait.ankle_angle.mean - whole.gait.ankle_angle.mean) == pytest.approx(0.0, abs=0.1)
 
 
-def test_a_marker_that_is_held_until_it_jumps_was_lost_and_one_at_rest_was_not(tmp_path: Path) -> None:
-    path = dflow(tmp_path / "walk.txt")
+# Rounded to 0.1 mm a marker at rest repeats itself, until it jumps; at 0.1 um three frames of one place are a gap.
+@pytest.mark.parametrize(
+    ("write", "mark", "name", "first", "count"), [(dflow, "\t", "RKNE", 250, 6), (bts, "\t", "RHEE", 242, 2)]
+)
+def test_a_marker_that_is_held_until_it_jumps_was_lost_and_one_at_rest_was_not(
+    write: Callable[[Path], Path], mark: str, name: str, first: int, count: int, tmp_path: Path
+) -> None:
+    path = write(tmp_path / f"walk{'.txt' if write is dflow else '.emt'}")
     lines = path.read_text().splitlines()
-    at = 2 + 3 * NAMES.index("RKNE")
-    for number in range(250, 256):
-        row, before = lines[number].split("\t"), lines[249].split("\t")
-        lines[number] = "\t".join([*row[:at], *before[at : at + 3], *row[at + 3 :]])
+    at = 2 + 3 * NAMES.index(name)
+    for number in range(first, first + count):
+        row, before = lines[number].split(mark), lines[first - 1].split(mark)
+        lines[number] = mark.join([*row[:at], *before[at : at + 3], *row[at + 3 :]])
     path.write_text("\n".join(lines) + "\n")
     found = import_gait([path], ImportSettings(MASS, least_strides=1))
-    assert any("'RKNE' was lost in 6 of" in remark and "position unchanged" in remark for remark in found.remarks)
+    said = f"'{name}' was lost in {count} of"
+    assert any(said in remark and "position unchanged" in remark for remark in found.remarks)
     whole = import_gait([dflow(tmp_path / "whole.txt")], ImportSettings(MASS))
     assert not any("lost" in remark for remark in whole.remarks)
 
@@ -142,6 +150,7 @@ def test_a_marker_that_is_held_until_it_jumps_was_lost_and_one_at_rest_was_not(t
     ("forward", "vertical", "said"),
     [
         ("y", "z", "along x; in a gait map, replace shank_angle.forward = 'y' by the walking direction, 'x' or '-x'"),
+        ("-x", "z", "shank_angle.forward = '-x' is reversed: 'RTOE' is behind 'RHEE' along it; give 'x'"),
         ("x", "y", "is longest along 'z'; give 'z' in a gait map, also for ankle_angle"),
     ],
 )

@@ -32,6 +32,20 @@ Vertical = Literal["x", "y", "z"]
 _Flexion = Literal["plantarflexion", "dorsiflexion"]
 
 
+class FrameClock(StrictTable):
+    """Entry of a gait map for the clock of files that count frames or samples and have no time column."""
+
+    rate: Annotated[Text, Field(description="frames per second, such as '100 Hz'")]
+
+    def frequency(self) -> float:
+        """Return the rate [Hz]; raises DataError for another unit, or a rate that is not above 0."""
+        with refused_as(DataError, f"time.rate = {self.rate!r}", UnitError):
+            rate = parse_quantity(self.rate, "1/s")
+            if rate <= 0.0:
+                raise UnitError("must be above 0 Hz")
+        return rate
+
+
 class ShankMap(StrictTable):
     """Entry of a gait map for the shank angle: a sum of columns, or two markers and the laboratory axes."""
 
@@ -138,6 +152,7 @@ class GaitMap(StrictTable):
     """
 
     schema_version: SchemaVersion = 1
+    time: FrameClock | None = Field(None, description="sampling rate of files without a time column")
     shank_angle: ShankMap = Field(default_factory=lambda: ShankMap(terms=("shank_angle",)), description=_OF_THE_FORM)
     ankle_angle: AngleMap = Field(
         default_factory=lambda: AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
@@ -148,6 +163,9 @@ class GaitMap(StrictTable):
     centre_of_pressure: PressureMap | None = Field(None, description=_OF_THE_FORM)
     knee: KneeMap | None = Field(None, description=_OF_THE_FORM)
 
+
+CURVES = tuple(name for name in GaitMap.model_fields if name not in ("schema_version", "time"))
+"""Names of the curves in a gait map."""
 
 _UNIT_OF_HEADER = re.compile(r"\s+\[[^\[\]]*\]$")
 

@@ -17,9 +17,16 @@ from ppafo.gait.recorded.contacts import force_of_plates
 from ppafo.gait.recorded.footfalls import FORCE
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.markers import convention_of_map
-from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, Side, column_names, setting_text
+from ppafo.gait.recorded.mapping import CURVES, GaitMap, ImportSettings, Side, column_names, setting_text
 from ppafo.gait.recorded.signal import Signal
-from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps, mean_stride_table, without_lost_markers
+from ppafo.gait.recorded.table import (
+    MotionTable,
+    counted_table,
+    cut_table,
+    fill_gaps,
+    mean_stride_table,
+    without_lost_markers,
+)
 from ppafo.gait.recorded.walk import walk_signals
 from ppafo.kinds import Kinds
 from ppafo.plugins import nearest_kind
@@ -93,10 +100,10 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
     conventions = [FORMS[table.form].convention(table, side, body_mass) for table in tables]
     # One convention for all files: each curve is from the first file that has its columns.
     columns = {}
-    for name in GaitMap.model_fields:
+    for name in CURVES:
         choices = [getattr(convention.columns, name) for convention in conventions]
         pairs = zip(choices, tables, strict=True)
-        fitting = [each for each, table in pairs if name != "schema_version" and _is_there(each, table)]
+        fitting = [each for each, table in pairs if _is_there(each, table)]
         columns[name] = fitting[0] if fitting else choices[0]
     plates = tuple(dict.fromkeys(plate for convention in conventions for plate in convention.plates))
     remarks = tuple(remark for convention in conventions for remark in convention.remarks)
@@ -108,8 +115,7 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
 
 def _named_in(own: GaitMap | None) -> dict[str, list[str]]:
     """Return the columns that a user's map names, by curve in the order of the map, without their signs."""
-    given = set[str]() if own is None else own.model_fields_set - {"schema_version"}
-    mapped = {name: getattr(own, name) for name in GaitMap.model_fields if name in given}
+    mapped = {} if own is None else {name: getattr(own, name) for name in CURVES if name in own.model_fields_set}
     named = {name: column_names(curve) for name, curve in mapped.items() if curve is not None}
     return {name: [column.removeprefix("-") for column in columns] for name, columns in named.items()}
 
@@ -238,6 +244,14 @@ def _read_tables(
         if not any(each.is_mean_stride or each.problem for each in read):
             given = setting_text("stride_time")
             wrong.append(DataError(f"{given} is for a file over percent of the stride, in its first column; omit it"))
+    if settings.columns is not None and settings.columns.time is not None:
+        if not any(each.problem for each in read):
+            wrong.append(DataError("time.rate of the gait map is for files without a time column; omit it"))
+        rate = settings.columns.time.frequency()
+        read = [
+            cut_table(counted_table(each, rate), settings.longest_gap, start, end) if each.problem else each
+            for each in read
+        ]
     wrong += [DataError(table.problem) for table in read if table.problem]
     arranged = []
     for table in read:

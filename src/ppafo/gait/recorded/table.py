@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, refused_as
 from ppafo.signals.recording import Floats
+from ppafo.storage.comma_separated import check_clock
 from ppafo.wording import argument_text
 
 STRIKE, OFF = "foot strike", "foot off"
@@ -83,6 +84,24 @@ def mean_stride_table(table: MotionTable, stride_time: float) -> MotionTable:
     return replace(table, time=time, columns=columns, remarks=(*table.remarks, remark), problem="", is_mean_stride=True)
 
 
+COUNTERS = ("", "index", "frame", "frame#", "framenumber", "frame number", "sample")
+"""Column names of row counters, in lower case; the first is pandas' index."""
+
+
+def counted_table(table: MotionTable, rate: float) -> MotionTable:
+    """Return a table without time column over time [s], by its column of frame numbers, or by its rows, at ``rate``.
+
+    Frame numbers count from 1, or from 0 if the first is 0; a number that is left out is a missing row.
+    """
+    name, counted = next(iter(table.columns.items()))
+    time = np.arange(table.time.size) / rate
+    if name.lower() in COUNTERS:
+        time = (counted - min(float(counted[0]), 1.0)) / rate
+        with refused_as(DataError, table.file, DataError):
+            check_clock(time, range(1, time.size + 1), "row", may_have_trials=False)
+    return replace(table, time=time, problem="")
+
+
 _LARGEST_JUMP = 3.0
 """Sampling interval, relative to the median interval, above which it counts as a gap [-]."""
 
@@ -128,6 +147,8 @@ def cut_table(
 
 MOST_ACCELERATION = 50.0
 """Acceleration [m/s^2] that a marker on a leg does not reach when it starts to move from rest."""
+_COARSE = 5.0e-5
+"""Least difference of coordinates [m] from which rounding may repeat the position of a marker at rest."""
 _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
@@ -135,8 +156,9 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
     """Return the table with NaN for frames in which a marker of these columns was lost, and a remark on each marker.
 
     A marker is lost in three cases: a coordinate is not a number; all coordinates are exactly 0; or its position stays
-    bitwise equal for two frames or more and then jumps further than a marker at rest can move in one sample interval,
-    which is ``MOST_ACCELERATION`` times the interval squared [m].
+    bitwise equal for three frames, which no camera sees twice of a moving person. Where the file is rounded to
+    ``_COARSE`` or more, a marker at rest does so too: then only a jump after it, further than a marker can move from
+    rest in one sample interval, ``MOST_ACCELERATION`` times the interval squared [m], shows that it was lost.
     """
     columns, remarks = dict(table.columns), []
     labels = dict.fromkeys(name[:-2] for name in names if name[-2:] in COORDINATES)
@@ -152,7 +174,7 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
             "not recorded": ~recorded,
             # A marker that is 0 throughout stands at the origin.
             "all coordinates 0": zero & bool((recorded & ~zero).any()),
-            "position unchanged": _held(at, MOST_ACCELERATION * interval**2),
+            "position unchanged": _held(at, MOST_ACCELERATION * interval**2 if _resolution(at) > _COARSE else 0.0),
         }
         lost = {cause: frames for cause, frames in causes.items() if frames.any()}
         if not lost:
@@ -166,15 +188,26 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
 
 
 def _held(at: Floats, furthest: float) -> NDArray[np.bool_]:
-    """Return the frames in which a marker (coordinates, frames) [m] repeats its last position before a jump."""
+    """Return the frames in which a marker (coordinates, frames) [m] repeats its position before a jump.
+
+    A marker that is repeated up to the end of the file never jumps: only a ``furthest`` of 0 finds it.
+    """
     steps = np.linalg.norm(np.diff(at, axis=1), axis=0)
     held = np.zeros(at.shape[1], dtype=np.bool_)
-    moves = np.flatnonzero(steps != 0.0)
-    for before, after in pairwise(moves.tolist()):
+    moves = np.flatnonzero(steps != 0.0).tolist()
+    # A marker that never moves is a point of the laboratory.
+    last = [steps.size] if moves and furthest == 0.0 else []
+    for before, after in pairwise([*moves, *last]):
         # Frames before + 1 to after have one place, of which the first was seen.
-        if after - before > 2 and steps[after] > furthest:
+        if after - before > 2 and (after == steps.size or steps[after] > furthest):
             held[before + 2 : after + 1] = True
     return held
+
+
+def _resolution(at: Floats) -> float:
+    """Return the smallest step between frames of the coordinates of a marker [m]; 0 if it never moves."""
+    steps = np.abs(np.diff(at, axis=1))
+    return float(np.min(steps, initial=np.inf, where=steps > 0.0)) if steps.any() else 0.0
 
 
 LONGEST_FILLED = 0.25

@@ -11,7 +11,7 @@ from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.recorded.delimited import NumberBlock, cells_of, delimiter_of, lines_of, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map, setting_text
-from ppafo.gait.recorded.table import MotionTable
+from ppafo.gait.recorded.table import COUNTERS, MotionTable
 from ppafo.storage.comma_separated import kind_of_comments
 from ppafo.units import to_si
 from ppafo.wording import one_line
@@ -19,9 +19,6 @@ from ppafo.wording import one_line
 _NAME = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?")
 
 _TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
-
-_COUNTERS = ("", "index", "frame", "frame#", "framenumber", "frame number", "sample")
-"""Column names of row counters, in lower case; the first is pandas' index."""
 
 _LONGEST_SHOWN = 40
 """Largest number of characters of a name in a message."""
@@ -64,13 +61,15 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     delimiter, pairs = delimiter_of(header), _named_columns(header)
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
     at = next((place for place, name in enumerate(names) if name.lower() in _TIMES), 0)
-    at = at if all(name.lower() in _COUNTERS for name in names[:at]) else 0
+    at = at if all(name.lower() in COUNTERS for name in names[:at]) else 0
     clock = names[at] if names[at].lower() in _TIMES else ""
     duration = setting_text("stride_time", 1.1, "1.1 s")
     problem = (
         f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; or give one mean "
         f"stride over 0 to 100 percent with its duration, such as {duration}"
     )
+    if names[at].lower() in COUNTERS:
+        problem += "; frames of a constant rate need it in a gait map, such as time = { rate = '100 Hz' }"
     if "" in names[at:]:
         raise DataError(f"{path}: a column has no name; name every column")
     # A decimal comma shows only where commas do not separate the cells.

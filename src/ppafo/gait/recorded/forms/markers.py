@@ -52,6 +52,9 @@ _TOES = ("toe", "toetip", "toestudy", "mt2")
 _LEAST_WAY = 0.5
 """Travel of a marker [m] above which it shows the direction of walking; on a treadmill the travel is shorter."""
 
+_MOST_OF_A_WALK = 0.9
+"""Fraction of the samples in which the toe is behind the heel along a reversed axis."""
+
 _MOST_OBLIQUE = 25.0
 """Largest angle [deg] between walking direction and laboratory axis; the shank lean is then 10 % too small."""
 
@@ -100,6 +103,7 @@ def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Sid
     if table is None or shank.knee is None or shank.ankle is None:
         return Convention(columns, (), tuple(unsaid_axes(columns)))
     labels = _recorded_labels(table)
+    _check_forward(table, columns, side[0], labels)
     mapped: dict[str, ShankMap | AngleMap] = {"shank_angle": shank, "ankle_angle": columns.ankle_angle}
     unsaid = [name for name, each in mapped.items() if each.terms is None and not each.model_fields_set >= _AXIS_KEYS]
     remarks: tuple[str, ...] = ()
@@ -119,6 +123,38 @@ def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Sid
     is_free = columns.vertical_force is None
     plates = tuple(name for name in table.columns if is_free and name.startswith(PLATE) and name.endswith(vertical))
     return Convention(columns, plates, remarks)
+
+
+def _check_forward(table: MotionTable, columns: GaitMap, foot: str, labels: Sequence[str]) -> None:
+    """Raise DataError for a forward axis of a map against which the foot points or, without a foot, the ankle moves."""
+    shank, ankle = columns.shank_angle, columns.ankle_angle
+    heel, toe = ankle.heel or _first(labels, foot, _HEELS), ankle.toe or _first(labels, foot, _TOES)
+    for name, mapped in (("shank_angle", shank), ("ankle_angle", ankle)):
+        if mapped.terms is not None or "forward" not in mapped.model_fields_set:
+            continue
+        axis, sign = mapped.forward[-1], -1.0 if mapped.forward.startswith("-") else 1.0
+        tip, back, way = (table.columns.get(f"{label}.{axis}") for label in (toe, heel, shank.ankle))
+        is_reversed = False
+        if tip is not None and back is not None:
+            ahead = sign * (tip - back)[np.isfinite(tip - back)]
+            # A foot swings about its axis, but never points back for most of a walk.
+            is_reversed = ahead.size > 0 and float(np.quantile(ahead, _MOST_OF_A_WALK)) < 0.0
+            why = f"{toe!r} is behind {heel!r} along it"
+        elif way is not None and np.isfinite(way).any():
+            seen = way[np.isfinite(way)]
+            is_reversed = sign * float(seen[-1] - seen[0]) < -_LEAST_WAY * _per_metre(table, f"{shank.ankle}.{axis}")
+            why = f"{shank.ankle!r} travels against it"
+        if is_reversed:
+            other = axis if sign < 0.0 else f"-{axis}"
+            raise DataError(
+                f"{table.file}: {name}.forward = {mapped.forward!r} is reversed: {why}; give {other!r} in the "
+                "gait map, for shank_angle and ankle_angle"
+            )
+
+
+def _per_metre(table: MotionTable, column: str) -> float:
+    """Return the units of a column per metre; most laboratories write mm, also where the file does not say so."""
+    return {"m": 1.0, "cm": 100.0}.get(table.units.get(column, ""), 1000.0)
 
 
 def _recorded_labels(table: MotionTable) -> list[str]:
@@ -195,10 +231,7 @@ def _axes(
         shoe = at_toe - at_heel
         both = np.isfinite(shoe).all(axis=0)
         pointing = shoe[:, both].mean(axis=1) if both.any() else None
-    # Most laboratories write millimetres, also where the file does not say so.
-    if np.hypot(*np.delete(travel, up)) < _LEAST_WAY * {"m": 1.0, "cm": 100.0}.get(
-        table.units.get(f"{ankle}.x", ""), 1000.0
-    ):
+    if np.hypot(*np.delete(travel, up)) < _LEAST_WAY * _per_metre(table, f"{ankle}.x"):
         if pointing is None:
             return "x" if up else "y", _UPWARDS[up], ()
         travel = pointing
