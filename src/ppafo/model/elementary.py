@@ -97,6 +97,8 @@ def sine_and_cosine(turns: Numeric) -> tuple[Numeric, Numeric]:
 TURN = 6.283185307179586
 QUARTER_TURN = 1.5707963267948966
 TURNS_OF_RADIAN = 1.0 / TURN
+ROUNDING = 1.5 * 2.0**52
+"""Added to a number and subtracted again, it leaves the nearest whole number, without a branch or an integer."""
 
 DOUBLINGS = 12
 """Number of doublings from the small fraction of a step, at which a series is evaluated, to the whole step."""
@@ -110,9 +112,9 @@ def sine_and_cosine_of_turns(turns: float) -> tuple[float, float]:
 
     A library sine would be a function call for each run, which prevents vector code over runs.
     """
-    half_turns = float(int(2.0 * turns + (0.5 if turns >= 0.0 else -0.5)))
-    odd = half_turns - 2.0 * float(int(0.5 * half_turns))
-    # A negative odd number of half turns leaves -1 here, hence the square.
+    half_turns = (2.0 * turns + ROUNDING) - ROUNDING
+    # 1 or -1 for an odd number of half turns, hence the square.
+    odd = half_turns - 2.0 * ((0.5 * half_turns + ROUNDING) - ROUNDING)
     sign = 1.0 - 2.0 * odd * odd
     angle = TURN * (turns - 0.5 * half_turns)
     square = angle * angle

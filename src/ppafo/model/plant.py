@@ -16,12 +16,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ppafo.model.columns import Numeric
-from ppafo.model.elementary import QUARTER_TURN, TURN
+from ppafo.model.elementary import QUARTER_TURN, TURNS_OF_RADIAN, sine_and_cosine_of_turns
 from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_slopes, orifice_flow, orifice_flow_slopes
 from ppafo.model.ports import exhaust_path, load_torque, supply_path
-
-HALF_TURN = 0.5 * TURN
-"""Angle of half a turn [rad]."""
 
 
 class PlantParameters(NamedTuple):
@@ -138,24 +135,10 @@ def gravity_torque(angle: float, largest_torque: float) -> float:
     """Gravity torque [N m] against the vane for an upright shank; it is subtracted in equation (1).
 
     The foot plate is level at 90 deg, where gravity pulls the toes down with ``largest_torque`` = m g l, that is in
-    plantarflexion, so the value is negative. The cosine of the slope is a power series, accurate to 1e-8 at every angle
-    that a parameter set may contain: a call of the library cosine would prevent vector code over runs.
+    plantarflexion, so the value is negative.
     """
-    slope = abs(angle - QUARTER_TURN)
-    # The cosine is even and periodic: a slope of up to 5 half turns comes within one half turn of level.
-    slope = abs(slope - TURN) if slope > HALF_TURN else slope
-    slope = abs(slope - TURN) if slope > HALF_TURN else slope
-    is_upside_down = slope > QUARTER_TURN
-    slope = HALF_TURN - slope if is_upside_down else slope
-    # Terms up to x^12 of the cosine, by Horner's rule from the last one.
-    square = slope * slope
-    cosine = 1.0 / 479001600.0 * square - 1.0 / 3628800.0
-    cosine = cosine * square + 1.0 / 40320.0
-    cosine = cosine * square - 1.0 / 720.0
-    cosine = cosine * square + 1.0 / 24.0
-    cosine = cosine * square - 0.5
-    cosine = cosine * square + 1.0
-    return (largest_torque if is_upside_down else -largest_torque) * cosine
+    _, cosine = sine_and_cosine_of_turns((angle - QUARTER_TURN) * TURNS_OF_RADIAN)
+    return -largest_torque * cosine
 
 
 def torque_less_loads(torque: float, angle: float) -> float:
