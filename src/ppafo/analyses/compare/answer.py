@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.analyses.compare.pairs import PairedMetric, pareto_front
+from ppafo.analyses.compare.pairs import RMS_ERRORS, PairedMetric, pareto_front
 from ppafo.metrics import Metric
 from ppafo.report.display_units import display_difference
 from ppafo.report.finding import Column, Finding, Section
@@ -29,7 +29,7 @@ from ppafo.wording import count_of, said_of_configuration
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_ERROR, _GAS = "rms_error", "gas_supplied"
+_GAS = "gas_supplied"
 _PROBABILITY = Kind(form=".4g")
 
 
@@ -115,6 +115,11 @@ class ComparisonResult:
     metrics: tuple[str, ...] = field(compare=False)
 
     @property
+    def error(self) -> str:
+        """Metric of the error of the controlled quantity; empty if the configurations have none in common."""
+        return error_of(self.metrics)
+
+    @property
     def has_noise(self) -> bool:
         """True if a controller receives sensor noise."""
         return any(case.renoised is not None for task in self.tasks for case in task.cases)
@@ -167,8 +172,8 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
         said=(lead,),
         parts=(
             *(part for task in comparison.tasks for part in _parts(comparison, task)),
-            *([pareto] if _ERROR in comparison.metrics else []),
-            *([change] if _ERROR in comparison.metrics and comparison.draws else []),
+            *([pareto] if comparison.error else []),
+            *([change] if comparison.error and comparison.draws else []),
             Section(remarks=comparison.remarks),
             Section("How to read it", said=[_READING], is_detail=True) if comparison.draws else Section(),
         ),
@@ -182,7 +187,7 @@ def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
     where = "" if len(comparison.tasks) == 1 else f", {task.task}"
     kinds = [(name, of_metric(name)) for name in comparison.metrics]
     following, best = [case for case in task.cases if case.follows], dict[str, str]()
-    for metric, kind in ((name, kind) for name, kind in kinds if name in (_ERROR, _GAS)):
+    for metric, kind in ((name, kind) for name, kind in kinds if name in (comparison.error, _GAS)):
         shares, values = task.best.get(metric, {}), {case.configuration: case.value(metric) for case in following}
         if shares and len(comparison.configurations) > 2:
             best[metric] = ", ".join(f"{name} {_PROBABILITY.interval(share)}" for name, share in shares.items())
@@ -284,10 +289,15 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
     return [*dict.fromkeys(filter(None, remarks)), *failed, *uncertain, *([_NOISE] if comparison.has_noise else [])]
 
 
-def front_of(cases: Sequence[ConfigurationResult]) -> list[str]:
-    """Return the configurations that follow their reference and are Pareto-optimal in error and gas."""
+def error_of(metrics: Sequence[str]) -> str:
+    """Return the error of the controlled quantity among compared metrics; empty without one."""
+    return next((name for name in metrics if name in RMS_ERRORS), "")
+
+
+def front_of(cases: Sequence[ConfigurationResult], error: str) -> list[str]:
+    """Return the configurations that follow their reference and are Pareto-optimal in a metric ``error`` and gas."""
     following = [case for case in cases if case.follows]
-    points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in following]).reshape(-1, 2)
+    points = np.array([[case.value(name) for name in (error, _GAS)] for case in following]).reshape(-1, 2)
     return [case.configuration for case, is_front in zip(following, pareto_front(points), strict=True) if is_front]
 
 
@@ -306,7 +316,7 @@ def _pareto_panels(comparison: ComparisonResult) -> list[Panel]:
 
 
 def _change_panels(comparison: ComparisonResult) -> list[Panel]:
-    return [_change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)]
+    return [_change(comparison, task, metric) for task in comparison.tasks for metric in (comparison.error, _GAS)]
 
 
 def _colours(task: TaskComparison) -> dict[str, str]:
@@ -320,16 +330,16 @@ def _colours(task: TaskComparison) -> dict[str, str]:
 def _pareto(comparison: ComparisonResult, task: TaskComparison) -> Panel:
     """Return a panel of error over gas, with a mark for each completed configuration and a dot for each draw."""
     cases = [case for case in task.cases if case.status.is_completed]
-    front, marks, on_front = front_of(cases), [], []
+    front, marks, on_front = front_of(cases, comparison.error), [], []
     colours = _colours(task)
     for number, case in enumerate(cases):
         colour = colours[case.configuration]
         if case.rows is not None:
             dots = {"linestyle": "", "marker": ".", "alpha": 0.35, "markersize": 4, "markeredgewidth": 0}
-            gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, _ERROR))
+            gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, comparison.error))
             marks.append(Mark("line", gas, error, colour=colour, style=dots))
         marker = {"linestyle": "", "marker": _MARKS[number % len(_MARKS)], "markersize": 8, "markeredgecolor": "white"}
-        x, y = (case.value(name) for name in (_GAS, _ERROR))
+        x, y = (case.value(name) for name in (_GAS, comparison.error))
         marks.append(Mark("line", [x], [y], label=case.configuration, colour=colour, style=marker))
         if case.configuration in front:
             on_front.append((x, y))
@@ -337,7 +347,7 @@ def _pareto(comparison: ComparisonResult, task: TaskComparison) -> Panel:
     x_front, y_front = np.array(sorted(on_front)).reshape(-1, 2).T
     marks.append(Mark("line", x_front, y_front, colour=GREY, style={"linewidth": 1.0, "zorder": 1}))
     title = f"Task: {task.task}" if len(comparison.tasks) > 1 else ""
-    return Panel(of_metric(_GAS), of_metric(_ERROR), marks, title, legend="inside")
+    return Panel(of_metric(_GAS), of_metric(comparison.error), marks, title, legend="inside")
 
 
 def _change(comparison: ComparisonResult, task: TaskComparison, metric: str) -> Panel:
@@ -361,7 +371,7 @@ def _change(comparison: ComparisonResult, task: TaskComparison, metric: str) -> 
         marks += [Mark("at", value, label=said, colour=colour, style=dashed) for value in nominal]
         ends += [float(low), float(high), *nominal.tolist()]
     words = f"{of_metric(metric).words}, change from {comparison.baseline}"
-    is_first = metric == _ERROR
+    is_first = metric == comparison.error
     title = f"Task: {task.task}" if len(comparison.tasks) > 1 and is_first else ""
 
     def limit_changes(axes: "Axes") -> None:

@@ -15,6 +15,8 @@ from ppafo.studies.intervals import effective_sample_size, noise_interval, repli
 Masks = NDArray[np.bool_]
 OUTER_QUANTILES = (0.05, 0.95)
 """Quantiles over the draws that tables show next to the median."""
+RMS_ERRORS = (*(name for name in TRACKING if name.startswith("rms_") and name.endswith("_error")), "torque_error")
+"""Metrics of the error of each quantity that a loop may control, over the whole run; of a walk the last."""
 COMPARED: dict[str, int] = {
     **{name: -1 for name in TRACKING if name not in ONE_INSTANT},
     "gas_supplied": -1,
@@ -30,7 +32,7 @@ COMPARED: dict[str, int] = {
     "torque_error": -1,
     "toe_clearance": 1,
 }
-"""Compared metrics by name: -1 if smaller is better, 1 if larger is better, 0 if neither."""
+"""Metrics that are always compared, by name: -1 if smaller is better, 1 if larger is better, 0 if neither."""
 
 
 @dataclass(frozen=True, slots=True)

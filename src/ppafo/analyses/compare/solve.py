@@ -5,8 +5,15 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
 
-from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, TaskComparison, front_of, remarks_of
-from ppafo.analyses.compare.pairs import COMPARED, PairedMetric, best_probabilities, compare_pairs
+from ppafo.analyses.compare.answer import (
+    ComparisonResult,
+    ConfigurationResult,
+    TaskComparison,
+    error_of,
+    front_of,
+    remarks_of,
+)
+from ppafo.analyses.compare.pairs import COMPARED, RMS_ERRORS, PairedMetric, best_probabilities, compare_pairs
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
@@ -96,17 +103,20 @@ def compared(
         for task, overrides in named_tasks
         for configuration in configurations_with(configurations, overrides)
     }
-    # Metrics that all scenarios can have: without a reference there is no error.
-    metrics = [
-        name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())
-    ]
+    # The controlled quantity first, and what the study asks for. Without a reference there is no error.
+    asked = () if study is None else study.outputs.metrics
+    lacks = {
+        name: any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())
+        for name in dict.fromkeys((*RMS_ERRORS, *asked, *COMPARED))
+    }
+    metrics = [name for name, is_lacking in lacks.items() if not is_lacking]
     uncertainty = _uncertainty_of_comparison(scenarios, study, draws)
     seed = draws.seed if draws.seed is not None else DEFAULT_SEED if study is None else study.sample.seed
     drawn = _runs_over_draws(scenarios, metrics, study, uncertainty, draws, seed) if uncertainty.drawn else {}
     # Nominal runs use the seed of each scenario: with noise, a nominal run is one realisation of the noise.
     nominal = dict(zip(scenarios, simulate_many(list(scenarios.values()), draws.threads), strict=True))
     cases = {
-        (task, name): _configuration_result(name, result, drawn.get((task, name), _DrawnRuns()))
+        (task, name): _configuration_result(name, result, metrics, drawn.get((task, name), _DrawnRuns()))
         for (task, name), result in nominal.items()
     }
     comparison = ComparisonResult(
@@ -125,7 +135,14 @@ def compared(
         metrics=tuple(metrics),
     )
     switching = ((task, name, unlimited_switching(result)) for (task, name), result in nominal.items())
-    remarks = [*(f"{name}, {task}: {text}" for task, name, text in switching if text), *remarks_of(comparison)]
+    left_out = [
+        f"outputs: '{name}' is left out: not every configuration has this metric" for name in asked if lacks[name]
+    ]
+    remarks = [
+        *left_out,
+        *(f"{name}, {task}: {text}" for task, name, text in switching if text),
+        *remarks_of(comparison),
+    ]
     if study is not None and study.drawn and draws.is_default and study.sample.runs != draws.count:
         remarks.append(
             f"study '{study.name}': sample.runs = {study.sample.runs} applies to 'ppafo sweep' only; 'compare' used "
@@ -197,14 +214,14 @@ def _runs_over_draws(
     return drawn
 
 
-def _configuration_result(name: str, nominal: Result, drawn: _DrawnRuns) -> ConfigurationResult:
+def _configuration_result(name: str, nominal: Result, metrics: Sequence[str], drawn: _DrawnRuns) -> ConfigurationResult:
     """Return the result of a configuration on a task, with a tried remedy if it does not follow its reference."""
     with said_of_configuration(name):
         tracking = tried(nominal.scenario, nominal.tracking)
     return ConfigurationResult(
         configuration=name,
         status=nominal.status,
-        metrics={metric: value for metric, value in nominal.metrics.items() if metric in COMPARED},
+        metrics={metric: value for metric, value in nominal.metrics.items() if metric in metrics},
         tracking=tracking,
         failed_draws=0 if drawn.rows is None else int(drawn.rows[FAILED].sum()),
         reason=drawn.failure,
@@ -231,7 +248,7 @@ def _task_result(
         noise = None
         if base.renoised is not None and case.renoised is not None:
             noise = base.renoised[name], case.renoised[name]
-        pair = compare_pairs(name, base.rows[name], case.rows[name], COMPARED[name], confidence, noise)
+        pair = compare_pairs(name, base.rows[name], case.rows[name], COMPARED.get(name, 0), confidence, noise)
         # Without a pair of values a metric has no statistics.
         if pair is not None:
             pairs[case.configuration].append(pair)
@@ -240,10 +257,10 @@ def _task_result(
     rows = [case.rows for case in following if case.rows is not None]
     best: dict[str, dict[str, ConfidenceInterval]] = {}
     for name in metrics:
-        better = COMPARED[name]
+        better = COMPARED.get(name, 0)
         # A metric may have no better end.
         if rows and better:
             # All at once: no pair says which of three is the best. Empty where no draw has a value of all.
             shares = best_probabilities([row[name] for row in rows], better, confidence)
             best[name] = dict(zip([case.configuration for case in following], shares, strict=False))
-    return TaskComparison(task, list(overrides), cases, front_of(cases), pairs, best)
+    return TaskComparison(task, list(overrides), cases, front_of(cases, error_of(metrics)), pairs, best)

@@ -38,7 +38,7 @@ class Threshold:
     ``value``: value found; None if no value meets the condition
     ``not_met_at``: next tried value on the outer side, which does not meet the condition; None at the end of the range
     ``changes``: number of changes between met and not met along the tried values
-    ``met``: first and last value of each interval in which the condition is met
+    ``met``: first and last tried value of each interval in which the condition is met; beside ``value``, of the grid
     ``unsettled``: number of runs that swing at the instant of the metric, so that their RMS error in the second half of
         the hold must meet the condition too
     """
@@ -91,7 +91,7 @@ def finding_of(outcome: FindResult, overrides: Sequence[str] = ()) -> Finding[Th
         title=f"The {wanted} {path.path} such that {'the run ' if condition.text == FOLLOWS else ''}{condition.text}",
         said=(_verdict(outcome, kind, missed), *remarks),
         parts=(
-            Section("Where the condition is met", columns),
+            Section("Where the condition is met", columns, remarks=_ends_of_grid(outcome, kind, met)),
             Section("To use the value" if used else "", code=used),
             Section(
                 "Metric over the value",
@@ -219,6 +219,17 @@ def _remarks(outcome: FindResult, kind: Kind, missed: int) -> Iterator[str]:
         yield f"at {missed} values the condition is met, but the reference is not followed: they count as not met"
     if runs.failures:
         yield f"{runs.failures} of {runs.count} runs failed and count as not met; the first: {runs.reason}"
+
+
+def _ends_of_grid(outcome: FindResult, kind: Kind, met: Sequence[Sequence[float]]) -> list[str]:
+    """Return a remark on the ends of intervals that are values of the grid, not bracketed as the value found is."""
+    values, (index, _) = outcome.tried["value"], outcome.found
+    exact = [values[0], values[-1], *([] if index is None else [values[index]])]
+    grid = values[outcome.tried["is_of_grid"]]
+    ends = [kind.number(end) for interval in met for end in interval if end not in exact]
+    if not ends:
+        return []
+    return [f"{', '.join(ends)}: of the grid; the condition may be met up to {kind.change(grid[1] - grid[0])} beyond"]
 
 
 def _met_words(missed: int) -> str:
