@@ -17,7 +17,7 @@ from ppafo.report.kind import PLAIN, ConfidenceInterval, Kind
 from ppafo.report.notebook import shown
 from ppafo.report.panels import Panel, draw_panels
 from ppafo.report.style import drawn_at, render_figure
-from ppafo.report.writing import align_columns, inline_figure, render_page
+from ppafo.report.writing import align_columns, inline_figure, render_page, terminal_width
 from ppafo.signals import RecordingKind
 from ppafo.units.shown import in_units, units_in_force
 from ppafo.version import __version__
@@ -135,9 +135,11 @@ class Section:
         """Rows of the table as text, without the titles."""
         return list(zip(*(column.texts for column in self.columns), strict=True))
 
-    @property
-    def table_lines(self) -> list[str]:
-        """Table as aligned lines, with titles and marks of highlighted rows; empty without rows."""
+    def table_lines(self, width: int = 0) -> list[str]:
+        """Table as aligned lines, with titles and marks of highlighted rows; empty without rows.
+
+        Columns that exceed a ``width`` above 0 follow below, beside the names again.
+        """
         rows: list[tuple[str, ...]] = self.rows
         if not rows:
             return []
@@ -147,7 +149,7 @@ class Section:
         if self.marked:
             marks = ["", *(MARK if number in self.marked else "" for number in range(len(rows)))]
             lines = [(mark, *line) for mark, line in zip(marks, lines, strict=True)]
-        return align_columns(lines, self.left + bool(self.marked))
+        return align_columns(lines, self.left + bool(self.marked), width)
 
     def drawn(self, kind: RecordingKind) -> "matplotlib.figure.Figure":
         """Draw the figure of the section, marked as simulated or synthetic unless ``kind`` is measured."""
@@ -199,7 +201,7 @@ class Finding(Generic[T_co]):
 
     def __str__(self) -> str:
         """Return the text printed by the command."""
-        return text_of(self)
+        return text_of(self, terminal_width())
 
     def __iter__(self) -> Iterator[Any]:
         """Iterate over the results, for example the findings of an audit; raises TypeError if they are not iterable."""
@@ -251,13 +253,16 @@ class Finding(Generic[T_co]):
 
 
 @_in_own_units
-def text_of(finding: Finding[Any]) -> str:
-    """Return the report as text: opening sentences and sections, without the sections meant for the page only."""
+def text_of(finding: Finding[Any], width: int = 0) -> str:
+    """Return the report as text: opening sentences and sections, without the sections meant for the page only.
+
+    Tables are folded to a ``width`` above 0 [characters].
+    """
     blocks = ["\n".join(filter(None, (*finding.said, changed_text(finding.overrides))))]
     for section in finding.parts:
         if section.is_detail:
             continue
-        body = [*section.said, *section.table_lines, *section.remarks, *([section.code] if section.code else [])]
+        body = [*section.said, *section.table_lines(width), *section.remarks, *([section.code] if section.code else [])]
         # A heading over nothing is left out, and a part of the page alone, a figure, has no text.
         blocks.append("\n".join([section.heading, *body] if section.heading and body else body))
     return "\n\n".join(block for block in blocks if block)

@@ -2,6 +2,8 @@
 
 import base64
 import re
+import shutil
+import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -88,13 +90,27 @@ def format_reported_quantity(value: float, unit: str) -> str:
     return f"{value:g} {'' if unit == '-' else unit}".rstrip()
 
 
-def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
-    """Format rows of texts as aligned lines: the first ``left`` columns left-aligned, the others right-aligned."""
+def terminal_width() -> int:
+    """Return the number of characters in a line of the terminal; 0 where the output goes elsewhere."""
+    return shutil.get_terminal_size().columns if sys.stdout is not None and sys.stdout.isatty() else 0
+
+
+def align_columns(rows: Sequence[Sequence[str]], left: int = 1, width: int = 0) -> list[str]:
+    """Format rows of texts as aligned lines: the first ``left`` columns left-aligned, the others right-aligned.
+
+    Columns that would exceed a ``width`` above 0 follow in further blocks of lines, each with the first ``left``.
+    """
     columns = []
     for place, column in enumerate(zip(*rows, strict=True)):
-        width = max(map(len, column))
-        columns.append([f"{cell:<{width}}" if place < left else f"{cell:>{width}}" for cell in column])
-    return ["  ".join(cells).rstrip() for cells in zip(*columns, strict=True)]
+        widest = max(map(len, column))
+        columns.append([f"{cell:<{widest}}" if place < left else f"{cell:>{widest}}" for cell in column])
+    names, blocks = columns[:left], [columns[:left]]
+    for column in columns[left:]:
+        if width and len(blocks[-1]) > left and sum(len(each[0]) + 2 for each in (*blocks[-1], column)) - 2 > width:
+            blocks.append([*names])
+        blocks[-1].append(column)
+    lines = [["  ".join(cells).rstrip() for cells in zip(*block, strict=True)] for block in blocks]
+    return [line for block in lines for line in ("", *block)][1:]
 
 
 def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.report") -> str:

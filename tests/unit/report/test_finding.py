@@ -8,6 +8,7 @@ import pytest
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import TIME, ConfidenceInterval, Kind, of_metric, of_path
 from ppafo.report.panels import SHAPES, Mark, Panel
+from ppafo.report.writing import align_columns
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,8 @@ def finding() -> Finding[Numbers]:
 def test_a_finding_is_text_json_page_figure_and_folder(tmp_path: Path) -> None:
     found = finding()
     assert str(found) == "said\n\nGas\nrun   gas (g)\na           1\nb    2 [1, 3]\nc           -"
+    folded = align_columns([("run", "gas", "work"), ("a", "1", "2")], 1, 12)
+    assert folded == ["run  gas", "a      1", "", "run  work", "a       2"]
     assert found.to_dict() == {"gas": [0.001, None]}
     (axes,) = found.plot().axes
     assert axes.get_ylabel() == "Gas supplied (g)"

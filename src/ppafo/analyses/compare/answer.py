@@ -185,7 +185,9 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
 def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
     """Return the tables of a task: metrics, changes against the baseline, probability of being the best."""
     where = "" if len(comparison.tasks) == 1 else f", {task.task}"
-    kinds = [(name, of_metric(name)) for name in comparison.metrics]
+    # A column without any number, such as the error of a hold that no task has, says nothing.
+    held = [name for name in comparison.metrics if not all(math.isnan(case.value(name)) for case in task.cases)]
+    kinds = [(name, of_metric(name)) for name in held]
     following, best = [case for case in task.cases if case.follows], dict[str, str]()
     for metric, kind in ((name, kind) for name, kind in kinds if name in (comparison.error, _GAS)):
         shares, values = task.best.get(metric, {}), {case.configuration: case.value(metric) for case in following}

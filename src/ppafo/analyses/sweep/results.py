@@ -14,7 +14,7 @@ from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, column_names, matrix_of, read_parquet
 from ppafo.study.folder import StudyFolder
 from ppafo.study.runs import joined
-from ppafo.study.store import FOLLOWS, check_types, chunk_file, stored_rows, trace_column
+from ppafo.study.store import FOLLOWS, OSCILLATES, check_types, chunk_file, stored_rows, trace_column
 from ppafo.units import from_si
 from ppafo.wording import known_names, nearest_name
 
@@ -92,7 +92,7 @@ class StudyResults:
     def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
         """Return the rows of all runs, like ``table``, in SI or in ``units``, such as ``{"supply.pressure": "bar_g"}``.
 
-        ``attrs["units"]`` has the unit of each column. Gauge pressures are relative to the standard atmosphere.
+        ``attrs["units"]`` has the unit of each column; answers such as ``follows`` are booleans. Gauge pressures are relative to the standard atmosphere.
         """
         from pandas import DataFrame
 
@@ -106,6 +106,8 @@ class StudyResults:
                 # Units are affine, so that two values decide all.
                 zero, one = (from_si(number, unit, shown[name]) for number in (0.0, 1.0))
             frame[name] = zero + (one - zero) * frame[name]
+        # A truth that is not known stays empty.
+        frame = frame.astype({name: "boolean" for name in (OSCILLATES, FOLLOWS) if name in frame})
         frame.attrs = {"title": self.name, "units": shown | dict(units or {})}
         return frame
 

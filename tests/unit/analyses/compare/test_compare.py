@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -146,6 +147,18 @@ def test_without_a_reference_there_is_gas_and_no_error() -> None:
     comparison = compare({"as it is": ppafo.load_scenario("step-response"), "small valve": slow}).found
     of_valve = ("switchings", "peak_torque", "command_reversals")
     assert comparison.metrics == ("gas_supplied", "mechanical_work", "gas_per_work", *of_valve)
+
+
+def test_the_error_of_what_is_controlled_ranks_and_outputs_of_a_study_are_shown(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(
+        'schema_version = 1\nname = "s"\noutputs.metrics = ["gas_leaked", "final_pressure_1_error"]\n'
+        '[[configurations]]\nname = "a"\nscenario = "pressure-loop"\n'
+        '[[configurations]]\nname = "b"\nscenario = "pressure-loop"\noverrides = ["supply.pressure=60 psi_g"]\n'
+    )
+    answer = compare(study=tmp_path / "s.toml")
+    assert answer.found.metrics[:3] == ("rms_pressure_1_error", "gas_leaked", "final_pressure_1_error")
+    assert re.search(r"^best: rms_pressure_1_error: b ", str(answer), re.MULTILINE)
+    assert "Gas leaked (g)" in str(answer)
 
 
 FAST = ["controller.proportional_gain=60 1/(N m)", "controller.derivative_gain=0.05 s/(N m)", "valve.delay=5 ms"]

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -101,6 +102,7 @@ def test_a_condition_that_changes_more_than_once_says_so_and_shows_where_it_is_m
     assert found.value / BAR == pytest.approx(np.pi, abs=1e-5)
     assert found.changes == 3
     assert np.array(found.met) / BAR == pytest.approx(np.array([[3.14, 6.28], [9.42, 10.0]]), abs=0.13)
+    assert re.search(r"\n[0-9.]+, [0-9.]+: of the grid; the condition may be met up to [0-9.]+ bar beyond", str(answer))
     highest = of_curve(lambda p: 1.0 + np.sin(p), highest=True).found
     assert (highest.value, highest.not_met_at, highest.changes) == (10.0 * BAR, None, 3)
 

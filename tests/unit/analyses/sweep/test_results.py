@@ -50,6 +50,7 @@ def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: St
 def test_rows_are_a_data_frame_in_si_or_in_units(small_results: StudyResults) -> None:
     frame, rows = small_results.to_dataframe(), small_results.table()
     assert list(frame) == list(rows)
+    assert {str(frame[name].dtype) for name in ("oscillates", "follows")} == {"boolean"}
     assert frame.attrs["units"]["supply.pressure"] == "Pa_a"
     gauge = small_results.to_dataframe({"supply.pressure": "bar_g", "rms_error": "mN m"})
     np.testing.assert_allclose(gauge["supply.pressure"], (rows["supply.pressure"] - 101325.0) / 1e5)
