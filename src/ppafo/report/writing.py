@@ -101,9 +101,9 @@ def align_columns(rows: Sequence[Sequence[str]], left: int = 1, width: int = 0) 
     Columns that would exceed a ``width`` above 0 follow in further blocks of lines, each with the first ``left``.
     """
     columns = []
-    for place, column in enumerate(zip(*rows, strict=True)):
-        widest = max(map(len, column))
-        columns.append([f"{cell:<{widest}}" if place < left else f"{cell:>{widest}}" for cell in column])
+    for place, texts in enumerate(zip(*rows, strict=True)):
+        widest = max(map(len, texts))
+        columns.append([f"{cell:<{widest}}" if place < left else f"{cell:>{widest}}" for cell in texts])
     names, blocks = columns[:left], [columns[:left]]
     for column in columns[left:]:
         if width and len(blocks[-1]) > left and sum(len(each[0]) + 2 for each in (*blocks[-1], column)) - 2 > width:

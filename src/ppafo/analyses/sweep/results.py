@@ -92,7 +92,8 @@ class StudyResults:
     def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
         """Return the rows of all runs, like ``table``, in SI or in ``units``, such as ``{"supply.pressure": "bar_g"}``.
 
-        ``attrs["units"]`` has the unit of each column; answers such as ``follows`` are booleans. Gauge pressures are relative to the standard atmosphere.
+        ``attrs["units"]`` has the unit of each column; answers such as ``follows`` are booleans. Gauge pressures are
+        relative to the standard atmosphere.
         """
         from pandas import DataFrame
 
