@@ -1,12 +1,12 @@
 """Consistency tests of the recordings (Hausman): sensors, recordings, groups of rows and stated limits."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
@@ -17,6 +17,9 @@ from ppafo.signals.recording import Floats
 
 SMOOTH = "noise"
 """Marker in ``Conflict.number`` for residuals too smooth to be noise; ``standard_errors`` is then 1 / innovation."""
+
+SHAPE = "shape"
+"""Marker in ``Conflict.number`` for residuals whose neighbours have the same sign; the law has another shape."""
 
 STATED = "stated limit"
 """Marker in ``Conflict.group`` for recordings that contradict the stated limit of a tolerance."""
@@ -29,6 +32,8 @@ Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recording
 
 _SIGNIFICANCE = 0.01
 """Significance level [-] of a difference between estimates."""
+_BY_CHANCE = 0.001
+"""Significance level [-] of residuals that follow each other, about 3.1 standard errors of their correlation."""
 _PARTING = 0.05
 """Smallest relative excess of a group's variance over the common variance [-] for a direction to be tested."""
 
@@ -68,6 +73,22 @@ def too_smooth(sensors: Mapping[str, Noise]) -> Conflict | None:
     """Return a conflict for the channel with the smoothest residuals if they are too smooth to be noise, else None."""
     channel, noise = min(sensors.items(), key=lambda item: item[1].innovation)
     return Conflict(channel, SMOOTH, 1.0 / noise.innovation, 0.0) if noise.innovation < _SMOOTHEST else None
+
+
+def wrong_shape(sensor: str, series: Sequence[Floats]) -> Conflict | None:
+    """Return a conflict if neighbouring residuals of a sensor follow each other, as noise does not; else None.
+
+    ``series`` are residuals divided by their noise [-], each in order of what the law predicts. Their correlation with
+    the next one times the root of the count is standard normal under white noise.
+    """
+    size = sum(float(values @ values) for values in series)
+    count = sum(values.size - 1 for values in series)
+    # Residuals below the floor are rounding, and no noise.
+    if count < 1 or size < 0.5 * sum(values.size for values in series):
+        return None
+    errors = sum(float(values[1:] @ values[:-1]) for values in series) / size * math.sqrt(count)
+    p = float(norm.sf(errors))
+    return Conflict(sensor, SHAPE, errors, p) if p < _BY_CHANCE else None
 
 
 def conflict_of(runs: FitRuns, rows: Floats, point: Floats, free: Flags, freedom: float) -> Conflict | None:

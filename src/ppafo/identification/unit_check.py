@@ -52,7 +52,8 @@ def with_tried_units(
     # All absolute pressures together, then each one.
     groups = dict.fromkeys((pressures, *((name,) for name in pressures)))
     stated = {group: [channels[name].stated for name in group] for group in groups}
-    least, found = math.inf, result
+    # Accusations first, then the least scatter.
+    first, found = (True, math.inf), result
     for names, (mistake, factor) in ((group, each) for group in groups for each in misread_units("Pa", stated[group])):
         again = [replace(source, recording=_in_unit(source.recording, names, factor, atmosphere)) for source in sources]
         try:
@@ -60,20 +61,23 @@ def with_tried_units(
         except IdentificationError:
             continue
         expected = [(tried[path].value, number_in_si(parameter_set, path) or math.inf) for path in impossible]
-        is_near = impossible and all(1.0 / _NEAR < value / number < _NEAR for value, number in expected)
+        is_near = bool(impossible) and all(1.0 / _NEAR < value / number < _NEAR for value, number in expected)
+        is_accused = is_near and tried.scatter <= result.scatter + _ROUNDING
         is_smoother = result.scatter > _LARGE_SCATTER and _SMOOTHER * tried.scatter < result.scatter
-        is_as_good = tried.scatter <= result.scatter + _ROUNDING
-        if (is_smoother or (is_near and is_as_good)) and tried.scatter < least:
-            least = tried.scatter
-            text = (
-                f"with {' and '.join(names)} as {mistake}, a factor of {max(factor, 1.0 / factor):.4g}, the scatter is "
-                f"{percentage(tried.scatter, 2)} of the largest reading instead of {percentage(result.scatter, 2)}"
-            )
+        rank = not is_accused, tried.scatter
+        if not (is_accused or is_smoother) or rank >= first:
+            continue
+        first = rank
+        text = (
+            f"with {' and '.join(names)} as {mistake}, a factor of {max(factor, 1.0 / factor):.4g}, the scatter is "
+            f"{percentage(tried.scatter, 2)} of the largest reading instead of {percentage(result.scatter, 2)}"
+        )
+        if is_accused:
+            text = f"{text}; correct the unit in the header or the column map"
+            doubted = (replace(estimate, verdict=WRONG_UNIT, explanation=text) for estimate in result.estimates)
+            found = replace(result, estimates=tuple(doubted))
+        else:
             found = replace(result, remarks=(*result.remarks, f"{text}; check the unit, and the law"))
-            if is_near and is_as_good:
-                text = f"{text}; correct the unit in the header or the column map"
-                doubted = (replace(estimate, verdict=WRONG_UNIT, explanation=text) for estimate in result.estimates)
-                found = replace(result, estimates=tuple(doubted))
     return found
 
 

@@ -2,7 +2,7 @@
 
 import math
 
-from ppafo.identification.conflict import SMOOTH, STATED
+from ppafo.identification.conflict import SHAPE, SMOOTH, STATED
 from ppafo.identification.fit import Fit
 from ppafo.units import percentage
 from ppafo.units.shown import shown_unit, shown_value
@@ -91,6 +91,11 @@ def conflict_in_words(fitted: Fit, remedy: str) -> str:
         return f"{conflict.number} is {errors:.1f} standard errors beyond its stated limit; {remedy}"
     if conflict.number == SMOOTH:
         return f"the residual of {conflict.group} is {errors:.0f} times its noise and too smooth to be noise; {remedy}"
+    if conflict.number == SHAPE:
+        return (
+            f"the residuals of {conflict.group} have a shape that the law has not, by {errors:.1f} standard errors; "
+            f"{remedy}"
+        )
     give = "give" if _SEVERAL & set(conflict.group.split()) else "gives"
     return (
         f"{conflict.group}, fitted alone, {give} different values: {conflict.number} by {errors:.1f} standard "

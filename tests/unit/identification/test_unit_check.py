@@ -8,7 +8,11 @@ import pytest
 from ppafo.analyses.identify.answer import Identification, finding_of
 from ppafo.analyses.identify.question import identify
 from ppafo.errors import DataError, IdentificationError
+from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import RecordingSource
+from ppafo.identification.unit_check import with_tried_units
+from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.parameter_set import number_in_si
 from ppafo.signals import Channel, Recording
 from ppafo.units import from_si
@@ -70,6 +74,23 @@ def test_a_jet_wider_than_its_opening_is_a_wrong_unit_where_the_other_unit_gives
 def test_a_jet_wider_than_its_opening_is_no_wrong_unit_where_no_unit_gives_the_set(tmp_path: Path) -> None:
     found = flow_of_orifice(tmp_path, 1.3, 1.0e5, "kPa_g", "kPa_g")
     assert found.estimates[0].verdict == "holds for this model only"
+
+
+def test_an_accusation_is_not_hidden_by_another_unit_that_scatters_less() -> None:
+    upstream = np.linspace(2.0e5, 3.0e5, 30)
+    source = planted.source("flow", np.arange(30.0), upstream_pressure=(upstream, "Pa"), mass_flow=(upstream, "kg/s"))
+
+    def run(sources: tuple[RecordingSource, ...]) -> BenchResult:
+        """Cd 1.64 as read, the set's where bar was read as psi, and 9 with far less scatter in kPa."""
+        factor = round(2.0e5 / sources[0].recording["upstream_pressure"][0], 3)
+        value, scatter = {1.0: (1.64, 0.05), 0.069: (0.113, 0.05), 0.145: (9.0, 0.001)}.get(factor, (5.0, 0.05))
+        path = "valves.proportional.discharge_coefficient"
+        estimate = Estimate(path, value, "-", value, value, "identified", "", ())
+        return BenchResult("open-valve-flow", "", (estimate,), (), "measured", scatter=scatter)
+
+    result = with_tried_units(run((source,)), (source,), load_parameter_set("ppafo2011"), 101325.0, run)
+    assert result.estimates[0].verdict == "unit probably wrong"
+    assert "bar read as psi" in result.estimates[0].explanation
 
 
 def flow_of_orifice(folder: Path, coefficient: float, rise: float, true: str, read: str) -> Identification:

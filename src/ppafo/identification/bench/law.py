@@ -3,10 +3,11 @@
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ppafo.identification.conflict import wrong_shape
 from ppafo.identification.fit import Fit, fit
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
 from ppafo.identification.residuals import FitVariable, ResidualBlock
@@ -20,6 +21,9 @@ Values = Mapping[str, float]
 
 _MEMORY = 2
 """Highest order of the noise autoregression: enough for sensor lag, drift or hum, too low to absorb model error."""
+
+_TELLING = 1.0e-3
+"""Least residuals whose shape is tested [ranges of the readings]; smaller ones are lost in the errors of a bench."""
 
 _WIDEST = 12.0
 """Largest deviation of a tolerance in the search, as a multiple of its limit [-]."""
@@ -73,7 +77,10 @@ def recordings_of(sources: tuple[RecordingSource, ...], counts: Iterable[int] = 
 def solve(
     law: Callable[[Values], Floats], readings: PooledReadings, numbers: Sequence[FitVariable], confidence: float
 ) -> tuple[Fit, Floats]:
-    """Fit a law to readings. Returns the fit, and the fitted values in the unit of the readings."""
+    """Fit a law to readings. Returns the fit, and the fitted values in the unit of the readings.
+
+    Residuals of sensors whose readings are too few for correlated noise are tested for runs in order of the law.
+    """
     names, measured = [number.name for number in numbers], readings.measured
     keys = list(zip(readings.recordings, readings.sensors, *readings.groups, strict=True))
     # In the order of their first reading, so that the first block is the first recording.
@@ -100,4 +107,13 @@ def solve(
     fitted = fit(
         residuals, numbers, blocks, confidence, memory=min(_MEMORY, int(counts.min()) // SAMPLES_PER_COEFFICIENT)
     )
-    return fitted, law(at(fitted.values))
+    model = law(at(fitted.values))
+    tested = (name for name in resolutions if fitted.correlation[name] == 0)
+    for sensor in (name for name in tested if fitted.noise[name] > _TELLING * float(np.ptp(measured[sensors == name]))):
+        series = []
+        for block in (block for block in blocks if block.channel == sensor):
+            samples = order[block.rows]
+            by_law = samples[np.argsort(model[samples], kind="stable")]
+            series.append((measured - model)[by_law] / fitted.noise[sensor])
+        fitted = replace(fitted, conflict=fitted.conflict or wrong_shape(sensor, series))
+    return fitted, model

@@ -10,16 +10,18 @@ Temperature and law of the gas, gains and zeros of the sensors are tolerances; t
 inside the dead band.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.checks import check_sources
-from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
+from ppafo.identification.bench.flow import ZERO, GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
 from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, meter_readings
+from ppafo.identification.conflict import SHAPE, Conflict
 from ppafo.identification.residuals import FitVariable
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
@@ -45,6 +47,10 @@ _CLEAR_COMMAND = 0.1
 _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "valve_map.hysteresis", "valve_map.saturation_command"
+_ROUND, _ROUNDS = "valve_map.round_off", (0.05, 0.005, 0.5)
+"""Range over which corners of the opening are rounded, tried beside sharp ones: name, start and bounds [-]."""
+_BETTER = 5.4
+"""Increase of the log-likelihood [-] by one more number that happens by chance in one fit of 1,000."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +131,7 @@ def valve_map(
         true_upstream = true_pressure(at, "upstream_pressure", sweep.upstream)
         true_downstream = true_pressure(at, "downstream_pressure", sweep.downstream)
         spool = np.concatenate([spool_of(command, at[_PLAY]) for command in sweep.commands])
-        area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION])
+        area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION], at[_ROUND])
         shape = np.abs(orifice_shape(true_upstream, true_downstream, gas.heat_capacity_ratio))
         flow = read_flow(at, gas, area * gas.choked_flow_constant * shape)
         # A play needs every command, so that readings that cannot be drop out of the flow alone.
@@ -138,6 +144,18 @@ def valve_map(
     )
     readings = PooledReadings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
     fitted, model = solve(law, readings, numbers, confidence)
+    remedy = "the opening is not the same in both directions, or not linear in the command"
+    # Corners are refuted where an opening with rounded ones, tried in its place, explains the readings better.
+    if fitted.conflict is None or fitted.conflict.number == SHAPE:
+        free = [number for number in numbers if math.isinf(number.deviation) or number.name == ZERO]
+        rounded, _ = solve(law, readings, (*free, sought(_ROUND, *_ROUNDS)), confidence)
+        gain = rounded.log_likelihood - fitted.log_likelihood
+        if gain > _BETTER:
+            remedy = (
+                f"an opening whose corners are rounded over {rounded.by_name[_ROUND]:.2g} of the command, through "
+                "which gas flows from the first command on, explains them better"
+            )
+            fitted = replace(fitted, conflict=Conflict("mass_flow", SHAPE, math.sqrt(2.0 * gain), 0.0))
     values, residuals = fitted.by_name, sweep.flow - model
     scatter = np.std(residuals) / np.abs(sweep.flow).max()
     is_clear = bool((sweep.command > _CLEAR_COMMAND).any() and (sweep.command < -_CLEAR_COMMAND).any())
@@ -152,7 +170,7 @@ def valve_map(
         f"{sweep.command.size} readings; dead band {values[band]:.3g}, {values[_GAIN] * 1e6:.4g} mm^2 per command; "
         f"scatter {scatter:.2%} of the largest flow",
         with_residuals("Valve map", *axes, _marks(sweep, model), sweep.command, residuals),
-        "the opening is not the same in both directions, or not linear in the command",
+        remedy,
         (*remarks, *(() if is_clear else (one_way,)), *(() if sweep.is_two_way else (no_play,))),
     )
 
@@ -205,9 +223,20 @@ def _marks(sweep: _Sweep, model: Floats) -> list[Mark]:
     return marks
 
 
-def area_of_command(command: Floats, dead_band: float, gain: float, saturation: float) -> Floats:
-    """Return the effective area [m^2] for a spool command [-], positive towards chamber 1."""
-    beyond = np.clip(np.abs(command) - dead_band, 0.0, max(saturation - dead_band, 0.0))
+def area_of_command(
+    command: Floats, dead_band: float, gain: float, saturation: float, round_off: float = 0.0
+) -> Floats:
+    """Return the effective area [m^2] for a spool command [-], positive towards chamber 1.
+
+    With ``round_off`` [-] both corners are rounded over about this range of the command, and gas flows from 0 on.
+    """
+    size = np.abs(command)
+    if round_off > 0.0:
+        ends = [round_off * np.logaddexp(0.0, (size - end) / round_off) for end in (dead_band, saturation)]
+        at_zero = [round_off * float(np.logaddexp(0.0, -end / round_off)) for end in (dead_band, saturation)]
+        beyond = (ends[0] - at_zero[0]) - (ends[1] - at_zero[1])
+    else:
+        beyond = np.clip(size - dead_band, 0.0, max(saturation - dead_band, 0.0))
     return np.asarray(np.sign(command) * gain * beyond)
 
 

@@ -113,14 +113,6 @@ def test_gauge_pressures_passed_for_absolute_are_refused() -> None:
         open_valve_flow((gauge,), planted.CO2)
 
 
-def test_exchanged_pressures_are_told() -> None:
-    source = planted.flow()
-    first, second = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
-    turned = changed(changed(source, "upstream_pressure", second), "downstream_pressure", first)
-    with pytest.raises(IdentificationError, match="are the two columns swapped"):
-        open_valve_flow((turned,), planted.CO2)
-
-
 def test_a_valve_that_was_never_open_is_told() -> None:
     half = changed(planted.flow(), "command", np.full(60, 0.5))
     with pytest.raises(IdentificationError, match="fully open"):
@@ -138,6 +130,30 @@ def test_planted_dead_band_saturation_and_hysteresis_come_back() -> None:
         assert result[path].low <= truth <= result[path].high
     assert result["valve_map.gain"].value == pytest.approx(4.2e-6, rel=0.01)
     assert result.conflict == ""
+
+
+def round_hole(noise: float, is_both_ways: bool, seed: int) -> RecordingSource:
+    """Readings of a spool that uncovers a round hole from its first step on, with noise relative to the whole flow."""
+    command = np.arange(-40 if is_both_ways else 0, 41) / 40.0
+    half_angle = np.arccos(1.0 - 1.9 * np.abs(command))
+    share = np.sign(command) * (half_angle - 0.5 * np.sin(2.0 * half_angle)) / math.pi
+    flow = 3.6e-3 * (share + np.random.default_rng(seed).normal(0.0, noise, command.size))
+    pressures = {
+        "upstream_pressure": (np.full(command.size, 7.0e5), "Pa"),
+        "downstream_pressure": (np.full(command.size, 1.0e5), "Pa"),
+    }
+    return planted.source(
+        "hole", np.arange(command.size), command=(command, "-"), mass_flow=(flow, "kg/s"), **pressures
+    )
+
+
+@pytest.mark.parametrize("is_both_ways", [False, True])
+@pytest.mark.parametrize(("noise", "seed"), [(0.0, 1), (0.002, 2), (0.01, 3), (0.01, 4)])
+def test_a_round_hole_has_no_dead_band_that_is_identified(noise: float, seed: int, is_both_ways: bool) -> None:
+    result = valve_map((round_hole(noise, is_both_ways, seed),), planted.CO2)
+    assert result["valve.dead_band"].value == pytest.approx(0.09, abs=0.02)
+    assert not any(estimate.is_identified for estimate in result.estimates)
+    assert "have a shape that the law has not" in result.conflict or "fitted alone" in result.conflict
 
 
 def test_the_zero_of_the_flow_meter_does_not_move_the_dead_band() -> None:
@@ -250,11 +266,6 @@ def test_a_steady_orifice_leak_gives_its_area_beside_the_zero_of_the_meter() -> 
         assert area.verdict == "identified"
 
 
-def test_steady_flow_with_the_wrong_sign_is_told() -> None:
-    with pytest.raises(IdentificationError, match="reverse the sign of 'mass_flow'"):
-        vane_leak((planted.steady("orifice", -EFFECTIVE),), planted.CO2)
-
-
 def test_a_leak_in_the_form_of_the_standard_gives_its_conductance() -> None:
     first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, planted.ROOM)
     flow = Opening(planted.CO2, "iso6358", 1.0, 0.25).flow(OpeningSizes(7.0e-11), first, second)
@@ -271,15 +282,6 @@ def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pres
     time = np.linspace(0.0, 3.0, 50)
     first, _ = pressures_of_fall(opening, OpeningSizes(0.2), 1e6, 1e5, 0.0, 1.0, time)
     assert np.allclose(first, 1e6 * np.exp(-0.2 * time), rtol=1e-4)
-
-
-def test_a_leak_below_zero_absolute_pressure_is_refused() -> None:
-    source = planted.leak("orifice", EFFECTIVE)
-    gauge = changed(source, "pressure_2", source.recording["pressure_2"] - 2.0e5)
-    with pytest.raises(
-        IdentificationError, match=r"'pressure_2' is .* at sample 1, which is impossible for an absolute pressure"
-    ):
-        vane_leak((gauge,), planted.CO2)
 
 
 def test_a_hundred_readings_with_white_noise_have_hardly_any_memory() -> None:
