@@ -21,6 +21,34 @@ def count_of(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
+def number_text(text: str) -> str:
+    """Check that a text is an ASCII number for ``float`` or ``int``. Raises ValueError, also for ``1_000``."""
+    if not text.isascii() or "_" in text:
+        raise ValueError(f"{one_line(repr(text))[:LONGEST_SHOWN]} is not a number")
+    return text
+
+
+def without_exponent(value: float, form: str) -> str:
+    """Format a number by ``form``, with thousands written out instead of an exponent; zero without sign or exponent.
+
+    >>> without_exponent(2641.3, ".3g"), without_exponent(2.0e7, ".3g"), without_exponent(0.12345, ".3g")
+    ('2640', '2e+07', '0.123')
+    >>> without_exponent(0.0, "+.3g"), without_exponent(0.0, ".1e"), without_exponent(-0.3, ".0f")
+    ('0', '0', '0')
+    """
+    if value == 0.0:
+        return "0" if form[-1:] == "e" else f"{0.0:{form.removeprefix('+')}}"
+    text = f"{value:{form}}"
+    text = text if text.strip("-0.") else text.removeprefix("-")
+    is_long = "e+0" in text and form[-1:] == "g" and abs(value) < 1.0e6
+    return f"{float(text):{form.partition('.')[0]}.0f}" if is_long else text
+
+
+def percentage(fraction: float, digits: int) -> str:
+    """Format a fraction [-] as a percentage with ``digits`` significant digits, without exponent: ``120 %``."""
+    return f"{float(f'{100.0 * fraction:.{digits}g}'):.12g} %"
+
+
 def said_missing(names: Sequence[str]) -> str:
     """Format a statement on missing items: ``'a', 'b' and 'c' are missing``."""
     quoted = [f"'{name}'" for name in names]

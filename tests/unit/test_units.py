@@ -4,6 +4,7 @@ import decimal
 import math
 import re
 
+import pint
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,20 +12,18 @@ from hypothesis import strategies as st
 from ppafo.errors import UnitError
 from ppafo.parameters.audit.evidence import digits
 from ppafo.units import (
-    ParsedUnit,
     base_value,
     check_unit,
+    conversion,
     format_quantity,
     from_si,
-    known_units,
-    number_text,
     parse_quantity,
     split_quantity,
     to_si,
-    unit_by_pint,
 )
-from ppafo.units.definitions import parse_unit
-from ppafo.units.quantity import conversion
+from ppafo.units.definitions import UNITS, named
+from ppafo.units.spelling import parse_unit
+from ppafo.wording import number_text
 
 PAIRS = [
     ("mm^2", "m^2"),
@@ -310,18 +309,12 @@ def test_any_text_is_a_quantity_or_a_clear_error(text: str) -> None:
         check_unit(unit)
 
 
-def test_what_is_kept_of_a_unit_is_what_pint_says_of_it() -> None:
-    def described(parsed: ParsedUnit) -> tuple[str, str, dict[str, int]]:
-        return str(parsed.scale), str(parsed.offset), parsed.dimensions
-
-    assert len(known_units()) > 50
-    for unit, parsed in known_units().items():
-        assert described(parsed) == described(unit_by_pint(unit)), f"{unit}: python scripts/known_units.py"
-
-
-def test_a_unit_of_which_nothing_is_kept_is_read_by_pint() -> None:
-    assert "lbf ft/deg" not in known_units()
-    assert to_si(2.0, "lbf ft/deg", "N m/rad") == pytest.approx(2.0 * 4.4482216152605 * 0.3048 * 180.0 / math.pi)
+def test_every_unit_is_what_pint_says_of_it() -> None:
+    registry, water = pint.UnitRegistry(), "1000 kg/m^3 * standard_gravity *"
+    of_pint = {"rev": "turn", "Torr": "torr", "mWC": f"{water} m", "inWC": f"{water} inch"}
+    for unit in UNITS.keys() - {"degC", "degF"}:
+        theirs = registry.Quantity(of_pint.get(unit, unit)).to_base_units()
+        assert float(named(unit).scale) == pytest.approx(theirs.magnitude, rel=1e-15), unit
 
 
 @pytest.mark.parametrize("unit", ["mm^0", "degC^0", "percent^0", "m/s^0", "m^-0"])
@@ -373,14 +366,14 @@ def test_only_digits_of_ascii_make_a_number(text: str) -> None:
 
 def test_decimals_of_a_host_program_change_no_conversion() -> None:
     def converted() -> list[object]:
-        for kept in (conversion, parse_unit, known_units):
+        for kept in (conversion, parse_unit, named):
             kept.cache_clear()
         return [
             parse_quantity("8.4 g", "kg"),
             from_si(451325.0, "psi_g", "Pa_a"),
             base_value(77.0, "degF"),
             parse_quantity("23.4 L/min (70 degF, 14.696 psi_a, air)", "kg/s"),
-            unit_by_pint("mm^3/min"),
+            parse_unit("mm^3/min"),
             digits(0.01234),
         ]
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.errors import ArgumentError, UnitError, refused_as
-from ppafo.units import SI, number_text, parse_quantity, split_number
+from ppafo.units import SI, parse_quantity, split_number
 from ppafo.units.shown import units_beside
+from ppafo.wording import number_text
 
 NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 """Number without a unit."""

@@ -19,7 +19,7 @@ from ppafo.gait.mean_stride import MeanStride
 from ppafo.gait.plausible import STANCE_FRACTION, force_remarks
 from ppafo.gait.plausible_angles import MIDSTANCE
 from ppafo.signals.recording import Floats
-from ppafo.units import without_exponent
+from ppafo.wording import without_exponent
 
 LARGEST_DELAY = 0.03
 """Largest plausible delay [s] of a curve relative to its usual time (at most 0.016 in the recorded strides)."""

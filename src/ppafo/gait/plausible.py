@@ -15,7 +15,7 @@ from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride, SignSource, other
 from ppafo.gait.plausible_angles import check_ankle, check_ankle_range, check_shank
 from ppafo.gait.plausible_knee import check_knee, check_knee_means
 from ppafo.signals.recording import Floats
-from ppafo.units import without_exponent
+from ppafo.wording import without_exponent
 
 STANCE_FRACTION = (0.45, 0.85)
 STRIDE_TIME = (0.5, 3.0)

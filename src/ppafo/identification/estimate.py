@@ -6,7 +6,7 @@ from statistics import NormalDist
 from typing import Literal, get_args
 
 from ppafo.errors import IdentificationError
-from ppafo.units import percentage
+from ppafo.wording import percentage
 
 Verdict = Literal["identified", "holds for this model only", "not identifiable", "at its bound", "unit probably wrong"]
 """Verdict on an estimated value, given the fit of the model to the recordings.

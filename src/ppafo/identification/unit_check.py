@@ -11,7 +11,8 @@ from ppafo.identification.source import RecordingSource
 from ppafo.parameters.parameter_set import ParameterSet, number_in_si
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded.misread_units import misread_units
-from ppafo.units import percentage, split_pressure_kind
+from ppafo.units import split_pressure_kind
+from ppafo.wording import percentage
 
 _NEAR = 1.5
 """Largest ratio [-] of a discharge coefficient in another unit to the value of the set, for the unit to be accused."""

@@ -4,9 +4,9 @@ import math
 
 from ppafo.identification.conflict import SHAPE, SMOOTH, STATED
 from ppafo.identification.fit import Fit
-from ppafo.units import percentage
+from ppafo.units import split_pressure_kind
 from ppafo.units.shown import shown_unit, shown_value
-from ppafo.units.spelling import split_pressure_kind
+from ppafo.wording import percentage
 
 _DIFFERENCES = {"Pa": "Pa_d"}
 """Unit of a difference by SI unit."""

@@ -11,7 +11,8 @@ The conversion for liquids, 17.0 mm^2 of orifice per Cv, does not hold for gas: 
 import math
 
 from ppafo.errors import UnitError
-from ppafo.units import flow_of, is_volume_flow, split_number, to_si
+from ppafo.units import split_number, to_si
+from ppafo.units.reference import flow_of, is_volume_flow
 
 USUAL_CRITICAL_RATIO = 0.3
 """Usual critical pressure ratio b of spool valves [-], for data sheets without b."""
@@ -43,7 +44,7 @@ def conductance_of(name: str, text: str) -> float | None:
         value, unit = split_number(text)
         is_flow = bool(unit) and is_volume_flow(unit)
         # Normal litres are taken as those of the nominal flow.
-        litres = to_si(value, flow_of(unit)[0], "m^3/s") * 6.0e4 if is_flow else value
+        litres = to_si(value, flow_of(unit).unit, "m^3/s") * 6.0e4 if is_flow else value
     except UnitError:
         return None
     if value <= 0.0 or (unit and not is_flow):

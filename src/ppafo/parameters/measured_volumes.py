@@ -23,9 +23,9 @@ from ppafo.documents.toml_text import label
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.actuators.table import MOST_ANGLES, MOST_PRESSURES
 from ppafo.signals.recording import Floats
-from ppafo.units import number_text, to_si
+from ppafo.units import to_si
 from ppafo.units.shown import counted_from, shown_in, shown_text
-from ppafo.wording import nearest_name, one_line, reason, said_missing
+from ppafo.wording import nearest_name, number_text, one_line, reason, said_missing
 
 
 class _VolumeColumn(NamedTuple):

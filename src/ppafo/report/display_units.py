@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.metrics import Metric
-from ppafo.units import without_exponent
 from ppafo.units.shown import QUANTITIES, quantity_of_unit, shown_value, unit_of
+from ppafo.wording import without_exponent
 
 Floats = NDArray[np.float64]
 

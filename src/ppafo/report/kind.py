@@ -21,8 +21,8 @@ from ppafo.report.display_units import (
 )
 from ppafo.report.setting_names import label_of
 from ppafo.signals.recording import Floats
-from ppafo.units import without_exponent
 from ppafo.units.shown import quantity_of_unit
+from ppafo.wording import without_exponent
 
 YES_OR_NO = "; 1: yes, 0: no"
 """Remark in the label of a number that answers a question; a mean of several runs lies between."""

@@ -23,7 +23,7 @@ from ppafo.report.style import (
     printed_width,
 )
 from ppafo.signals import RecordingKind
-from ppafo.units import without_exponent
+from ppafo.wording import without_exponent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,8 +22,8 @@ from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
 from ppafo.simulation.at_hand import RecordedResult
 from ppafo.simulation.scenario import Scenario
-from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
+from ppafo.wording import without_exponent
 
 SHORTER = 4
 """Factor by which the finer run shortens the steps; its allowed error is smaller by the square of this factor."""

@@ -18,8 +18,8 @@ from ppafo.parameters.declaration import quantities as device_quantities
 from ppafo.parameters.overrides import Override, check_valve, layered, of_another_valve, other_forms, override_set
 from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent
 from ppafo.simulation.document import value_at
-from ppafo.units import SI, number_text
-from ppafo.wording import nearest_name
+from ppafo.units import SI
+from ppafo.wording import nearest_name, number_text
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 """Number without a unit."""

@@ -1,64 +1,199 @@
 """Units at the interface of the package: text with units to SI floats, and back.
 
-Inside the package all floats are SI.
-
-Four rules go beyond arithmetic:
+Inside the package all floats are SI. Four rules go beyond arithmetic:
 
 - A pressure states its kind: ``psi_g`` gauge, ``psi_a`` absolute, ``psi_d`` a difference. The suffix works with every
   unit of pressure, including quotients. ``psi`` alone is refused, except inside a compound such as ``N m/psi``. In SI
   a level is ``Pa_a`` and a difference ``Pa_d``.
 - An angle is a dimension: ``75`` is no angle, ``75 deg`` is, and ``rad/s`` is not ``Hz``.
 - ``4 SI`` is the number 4 in the SI unit of the quantity to which it is assigned. Programs write their numbers so.
-- Only the units listed in ``definitions.py`` exist. A short list turns a misspelling into an error and shortens the
-  start. Common other spellings are converted in ``spelling.py``.
-
-A volume flow becomes a mass flow by its reference condition and gas (``reference.py``): ``L/min (ANR, air)``.
+- A volume flow becomes a mass flow by its reference condition and gas: ``L/min (ANR, air)``.
 
 >>> pressure = parse_quantity("65 psi_g", "Pa_a")
 >>> f"{pressure:.0f} Pa absolute, {from_si(pressure, 'psi_g', 'Pa_a', 101325.0):.0f} psi gauge"
 '549484 Pa absolute, 65 psi gauge'
 """
 
-from ppafo.units.definitions import ParsedUnit, known_units, unit_by_pint
-from ppafo.units.quantity import (
-    SI,
-    base_value,
-    check_unit,
-    conversion,
-    dimension,
-    format_quantity,
-    from_si,
-    number_text,
-    parse_quantity,
-    percentage,
-    split_number,
-    split_quantity,
-    to_si,
-    without_exponent,
-)
-from ppafo.units.reference import flow_of, is_volume_flow, with_condition
-from ppafo.units.spelling import split_pressure_kind
+import contextlib
+import difflib
+import functools
+import math
+import re
+from collections.abc import Iterable, Iterator
+from decimal import Decimal
+from itertools import islice
 
-__all__ = [
-    "SI",
-    "ParsedUnit",
-    "base_value",
-    "check_unit",
-    "conversion",
-    "dimension",
-    "flow_of",
-    "format_quantity",
-    "from_si",
-    "is_volume_flow",
-    "known_units",
-    "number_text",
-    "parse_quantity",
-    "percentage",
-    "split_number",
-    "split_pressure_kind",
-    "split_quantity",
-    "to_si",
-    "unit_by_pint",
-    "with_condition",
-    "without_exponent",
-]
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import UnitError
+from ppafo.units.definitions import DECIMALS, ParsedUnit, UnknownUnitError, names
+from ppafo.units.reference import MASS_FLOW, flow_of, is_volume_flow, read_unit, without_condition
+from ppafo.units.spelling import as_product, quote
+from ppafo.units.spelling import split_pressure_kind as split_pressure_kind
+
+SI = "SI"
+"""Unit of a number that is in SI units already, for any quantity; written by programs."""
+LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
+KINDS = {"g": "gauge pressure", "a": "absolute pressure", "d": "pressure difference"}
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)
+_DECIMAL_COMMA = re.compile(r"([+-]?\d+),(\d+)(?![\d,.])", re.ASCII)
+_NEEDED = {
+    LEVEL: "a pressure level is needed, for example '50 psi_g' or '446 kPa_a'",
+    DIFFERENCE: "a pressure difference is needed, for example '5 psi_d'",
+    "rad": "an angle is needed, for example '75 deg' or '1.3 rad'",
+    "m^3/(s Pa)": (
+        "a sonic conductance is needed, such as '1 L/(s bar)', a flow per pressure before the valve; a nominal "
+        "flow q from p1 to p2 (absolute) is C = q/(p1 sqrt(1 - ((p2/p1 - b)/(1 - b))^2)), with b = critical_ratio"
+    ),
+    "": "a plain number without a unit is needed",
+}
+"""Statements of what is needed in place of a wrong unit, by SI unit."""
+
+
+def split_quantity(text: str) -> tuple[float, str]:
+    """Split a text such as ``12.6mm^2``, ``50 psi_g`` or ``0.4 1/s`` into number and unit, which may be empty."""
+    value, unit = split_number(text)
+    check_unit(unit)
+    return value, unit
+
+
+def split_number(text: str) -> tuple[float, str]:
+    """Split a text into number and unit, without a check of the unit.
+
+    For callers that know the wanted unit and raise a more specific error.
+    """
+    stripped = text.strip()
+    match = _NUMBER.match(stripped)
+    if match is None:
+        raise UnitError(f"{quote(text)} does not start with a number; write for example '12.6 mm^2' or '50 psi_g'")
+    if comma := _DECIMAL_COMMA.match(stripped):
+        rest = stripped[comma.end() :].strip()
+        whole = f" or '{f'{comma[1]}{comma[2]} {rest}'.rstrip()}'" if len(comma[2]) == 3 else ""
+        pointed = f"{comma[1]}.{comma[2]} {rest}".rstrip()
+        raise UnitError(f"{quote(text)} has a comma in its number; write '{pointed}'{whole}")
+    value = _finite(float(match.group()), text)
+    # float() rounds 1e-400 to 0 without a word, and 0 often means "none" in a file.
+    if value == 0.0 and _NOT_ZERO.match(match.group()):
+        raise UnitError(
+            f"{quote(text)} is too close to 0 for a 64-bit number and would become 0; write 0 or a larger number"
+        )
+    return value, stripped[match.end() :].strip()
+
+
+def parse_quantity(text: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Convert a text to a number in ``si_unit``; gauge pressures are relative to ``atmosphere`` [Pa absolute]."""
+    return to_si(*split_number(text), si_unit, atmosphere)
+
+
+def to_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Convert a value to ``si_unit``: ``Pa_a`` for a pressure level, ``Pa_d`` for a pressure difference."""
+    scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
+    exact = DECIMALS.fma(_decimal(value), scale, offset)
+    return _finite(float(exact) + (atmosphere if counts_from_atmosphere else 0.0), f"{value:g} {unit}")
+
+
+def from_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Convert an SI value to ``unit``, the inverse of ``to_si``."""
+    scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
+    above = _finite(value, value) - (atmosphere if counts_from_atmosphere else 0.0)
+    return float(DECIMALS.divide(DECIMALS.subtract(_decimal(above), offset), scale))
+
+
+def base_value(value: float, unit: str) -> float:
+    """Convert a value in any unit to base units (m, kg, s, K, mol, rad)."""
+    parsed = _read(unit, None)
+    exact = DECIMALS.fma(_decimal(value), parsed.scale, parsed.offset)
+    return float(exact) + (STANDARD_ATMOSPHERE if parsed.kind == "g" else 0.0)
+
+
+def dimension(unit: str) -> dict[str, int]:
+    """Return the dimension of a unit as powers of base dimensions such as ``[mass]`` and ``[angle]``."""
+    return dict(_read(unit, None).dimensions)
+
+
+def check_unit(unit: str, near: str | None = None) -> None:
+    """Check that a unit exists and is written like ``kg`` or ``m^3/(s Pa)``. Raises UnitError if not."""
+    if unit != SI:
+        _read(unit, near)
+
+
+@functools.lru_cache(maxsize=512)
+def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
+    """Return scale and offset to an SI unit, and a flag to add the atmosphere."""
+    if unit == SI:
+        return Decimal(1), Decimal(0), False
+    wanted, needed = read_unit(si_unit), _NEEDED.get(si_unit, f"a unit like '{si_unit}' is needed")
+    flow, is_volume = flow_of(unit), False
+    with contextlib.suppress(UnitError):
+        # Without the gas and condition that make it a mass flow.
+        is_volume = not flow.is_stated and is_volume_flow(unit)
+    if is_volume and wanted.dimensions == MASS_FLOW:
+        raise UnitError(without_condition(unit))
+    if is_volume and flow.is_normal:
+        raise UnitError(f"unit '{unit}' does not fit: {needed}")
+    given = _read(unit, si_unit)
+    if given.dimensions != wanted.dimensions:
+        # KHz, kelvin times hertz, is meant as kHz.
+        words = [] if given.kind else re.findall(r"[A-Za-z]+", unit)
+        meant = [near for name in words for near in _fitting(name, _in_other_case(name), unit, si_unit)]
+        said = f"unit '{unit}'" if unit else "a number without a unit"
+        raise UnitError(f"{said} does not fit{_asked(meant)}: {needed}")
+    if si_unit in (LEVEL, DIFFERENCE):
+        if not given.kind:
+            ways = f"{unit}_g for gauge or {unit}_a for absolute" if si_unit == LEVEL else f"{unit}_d for a difference"
+            raise UnitError(f"'{unit}' needs the kind of pressure: write {ways}")
+        if (given.kind == "d") != (si_unit == DIFFERENCE):
+            raise UnitError(f"'{unit}' is a {KINDS[given.kind]}, {needed}")
+    offset = DECIMALS.divide(DECIMALS.subtract(given.offset, wanted.offset), wanted.scale)
+    return DECIMALS.divide(given.scale, wanted.scale), offset, given.kind == "g" and si_unit == LEVEL
+
+
+def _read(unit: str, si_unit: str | None) -> ParsedUnit:
+    """Parse a unit. UnitError for an unknown one suggests units compatible with ``si_unit``.
+
+    Without ``si_unit`` only units that differ in upper and lower case are suggested.
+    """
+    try:
+        return read_unit(unit)
+    except UnknownUnitError as error:
+        name = error.name
+        # nm for N m: a force has a capital letter.
+        same = [*_in_other_case(name), as_product(name.capitalize()), f"deg{name}" if si_unit is not None else ""]
+        near = difflib.get_close_matches(name, sorted(names()), 12) if si_unit is not None else []
+        meant = [*_fitting(name, same, unit, si_unit)] or [*islice(_fitting(name, near, unit, si_unit), 1)]
+        raise UnknownUnitError(name, _asked(meant)) from error
+
+
+def _in_other_case(name: str) -> list[str]:
+    return sorted(known for known in names() if known.lower() == name.lower() and known != name)
+
+
+def _fitting(name: str, others: Iterable[str], unit: str, si_unit: str | None) -> Iterator[str]:
+    """Yield ``unit`` with ``name`` replaced by each other name that makes it a unit of ``si_unit``, if given."""
+    for other in dict.fromkeys(filter(None, others)):
+        meant = re.sub(rf"(?<![A-Za-z]){re.escape(name)}(?![A-Za-z])", other, unit)
+        with contextlib.suppress(UnitError):
+            parsed = read_unit(meant)
+            if si_unit is None or parsed.dimensions == read_unit(si_unit).dimensions:
+                kinds = {LEVEL: "ga", DIFFERENCE: "d", None: "gad"}.get(si_unit, "")
+                is_open = parsed.is_pressure and not parsed.kind
+                yield " or ".join(f"'{meant}_{kind}'" for kind in kinds if is_open) or f"'{meant}'"
+
+
+def _asked(meant: list[str]) -> str:
+    return f", did you mean {' or '.join(meant)}?" if meant else ""
+
+
+def _decimal(value: float) -> Decimal:
+    return Decimal(repr(float(_finite(value, value))))
+
+
+def _finite(value: float, shown: object) -> float:
+    if not math.isfinite(value):
+        raise UnitError(f"{quote(shown)} is not a finite number")
+    return value
+
+
+def format_quantity(value: float, unit: str) -> str:
+    """Format value and unit as text, which ``split_quantity`` reads back exactly."""
+    return f"{repr(float(value)).removesuffix('.0')} {unit}".rstrip()

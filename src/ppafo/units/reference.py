@@ -18,125 +18,131 @@ from ppafo.constants import (
     STANDARD_REFERENCE_TEMPERATURE,
 )
 from ppafo.errors import UnitError
-from ppafo.units.definitions import DECIMALS, PRESSURE, ParsedUnit, parse_unit
-from ppafo.units.spelling import says_kind
+from ppafo.units.definitions import DECIMALS, ParsedUnit
+from ppafo.units.spelling import KIND_WORD, parse_unit
 from ppafo.wording import nearest_name
 
-MASS_FLOW = {"[mass]": 1, "[time]": -1}
-VOLUME_FLOW = {"[length]": 3, "[time]": -1}
-_MOLAR_MASS = {"[mass]": 1, "[substance]": -1}
-
-
-class Condition(NamedTuple):
-    """Reference condition of a gas volume: temperature [K], pressure [Pa absolute], humid as in ISO 8778 or dry."""
-
-    temperature: float
-    pressure: float
-    is_humid: bool = False
-
-
-_ANR = Condition(STANDARD_REFERENCE_TEMPERATURE, 1.0e5, is_humid=True)
-CONDITIONS: dict[str, Condition] = {
-    "ANR": _ANR,
-    "ISO 8778": _ANR,
-    "ISO 6358": _ANR,
-    "DIN 1343": Condition(273.15, STANDARD_ATMOSPHERE),
-    "ISO 2533": Condition(288.15, STANDARD_ATMOSPHERE),
+MASS_FLOW, VOLUME_FLOW = {"[mass]": 1, "[time]": -1}, {"[length]": 3, "[time]": -1}
+_MOLAR_MASS, _TEMPERATURE = {"[mass]": 1, "[substance]": -1}, {"[temperature]": 1}
+_CONDITIONS = {
+    **dict.fromkeys(("ANR", "ISO 8778", "ISO 6358"), (STANDARD_REFERENCE_TEMPERATURE, 1.0e5, True)),
+    "DIN 1343": (273.15, STANDARD_ATMOSPHERE, False),
+    "ISO 2533": (288.15, STANDARD_ATMOSPHERE, False),
 }
-"""Reference conditions by name: pneumatics, normal litres, standard atmosphere at sea level."""
-
-_BEHIND = re.compile(r"(?P<flow>.*[^/ ]) *\((?P<words>[^()]*)\)|(?P<bare>.*[^/ ])[ _]+(?P<name>ANR)")
+"""Temperature [K], pressure [Pa] and humidity of pneumatics, of normal litres, of the atmosphere at sea level."""
+_GASES = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}
+_QUANTITY = re.compile(r"\s*([+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
+_AS_AIR = 5.0e-3
+"""Relative deviation from the molar mass of air [-] within which a gas counts as air."""
+# What stands behind bar (abs) or kgf/cm^2 (g) is no condition.
+_BEHIND = re.compile(
+    rf"(?P<flow>.*[^/ ]) *\((?!(?i:{KIND_WORD})\.?\))(?P<words>[^()]*)\)|(?P<bare>.*[^/ ])[ _]+(?P<name>ANR)"
+)
 _NORMAL = re.compile(
     r"(?:(?i:std\.?|standard|norm\.?|normal) +|[NSns](?=c?m\^?[23³]/|[lL]/|cc/))(?P<volume>[^ ]+/.+)"
-    r"|(?P<milli>m?)[lL](?:[ns]|\(n\))/(?P<per>\w+)"
-    r"|(?P<word>[NnSs][lL]p?m|[NS]LP?M|[Ss][Cc][Cc][Mm]|[Ss][Cc][Ff][MmHh])"
+    r"|(?P<milli>m?)[lL](?:[ns]|\(n\))(?P<per>/\w+)|[NnSs](?P<word>[lL]p?m|LP?M|(?i:ccm|cf[mh]))"
 )
-_WORDS = {"ccm": "cm^3/min", "cfm": "ft^3/min", "cfh": "ft^3/h"}
 _EXAMPLE = "70 degF, 14.696 psi_a"
 
 
-def flow_of(unit: str) -> tuple[str, str, bool]:
-    """Split a unit into volume flow, words after it, and a flag for normal or standard flow.
+class Flow(NamedTuple):
+    """Unit as written and as a flow without the word for normal; reference condition and gases, empty if not stated."""
 
-    The words are the condition and the gas, if given; otherwise empty.
-    """
-    text = unit.strip()
-    behind = _BEHIND.fullmatch(text)
-    flow = text if behind is None else behind["flow"] or behind["bare"]
-    words = "" if behind is None else behind["words"] or behind["name"] or ""
-    # What stands behind bar (abs) or kgf/cm^2 (g) is no condition.
-    if words and says_kind(text):
-        return text, "", False
-    normal = _NORMAL.fullmatch(flow)
-    if normal is None:
-        return flow, words, False
-    if normal["word"]:
-        word = normal["word"].lower()
-        return _WORDS.get(word[1:], "L/min"), words, True
-    return normal["volume"] or f"{normal['milli']}L/{normal['per']}", words, True
+    name: str
+    unit: str
+    is_normal: bool = False
+    condition: str = ""
+    gases: tuple[str, ...] = ()
+
+    @property
+    def is_stated(self) -> bool:
+        """Return whether a condition or a gas is stated."""
+        return bool(self.condition or self.gases)
+
+
+def flow_of(unit: str) -> Flow:
+    """Split a unit into volume flow, whether it is a normal or standard one, condition and gases."""
+    text, words = unit.strip(), ""
+    if match := _BEHIND.fullmatch(text):
+        text, words = match["flow"] or match["bare"], match["words"] or match["name"] or ""
+    said = [word.strip() for word in _split(words) if word.strip()]
+    gases = tuple(word for word in said if word.lower() in _GASES or word.endswith("/mol"))
+    flow, normal = text, _NORMAL.fullmatch(text)
+    if normal:
+        flow = (normal["word"] or "").upper() or normal["volume"] or f"{normal['milli']}L{normal['per']}"
+    return Flow(text, flow, normal is not None, ", ".join(word for word in said if word not in gases), gases)
+
+
+def _split(words: str) -> list[str]:
+    """Split words at commas, semicolons or 'and'; a comma between digits is a decimal comma."""
+    return re.split(r"(?<!\d),|,(?!\d)|;|\band\b|&|@", words)
 
 
 def is_volume_flow(unit: str) -> bool:
     """Return whether a unit is a volume per time, with or without condition. Raises UnitError if invalid."""
-    flow, _, is_normal = flow_of(unit)
-    return is_normal or parse_unit(flow)[0].dimensions == VOLUME_FLOW
+    flow = flow_of(unit)
+    return flow.is_normal or parse_unit(flow.unit).dimensions == VOLUME_FLOW
 
 
 def with_condition(unit: str, condition: str, gas: str) -> str:
-    """Add reference condition and gas to a unit of volume flow."""
-    flow, words, is_normal = flow_of(unit)
-    place, own = condition_and_gases(words)
-    name = unit.strip() if not words else unit.strip().removesuffix(")").removesuffix(words).rstrip(" (_")
-    whole = ", ".join(filter(None, (place or condition, *(own or (gas,)))))
-    return f"{name if is_normal else flow} ({whole})" if whole else unit
+    """Add reference condition and gas to a unit of volume flow that does not state them."""
+    flow = flow_of(unit)
+    whole = ", ".join(filter(None, (flow.condition or condition, *(flow.gases or (gas,)))))
+    return f"{flow.name} ({whole})" if whole else unit
 
 
-def read_unit(unit: str) -> tuple[ParsedUnit, str]:
-    """Parse a unit with the kind of a pressure; a volume flow with condition and gas becomes a mass flow.
+def read_unit(unit: str) -> ParsedUnit:
+    """Parse a unit; a volume flow with condition and gas becomes a mass flow.
 
     Raises UnitError for an invalid unit, a normal flow without condition, and a condition without gas.
     """
-    flow, words, is_normal = flow_of(unit)
-    if not words and not is_normal:
-        return parse_unit(unit)
-    parsed, _ = parse_unit(flow)
-    if parsed.dimensions != VOLUME_FLOW:
-        if is_normal:
-            return parse_unit(unit)
+    flow = flow_of(unit)
+    is_volume = (flow.is_stated or flow.is_normal) and parse_unit(flow.unit).dimensions == VOLUME_FLOW
+    if flow.is_stated and not is_volume:
         raise UnitError(f"'{unit}': a reference condition belongs to a volume flow, such as 'L/min (ANR, air)'")
-    if not words:
+    if not is_volume:
+        return parse_unit(unit)
+    if not flow.is_stated:
         raise UnitError(without_condition(unit))
-    place, gases = condition_and_gases(words)
-    condition = condition_of(place, unit)
-    if len(gases) != 1:
-        example = with_condition(unit, "", "air") if not gases else "L/min (ANR, air)"
+    temperature, pressure, is_humid = _condition_of(flow.condition, unit)
+    if len(flow.gases) != 1:
+        example = with_condition(unit, "", "air") if not flow.gases else "L/min (ANR, air)"
         raise UnitError(
-            f"'{unit}' {'states no gas' if not gases else 'states two gases'}: write one gas, for example '{example}'; "
+            f"'{unit}' states {'two gases' if flow.gases else 'no gas'}: write one gas, for example '{example}'; "
             f"allowed: {', '.join(MOLAR_MASSES)}, or a molar mass in kg/mol"
         )
-    factor = Decimal(repr(density(condition, _molar_mass(gases[0]))))
-    return ParsedUnit(DECIMALS.multiply(parsed.scale, factor), Decimal(0), MASS_FLOW), ""
+    mass = _molar_mass(flow.gases[0])
+    density = pressure * mass / (MOLAR_GAS_CONSTANT * temperature)
+    density = STANDARD_REFERENCE_DENSITY_AIR if is_humid and _is_air(mass) else density
+    scale = DECIMALS.multiply(parse_unit(flow.unit).scale, Decimal(repr(density)))
+    return ParsedUnit(scale, Decimal(0), MASS_FLOW)
 
 
 def molar_mass_in(unit: str) -> float | None:
-    """Return the molar mass [kg/mol] of the gas that a unit of flow states, such as air in 'L/min (ANR, air)'.
-
-    None for a unit without a gas.
-    """
-    gases = condition_and_gases(flow_of(unit)[1])[1]
+    """Return the molar mass [kg/mol] of the gas that a unit of flow states, or None, as for 'L/min (ANR)'."""
+    gases = flow_of(unit).gases
     return _molar_mass(gases[0]) if gases else None
 
 
 def _molar_mass(word: str) -> float:
     """Return the molar mass [kg/mol] of a gas, given by name or as a molar mass with unit."""
-    known = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}.get(word.lower())
-    if known is not None:
-        return known
-    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(\S+)\s*", word)
-    of_gas = None if match is None else parse_unit(match[2])[0]
-    if match is None or of_gas is None or of_gas.dimensions != _MOLAR_MASS or not float(match[1]) > 0.0:
+    if word.lower() in _GASES:
+        return _GASES[word.lower()]
+    masses = [value for value, unit in _quantities([word]) if unit.dimensions == _MOLAR_MASS and value > 0.0]
+    if not masses:
         raise UnitError(f"'{word}' is not a molar mass, such as '0.044 kg/mol'")
-    return float(of_gas.in_base(Decimal(match[1])))
+    return masses[0]
+
+
+def _quantities(words: list[str]) -> list[tuple[float, ParsedUnit]]:
+    """Return the value in base units and the unit of each word that is a number with a unit."""
+    matches = [match for word in words if (match := _QUANTITY.fullmatch(word))]
+    numbers = [(Decimal(match[1].replace(",", ".")), parse_unit(match[2])) for match in matches]
+    return [(float(DECIMALS.fma(number, unit.scale, unit.offset)), unit) for number, unit in numbers]
+
+
+def _is_air(molar_mass: float) -> bool:
+    return abs(molar_mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR
 
 
 def without_condition(unit: str, gas: str = "") -> str:
@@ -145,9 +151,8 @@ def without_condition(unit: str, gas: str = "") -> str:
     ``gas`` is the gas of the bench by name or molar mass, empty if unknown.
     """
     named, normal, own = (with_condition(unit, at, "air") for at in ("ANR", "DIN 1343", _EXAMPLE))
-    other = f"where the gas is {gas}" if gas else "with another gas"
-    is_air = bool(gas) and abs(_molar_mass(gas) / MOLAR_MASSES["air"] - 1.0) < _AS_AIR
-    too = "" if is_air else f"; in a [[procedure]] {other}, give gas = 'air' too"
+    bench = f"where the gas is {gas}" if gas else "with another gas"
+    too = "" if gas and _is_air(_molar_mass(gas)) else f"; in a [[procedure]] {bench}, give gas = 'air' too"
     return (
         f"'{unit}' is a volume flow, which is a mass flow only with a reference condition and a gas: write '{named}' "
         f"(20 degC, 1 bar), '{normal}' (0 degC, 1.01325 bar) or '{own}', as in the data sheet of the meter; in a "
@@ -155,53 +160,20 @@ def without_condition(unit: str, gas: str = "") -> str:
     )
 
 
-def density(condition: Condition, molar_mass: float) -> float:
-    """Return the density of an ideal gas [kg/m^3], ``p M/(R T)``; for air at ANR the density of ISO 6358."""
-    if condition.is_humid and abs(molar_mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR:
-        return STANDARD_REFERENCE_DENSITY_AIR
-    return condition.pressure * molar_mass / (MOLAR_GAS_CONSTANT * condition.temperature)
-
-
-_AS_AIR = 5.0e-3
-"""Relative deviation from the molar mass of air [-] within which a gas counts as air."""
-
-
-def condition_of(text: str, unit: str) -> Condition:
+def _condition_of(text: str, unit: str) -> tuple[float, float, bool]:
     """Parse a reference condition: a name, or temperature and pressure. Raises UnitError for other text."""
     name = re.sub(r"[\s_-]+", " ", text).upper()
-    if name in CONDITIONS:
-        return CONDITIONS[name]
-    temperature = pressure = None
-    for word in _split(text):
-        match = re.fullmatch(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*(\S.*?)\s*", word)
-        if match is None:
-            break
-        parsed, kind = parse_unit(match[2])
-        value = parsed.in_base(Decimal(match[1].replace(",", ".")))
-        if parsed.dimensions == {"[temperature]": 1} and value > 0:
-            temperature = float(value)
-        elif parsed.dimensions == PRESSURE and kind in ("", "a") and value > 0:
-            pressure = float(value)
-        else:
-            break
-    else:
-        if temperature is not None and pressure is not None:
-            return Condition(temperature, pressure)
-    names = ", ".join(CONDITIONS)
+    if name in _CONDITIONS:
+        return _CONDITIONS[name]
+    words = _split(text)
+    values = {
+        unit.is_pressure: value
+        for value, unit in _quantities(words)
+        if (unit.is_pressure or unit.dimensions == _TEMPERATURE) and unit.kind in ("", "a")
+    }
+    if len(values) == len(words) == 2 and min(values.values()) > 0.0:
+        return values[False], values[True], False
     raise UnitError(
-        f"'{unit}': '{text}' is not a reference condition{nearest_name(name, CONDITIONS)}; use {names}, or a "
-        f"temperature and an absolute pressure, such as '{_EXAMPLE}'"
+        f"'{unit}': '{text}' is not a reference condition{nearest_name(name, _CONDITIONS)}; use "
+        f"{', '.join(_CONDITIONS)}, or a temperature and an absolute pressure, such as '{_EXAMPLE}'"
     )
-
-
-def _split(words: str) -> list[str]:
-    """Split words at commas, semicolons or 'and'; a comma between digits is a decimal comma."""
-    return re.split(r"(?<!\d),|,(?!\d)|;|\band\b|&|@", words)
-
-
-def condition_and_gases(words: str) -> tuple[str, list[str]]:
-    """Split the words after a flow into reference condition, and gases or molar masses."""
-    said = [word.strip() for word in _split(words) if word.strip()]
-    known = [name.lower() for name in MOLAR_MASSES]
-    gases = [word for word in said if word.lower() in known or word.endswith("/mol")]
-    return ", ".join(word for word in said if word not in gases), gases

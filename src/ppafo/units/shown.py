@@ -1,9 +1,7 @@
 """Display units: unit as given, else unit of the parameter set, else default of the package.
 
-``QUANTITIES`` is the only table of display units, and ``shown_text`` writes a number in its display unit. Files and
-data stay in SI. Gauge pressures are relative to the atmosphere of the device. This zero is stored with the units, so
-that text, tables, axes and saved results, which store both as ``shown``, use the same one. Outside of ``shown_in`` the
-defaults of the package apply.
+Files and data stay in SI. Gauge pressures are relative to the atmosphere of the device, which is stored with the units:
+text, tables, axes and saved results use the same one.
 """
 
 import functools
@@ -15,20 +13,15 @@ from types import MappingProxyType
 from typing import NamedTuple, ParamSpec, TypeVar
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.units.quantity import from_si, without_exponent
-from ppafo.units.spelling import split_pressure_kind
-from ppafo.wording import set_within
+from ppafo.units import from_si, split_pressure_kind
+from ppafo.wording import set_within, without_exponent
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
 class Units(NamedTuple):
-    """SI unit of a quantity, and its default display unit.
-
-    ``zero`` [SI] is the accuracy of computed values: magnitudes up to it are rounding errors and displayed as 0. It is
-    0 for quantities that are given and not computed.
-    """
+    """SI unit of a quantity, its default display unit, and the magnitude [SI] up to which a computed value is 0."""
 
     si: str
     shown: str
@@ -79,10 +72,6 @@ _OF_UNIT = {
 """Kind of quantity by SI unit."""
 _WRITTEN = {"Pa": "Pa_a", "-": "1"}
 """Unit as written in files, by unit of a metric or channel."""
-_PER_PRESSURE = {"N/Pa": "N", "N m/Pa": "N m"}
-"""SI unit of the numerator of each quantity per pressure."""
-_DIGITS = 9
-"""Significant digits of written numbers, free of rounding errors of the unit conversion."""
 GAUGE_ZERO = "gauge_zero"
 """Key of the absolute pressure displayed as gauge zero, among display units by SI unit."""
 
@@ -108,19 +97,14 @@ def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R
     return decorate
 
 
-def pressure_units(level: str) -> dict[str, str]:
-    """Return the display units of pressure levels and differences for a level unit such as ``bar_g``."""
-    unit, kind = split_pressure_kind(level)
-    return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
-
-
 def units_beside(si_unit: str, unit: str) -> dict[str, str]:
     """Return the display units implied by ``unit`` for quantities of ``si_unit``, by SI unit.
 
     With levels in ``bar_g`` differences are in ``bar_d``, with angles in ``deg`` angular velocities in ``deg/s``.
     """
     if si_unit == "Pa_a":
-        return pressure_units(unit)
+        pressure, kind = split_pressure_kind(unit)
+        return {"Pa_a": f"{pressure}_{kind}", "Pa_d": f"{pressure}_d"}
     return {si_unit: unit, "rad/s": f"{unit}/s"} if si_unit == "rad" else {si_unit: unit}
 
 
@@ -141,11 +125,7 @@ def units_in_force() -> dict[str, str]:
 
 
 def quantity_of_unit(si_unit: str) -> str:
-    """Return the kind of quantity of an SI unit; empty for a plain number or a unit without display unit.
-
-    ``kg`` is a mass and ``s`` a time. Masses of gas and of parts, displayed in grams, and durations in minutes must be
-    named explicitly.
-    """
+    """Return the kind of quantity of an SI unit, none of ``NAMED``; empty if it has no display unit."""
     return _OF_UNIT.get(si_unit, "")
 
 
@@ -160,8 +140,8 @@ def shown_unit(si_unit: str) -> str:
     chosen, si_unit = _chosen.get(), _WRITTEN.get(si_unit, si_unit)
     if si_unit in chosen:
         return chosen[si_unit]
-    if si_unit in _PER_PRESSURE:
-        return f"{shown_unit(_PER_PRESSURE[si_unit])}/{shown_unit('Pa_d').removesuffix('_d')}"
+    if si_unit in ("N/Pa", "N m/Pa"):
+        return f"{shown_unit(si_unit.removesuffix('/Pa'))}/{shown_unit('Pa_d').removesuffix('_d')}"
     return usual_unit(si_unit)
 
 
@@ -186,10 +166,7 @@ def shown_value(
 
 
 def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float | None = None, unit: str = "") -> str:
-    """Format an SI value in its display unit; a value within the accuracy of a run is 0.
-
-    ``unit`` is the unit in which the value was given, if known. Gauge pressures are relative to ``atmosphere`` [Pa
-    absolute].
+    """Format an SI value in ``unit``, else in its display unit; a value within the accuracy of a run is 0.
 
     >>> shown_text(5.201e-4, "m^2"), shown_text(4.0e5, "Pa_a", unit="bar_a"), shown_text(1.0e-17, "N m")
     ('520.1 mm^2', '4 bar_a', '0 N m')
@@ -202,11 +179,11 @@ def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float 
 
 
 def written_text(value: float, si_unit: str) -> str:
-    """Format an SI value in its display unit for reading back, without conversion errors.
+    """Format an SI value in its display unit for reading back, in nine digits without conversion errors.
 
     >>> written_text(206842.71879504 + 101325.0, "Pa_a"), written_text(3.929e-9, "m^3/(s Pa)")
     ('30 psi_g', '0.3929 L/(s bar)')
     """
     unit = shown_unit(si_unit)
     number = shown_value(value, si_unit, unit)
-    return f"{float(f'{number:.{_DIGITS}g}')!r}".removesuffix(".0") + f" {unit}".rstrip()
+    return f"{float(f'{number:.9g}')!r}".removesuffix(".0") + f" {unit}".rstrip()

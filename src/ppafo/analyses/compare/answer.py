@@ -23,8 +23,7 @@ from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import Floats
 from ppafo.studies.intervals import fraction_text, is_carried
 from ppafo.study.runs import Rows
-from ppafo.units import without_exponent
-from ppafo.wording import count_of, said_of_configuration
+from ppafo.wording import count_of, said_of_configuration, without_exponent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

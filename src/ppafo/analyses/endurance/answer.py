@@ -19,7 +19,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units import format_quantity
-from ppafo.units.shown import in_units, pressure_units
+from ppafo.units.shown import in_units, units_beside
 from ppafo.version import __version__
 from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.bottle.course import duration_text, strides_text
@@ -56,7 +56,7 @@ class Endurance:
     @property
     def shown(self) -> dict[str, str]:
         """Display units by SI unit: of the device if it is known, otherwise of the bottle file."""
-        return pressure_units(self.bottle.entries["regulator.set_pressure"].unit) | dict(self.device_units)
+        return units_beside("Pa_a", self.bottle.entries["regulator.set_pressure"].unit) | dict(self.device_units)
 
     def json_document(self) -> dict[str, Any]:
         """Return time series, ending and bottle as plain data in SI units."""

@@ -25,9 +25,8 @@ from ppafo.report.panels import Panel
 from ppafo.report.residuals import FittedCurve, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.signals import Recording, RecordingKind
-from ppafo.units import percentage
 from ppafo.units.shown import counted_from, in_units
-from ppafo.wording import count_of
+from ppafo.wording import count_of, percentage
 
 _FAR = 2.0
 """Number of standard deviations above which a tolerance counts as contradicted by the recordings."""

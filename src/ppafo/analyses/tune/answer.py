@@ -21,9 +21,8 @@ from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILI
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.simulation.tracking.remarks import earlier_swing
 from ppafo.studies.intervals import fraction_text
-from ppafo.units import percentage, without_exponent
 from ppafo.units.shown import in_units, quantity_of_unit
-from ppafo.wording import count_of
+from ppafo.wording import count_of, percentage, without_exponent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

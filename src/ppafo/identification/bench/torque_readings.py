@@ -12,7 +12,7 @@ from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, ch
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.wording import in_shown_unit
 from ppafo.signals.recording import Floats
-from ppafo.units import percentage
+from ppafo.wording import percentage
 
 PROCEDURE = "static-torque"
 TORQUE, FORCE = "torque", "force"

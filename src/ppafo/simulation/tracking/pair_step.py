@@ -17,9 +17,8 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
 from ppafo.simulation.tracking.rule import REVERSALS, is_pair, most_reversals
 from ppafo.simulation.tracking.settled import smallest_change
-from ppafo.units import without_exponent
 from ppafo.units.shown import in_units
-from ppafo.wording import subject_text
+from ppafo.wording import subject_text, without_exponent
 
 if TYPE_CHECKING:
     from ppafo.simulation.at_hand import RecordedResult

@@ -19,8 +19,7 @@ from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chamber
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import LARGEST_SHARE
 from ppafo.simulation.tracking.settled import SettledPart
-from ppafo.units import without_exponent
-from ppafo.wording import override_text
+from ppafo.wording import override_text, without_exponent
 
 FASTEST_FIRST = (
     torque_loop.PROPORTIONAL_GAIN,

@@ -35,9 +35,8 @@ from ppafo.simulation.tracking.rule import (
 from ppafo.simulation.tracking.settled import settled_task, settled_walk
 from ppafo.simulation.tracking.shortfall import shortfall
 from ppafo.simulation.tracking.walk_causes import CAUSES_OF_WALK
-from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
-from ppafo.wording import override_text
+from ppafo.wording import override_text, without_exponent
 
 if TYPE_CHECKING:
     from ppafo.simulation.at_hand import RecordedResult
