@@ -6,6 +6,7 @@
 import math
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,8 @@ _CHECKED_SHARES = np.linspace(0.0, 1.0, 201)
 """Fractions of the angle range [-] at which curves are checked; at most 12 angles are measured."""
 _CLEAR = 1.0e-5
 """Margin of a moved curve above 0, in units of the last digit [-]."""
+_FELT = 0.01
+"""Standard deviation of the torque from which rounded volumes are smoothed, relative to the largest torque [-]."""
 _ROUNDING = 1.0e-9
 """Largest negative volume, or fall with pressure, that counts as rounding error, relative to the largest volume [-]."""
 
@@ -37,21 +40,21 @@ def read_actuator_table(path: Path) -> Table:
 def table_of(measured: MeasuredVolumes, file: str) -> Table:
     """Return the curves through measured volumes; ``file`` is the label used in messages.
 
-    If a curve would be negative between the angles or fall with the pressure, the volumes are moved within their last
-    digit, as little as possible. Raises ParameterError if moves within the last digit are not enough.
+    Volumes are moved within half of their last digit: if it matters to the torque, to the likeliest smooth curves, and
+    if a curve would be negative between the angles or fall with the pressure, as little as possible. Raises
+    ParameterError if moves within the last digit are not enough.
     """
     angles = measured.angles
     shares = (angles - angles[0]) / (angles[-1] - angles[0])
     # A bend at each angle but the first two and the last two, so that there are as many coefficients as angles.
     bends = shares[2:-2]
-    volume_1, _ = within_resolution(measured.volume_1, shares, measured.resolution_1)
-    chamber_1 = _chamber(volume_1, measured.pressures, shares)
+    first, second = _fitted_chambers(measured)
+    chamber_1 = _chamber(first.volume, measured.pressures, shares)
     _check_curves(chamber_1, bends, angles, "volume_1", file)
-    if measured.volume_2 is None:
+    if second is None:
         chamber_2 = TabulatedChamber(_NOTHING, tuple(rise._replace(gain=_NOTHING) for rise in chamber_1.rises))
     else:
-        volume_2, _ = within_resolution(measured.volume_2[::-1], 1.0 - shares[::-1], measured.resolution_2)
-        chamber_2 = _chamber(volume_2[::-1], measured.pressures, shares)
+        chamber_2 = _chamber(second.volume[::-1], measured.pressures, shares)
         _check_curves(chamber_2, bends, angles, "volume_2", file)
     return Table(
         first_angle=float(angles[0]),
@@ -63,56 +66,108 @@ def table_of(measured: MeasuredVolumes, file: str) -> Table:
     )
 
 
-def largest_move(path: Path) -> tuple[float, float]:
-    """Return the largest move of a volume in a file [m^3], and the last digit [m^3]; the move is 0 for exact curves."""
-    measured = read_measured_volumes(path)
+class FittedVolumes(NamedTuple):
+    """Volumes of a chamber [m^3] (angles, pressures) on admissible curves; ``resolution`` [m^3] is their last digit.
+
+    ``move`` is the largest move of a volume [m^3]; ``torque_error`` [-] is the largest standard deviation of the torque
+    that rounding leaves, at any angle and the highest pressure, relative to the largest torque.
+    """
+
+    volume: Floats
+    resolution: float
+    move: float
+    torque_error: float
+
+
+def rounding_of_table(path: Path) -> FittedVolumes:
+    """Return the fitted volumes of the chamber of a file in which rounding matters most to the torque."""
+    chambers = (chamber for chamber in _fitted_chambers(read_measured_volumes(path)) if chamber is not None)
+    return max(chambers, key=lambda chamber: (chamber.torque_error, chamber.move))
+
+
+def _fitted_chambers(measured: MeasuredVolumes) -> tuple[FittedVolumes, FittedVolumes | None]:
+    """Return the fitted volumes of both chambers; those of chamber 2 with falling angle, None if there is none."""
     shares = (measured.angles - measured.angles[0]) / (measured.angles[-1] - measured.angles[0])
-    _, first = within_resolution(measured.volume_1, shares, measured.resolution_1)
+    first = within_resolution(measured.volume_1, shares, measured.pressures, measured.resolution_1)
     if measured.volume_2 is None:
-        return first, measured.resolution_1
-    _, second = within_resolution(measured.volume_2[::-1], 1.0 - shares[::-1], measured.resolution_2)
-    return max((first, measured.resolution_1), (second, measured.resolution_2))
+        return first, None
+    turned, falling = 1.0 - shares[::-1], measured.volume_2[::-1]
+    return first, within_resolution(falling, turned, measured.pressures, measured.resolution_2)
 
 
-def within_resolution(volume: Floats, shares: Floats, resolution: float) -> tuple[Floats, float]:
-    """Return volumes [m^3] (angles, pressures) moved to give admissible curves, and the largest move [m^3].
+def within_resolution(volume: Floats, shares: Floats, pressures: Floats, resolution: float) -> FittedVolumes:
+    """Return volumes [m^3] (angles, pressures) moved to give admissible curves, by half of the last digit at most.
 
     Admissible curves are 0 or more, grow with the pressure and, at the highest pressure, grow from angle to angle.
-    Linear programming minimises the largest move. No volume is moved if more than half of the last digit ``resolution``
-    [m^3] would be needed.
+    Linear programming minimises the sum of the moves from the likeliest smooth curves. No volume is moved if more than
+    half of the last digit ``resolution`` [m^3] would be needed.
     """
     bends = shares[2:-2]
-    spline = _basis(_CHECKED_SHARES, bends)[:, : shares.size] @ np.linalg.inv(_basis(shares, bends)[:, : shares.size])
-    angles, pressures = volume.shape
-    rises = np.diff(np.eye(pressures), axis=0)
+    to_coefficients: Floats = np.linalg.inv(_basis(shares, bends)[:, : shares.size])
+    spline = _basis(_CHECKED_SHARES, bends)[:, : shares.size] @ to_coefficients
+    fitted, torque_error = _likeliest(volume, to_coefficients, bends, spline, pressures, resolution)
+    angles, count = volume.shape
+    rises = np.diff(np.eye(count), axis=0)
     rules = np.vstack(
         [
-            np.kron(spline, np.eye(pressures)[:1]),
+            np.kron(spline, np.eye(count)[:1]),
             *(np.kron(spline, rise[None, :]) for rise in rises),
-            np.kron(np.diff(np.eye(angles), axis=0), np.eye(pressures)[-1:]),
+            np.kron(np.diff(np.eye(angles), axis=0), np.eye(count)[-1:]),
         ]
     )
-    found = rules @ volume.ravel()
-    if resolution == 0.0 or found.min() >= -_ROUNDING * np.abs(volume).max():
-        return volume, 0.0
-    # SciPy is slow to load, and few tables need it.
-    from scipy.optimize import linprog
+    found = rules @ fitted.ravel()
+    if resolution > 0.0 and found.min() < -_ROUNDING * np.abs(volume).max():
+        # SciPy is slow to load, and few tables need it.
+        from scipy.optimize import linprog
 
-    size = volume.size
-    cost = np.append(np.zeros(size), 1.0)
-    # In last digits. A little more than 0, for the solver is exact to 1e-7.
-    limits = found / resolution - _CLEAR
-    rules = np.hstack([-rules, np.zeros((rules.shape[0], 1))])
-    moved = np.hstack([np.vstack([np.eye(size), -np.eye(size)]), -np.ones((2 * size, 1))])
-    solved = linprog(
-        cost,
-        A_ub=np.vstack([rules, moved]),
-        b_ub=np.append(limits, np.zeros(2 * size)),
-        bounds=[*[(-0.5, 0.5)] * size, (0.0, 0.5)],
-    )
-    if solved.status != 0:
-        return volume, 0.0
-    return volume + resolution * solved.x[:size].reshape(volume.shape), float(resolution * solved.x[-1])
+        size = volume.size
+        # In last digits. A little more than 0, for the solver is exact to 1e-7.
+        limits, moved = found / resolution - _CLEAR, ((fitted - volume) / resolution).ravel()
+        # Each move is the difference of two numbers of 0 or more, of which the sum is least.
+        solved = linprog(
+            np.ones(2 * size),
+            A_ub=np.hstack([-rules, rules]),
+            b_ub=limits,
+            bounds=[(0.0, end) for end in (*np.maximum(0.5 - moved, 0.0), *np.maximum(0.5 + moved, 0.0))],
+        )
+        fitted = (
+            volume if solved.status else fitted + resolution * (solved.x[:size] - solved.x[size:]).reshape(volume.shape)
+        )
+    return FittedVolumes(fitted, resolution, float(np.abs(fitted - volume).max()), torque_error)
+
+
+def _likeliest(
+    volume: Floats, to_coefficients: Floats, bends: Floats, spline: Floats, pressures: Floats, resolution: float
+) -> tuple[Floats, float]:
+    """Return the likeliest volumes [m^3] of smooth curves, and the standard deviation of the torque that is left [-].
+
+    Rounding is an error of resolution / sqrt(12). The third derivatives of the splines are taken as normal, of the
+    variance with the largest marginal likelihood. Volumes whose rounding does not matter to the torque stay.
+    """
+    # Torque at the highest pressure: the integral of dV/dangle over the pressure, here per angle range.
+    weights = 0.5 * (np.diff(pressures, prepend=pressures[0]) + np.diff(pressures, append=pressures[-1]))
+    weights = weights if pressures.size > 1 else np.ones(1)
+    slopes = np.gradient(spline, _CHECKED_SHARES, axis=0, edge_order=2)
+    largest = float(np.abs(slopes @ volume @ weights).max())
+    per_error = float(np.linalg.norm(weights)) / largest if largest > 0.0 else 0.0
+    noise = resolution / math.sqrt(12.0)
+    as_it_is = per_error * noise * float(np.linalg.norm(slopes, axis=1).max())
+    if as_it_is < _FELT or len(to_coefficients) < _POWERS:
+        return volume, as_it_is
+    lengths = np.diff(np.concatenate([[0.0], bends, [1.0]]))
+    third = np.cumsum(to_coefficients[3:], axis=0) * np.sqrt(lengths)[:, None]
+    roughness, modes = np.linalg.eigh(third.T @ third)
+    # Parabolas are smooth.
+    rough, amplitudes = roughness[3:], modes.T @ volume
+    squares = np.square(amplitudes[3:]).sum(axis=1)
+    variances = np.geomspace(1.0e-6, 1.0e6, 121)[:, None] * noise**2 * np.median(rough) / rough
+    totals = noise**2 + variances
+    costs = (squares / totals + pressures.size * np.log(totals)).sum(axis=1)
+    best = int(np.argmin(costs))
+    kept = np.concatenate([np.ones(3), variances[best] / totals[best]])
+    smoothed = modes @ (kept[:, None] * amplitudes)
+    left = per_error * noise * math.sqrt(float((np.square(slopes @ modes) @ kept).max()))
+    return volume + np.clip(smoothed - volume, -0.5 * resolution, 0.5 * resolution), left
 
 
 def measured_pressures(table: Table) -> tuple[float, float]:

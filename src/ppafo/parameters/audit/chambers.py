@@ -237,27 +237,36 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
     )
 
 
-# Were the numbers of a measured table moved within their last digit, so that its curves are those of a chamber?
+# What does the rounding of a measured table leave unknown of the torque?
+
+_FELT_TORQUE = 0.01
+"""Standard deviation of the torque, relative to the largest one [-], from which a rounded table is a warning."""
 
 
 def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield a note on the moves of the volumes of a rounded table."""
+    """Yield what the rounding of a measured table leaves unknown of the torque, where volumes were moved for it."""
     parameter_set = evidence.parameter_set
     path = Path(parameter_set.file).parent / parameter_set.actuator_file
     if parameter_set.actuator_table is None or not path.is_file():
         return
-    from ppafo.parameters.actuator_table import largest_move
+    from ppafo.parameters.actuator_table import rounding_of_table
 
-    moved, digit = largest_move(path)
-    if moved > 0.0:
+    rounding = rounding_of_table(path)
+    if rounding.move > 0.0:
+        digit, move, share = 1e6 * rounding.resolution, 1e6 * rounding.move, 2.0 * rounding.torque_error
         yield AuditFinding(
             id="rounded-table",
-            severity="note",
-            title="the measured volumes are rounded",
-            sides=(ComparedNumber("largest move", moved, "m^3"), ComparedNumber("last digit", digit, "m^3")),
+            severity="note" if rounding.torque_error < _FELT_TORQUE else "warning",
+            title=f"the measured volumes are rounded, which leaves the torque uncertain by {share:.1%}",
+            sides=(
+                ComparedNumber("largest move", rounding.move, "m^3"),
+                ComparedNumber("last digit", rounding.resolution, "m^3"),
+                ComparedNumber("relative standard deviation of the torque", rounding.torque_error, "1"),
+            ),
             paragraph=(
-                f"Between the angles of {parameter_set.actuator_file} the interpolated volumes would be negative or "
-                f"decrease with pressure. The volumes are shifted by {1e6 * moved:.2g} mL at most, "
-                f"within the rounding step of {1e6 * digit:.2g} mL of the file. Give more digits to avoid this."
+                f"The volumes of {parameter_set.actuator_file} are rounded to {digit:.2g} mL. Half a digit "
+                f"either way leaves up to {share:.1%} of the largest torque unknown (two standard deviations). They "
+                f"were moved by {move:.2g} mL at most, to curves that are smooth, nowhere negative, and grow with the "
+                "pressure. Give more digits to avoid this."
             ),
         )
