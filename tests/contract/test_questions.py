@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.analyses.endurance.solve import LONGEST
-from ppafo.analyses.linearise.solve import EQUILIBRIUM
+from ppafo.analyses.linearise.model import EQUILIBRIUM
 from ppafo.analyses.reproduce.publication import SEED
 from ppafo.cli import output
 from ppafo.cli.command_line import Command, CommandGroup, option_of, parameters_of
