@@ -12,6 +12,7 @@ from typing import Any
 
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import EFFECTS, VALVES
+from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
@@ -139,12 +140,19 @@ def over_layer(
     kind_paths = set(filter(_is_kind_path, later_paths))
     if not kind_paths:
         return tuple(combined.values())
-    changed = _with_preferred_paths(content, file, declared)
+    before, changed = (_with_preferred_paths(content, file, declared) for _ in range(2))
+    _choose_kinds(before, override_set(earlier, ScenarioError, declared.same), file, declared)
     _choose_kinds(changed, combined, file, declared)
-    known = later_paths.union(declared.paths(changed))
+    others = _of_other_units(declared.quantities(before), declared.quantities(changed))
+    known = later_paths.union(declared.paths(changed)) - (others - later_paths)
     return tuple(
         override for path, override in combined.items() if path in known or not deciding_kinds(path, kind_paths)
     )
+
+
+def _of_other_units(before: Mapping[str, Quantity], after: Mapping[str, Quantity]) -> set[str]:
+    """Return the paths that name quantities of different units before and after a change of a ``kind``."""
+    return {path for path in before.keys() & after.keys() if before[path].unit != after[path].unit}
 
 
 def _is_kind_path(path: str) -> bool:
@@ -227,12 +235,14 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
         if not isinstance(table, dict):
             raise ScenarioError(f"override '{path}={text}': {file} has no table [{section}]")
     if name == _KIND and table.get(_KIND) != text:
-        # What both kinds have stays as the document gives it.
-        old_names = _setting_names(document, section, declared)
+        # What both kinds have stays as the document gives it, unless it is another quantity by the same name.
+        old_names, of_old = _setting_names(document, section, declared), declared.quantities(document)
         table[_KIND] = text
-        new_names = _setting_names(document, section, declared)
-        for name_of_old_kind in old_names - new_names - _OF_ANY_KIND.get(section, frozenset()):
-            table.pop(name_of_old_kind, None)
+        new_names, of_new = _setting_names(document, section, declared), declared.quantities(document)
+        others = _of_other_units(of_old, of_new)
+        for name_of_old_kind in old_names - _OF_ANY_KIND.get(section, frozenset()):
+            if name_of_old_kind not in new_names or f"{section}.{name_of_old_kind}" in others:
+                table.pop(name_of_old_kind, None)
     # Area and conductance, rate and period: given in another form as well, a value would be there twice.
     for other in other_forms(path):
         table.pop(other.rpartition(".")[2], None)
