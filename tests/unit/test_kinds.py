@@ -132,7 +132,8 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
 def test_another_law_forgets_a_number_of_the_same_name_in_another_unit(monkeypatch: pytest.MonkeyPatch) -> None:
     pid, task, chosen = CONTROLLERS["pid"], "torque-task-proportional", "controller.kind=other"
     gains = [
-        replace(each, unit="1/s", default=2.0) if each.name == "integral_gain" else each for each in pid.quantities
+        replace(each, unit="1/s", default=2.0, follows=()) if each.name == "integral_gain" else each
+        for each in pid.quantities
     ]
     monkeypatch.setitem(CONTROLLERS, "other", replace(pid, name="other", quantities=tuple(gains)))
     later = with_overrides(load_scenario(task, ["controller.integral_gain=0.3 1/(N m s)"]), [chosen])
