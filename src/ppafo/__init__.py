@@ -55,7 +55,7 @@ _HOMES = {
     "ppafo.analyses.endurance.solve": ("endurance_of_walk",),
     "ppafo.analyses.identify.answer": ("Identification",),
     "ppafo.analyses.linearise.model": ("LinearModel",),
-    "ppafo.analyses.reproduce.result": ("Reproduction",),
+    "ppafo.analyses.reproduce.solve": ("Reproduction",),
     "ppafo.analyses.sets.audit": ("audit",),
     "ppafo.analyses.sweep.answer": ("load_study_results",),
     "ppafo.analyses.sweep.results": ("StudyResults",),
