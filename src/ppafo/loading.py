@@ -13,12 +13,12 @@ from ppafo.arguments import Overrides, checked
 from ppafo.documents.toml_text import assignments, beside, label, table_lines
 from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet
+from ppafo.parameters.declared import kind_at, schema_of
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import over, read_overrides
 from ppafo.plugins import Plugins, name_plugins, plugin_words
 from ppafo.simulation import loading as of_vanes
-from ppafo.simulation import schema
-from ppafo.simulation.document import ScenarioRequest, kind_at
+from ppafo.simulation.declaration import OF_A_VANE
 from ppafo.simulation.motion_kind import is_walk
 from ppafo.simulation.overrides import over_layer, override_document
 from ppafo.simulation.scenario import Scenario
@@ -79,10 +79,8 @@ def load_scenario(
         raise ScenarioError(
             f"there is no scenario or walk '{label(name)}'{known_names(name, known)}, or give a .toml file"
         )
-    document = of_vanes.FILE.parse(FILE.read(path), label(name))
-    given = read_overrides(overrides, ScenarioError)
-    request = ScenarioRequest(label(name), name, path.parent, document, given, parameter_set)
-    return of_vanes.scenario_of(request, _layout(document))
+    request = of_vanes.request_of_file(path, read_overrides(overrides, ScenarioError), parameter_set, FILE)
+    return of_vanes.scenario_of(request, _layout(request.content))
 
 
 @checked
@@ -142,7 +140,7 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
     before, custom = of_vanes.request_again(scenario.origin), scenario.controller.custom
     layout, later = _layout(before.content), read_overrides(more, ScenarioError)
     every = over_layer(
-        before.content, before.overrides, later, scenario.name, layout.declared, scenario.device.valve_name
+        before.content, before.overrides, later, scenario.name, layout.content, scenario.device.valve_name
     )
     read = of_vanes.scenario_of(replace(before, overrides=every), layout)
     return read if custom is None else read.controlled_by(custom)
@@ -163,9 +161,9 @@ _IN_FILE = "# or in the file of a scenario, in place of the tables of these name
 def _changed_tables(scenario: Scenario) -> Iterator[str]:
     """Yield the TOML lines of file tables changed by the overrides of a scenario."""
     request = of_vanes.request_again(scenario.origin)
-    declared = _layout(request.content).declared
+    content = _layout(request.content).content
     given, changed = (
-        override_document(request.content, overrides, request.file, declared) for overrides in ((), request.overrides)
+        override_document(request.content, overrides, request.file, content) for overrides in ((), request.overrides)
     )
     if changed.device:
         device = changed.document.setdefault("device", {})
@@ -183,13 +181,7 @@ def _changed_tables(scenario: Scenario) -> Iterator[str]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file, for a vane alone or a walking leg."""
-    from ppafo.walking import declaration as of_walks
+    from ppafo.walking.declaration import OF_A_WALK, load_kinds
 
-    definitions: dict[str, Any] = {}
-    for form, describe in (("vane", schema.json_schema), ("walk", of_walks.json_schema)):
-        # Both forms have definitions of the same names: each name begins with that of its form.
-        described = describe(f"#/$defs/{form}.{{model}}")
-        definitions |= {f"{form}.{name}": definition for name, definition in described.pop("$defs").items()}
-        definitions[form] = described
-    forms = [{"$ref": "#/$defs/vane"}, {"$ref": "#/$defs/walk"}]
-    return {"title": "ppafo scenario", "anyOf": forms, "$defs": definitions}
+    load_kinds()
+    return schema_of("ppafo scenario", OF_A_VANE.declare, OF_A_WALK.declare)

@@ -8,37 +8,22 @@ from typing import Annotated, Any, TypeGuard, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
+from ppafo.documents.toml_text import LONGEST_VALUE, NAME, NAME_RULE, quote
 from ppafo.plugins import nearest_kind
 from ppafo.wording import nearest_name, one_line, said_missing
 
-NAME = r"^[a-z0-9][a-z0-9_-]*$"
-"""Pattern of the name of a set or scenario."""
 LABEL = r"^[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?$"
 """Pattern of a display name: one line of text without leading or trailing space."""
-QUANTITY = r"^\s*[+-]?(\d|\.\d)"
-"""Pattern of the beginning of a number with unit."""
 _TEXT_RULES = {
-    NAME: "must consist of lower-case letters, digits, '-' and '_'",
+    NAME: NAME_RULE,
     LABEL: "must be one line of text without leading or trailing spaces",
-    QUANTITY: "does not start with a number; write for example '1.3 m/s'",
 }
 """Message endings for a text that does not match a pattern, by pattern."""
-_LONGEST_VALUE = 60
 _MAXIMUM_PROBLEMS = 5
 _MAXIMUM_TABLES = 3
 """Largest number of tables named in a message as containing an unknown key."""
 _MISSING = {"missing": "", "union_tag_not_found": ".kind"}
 """Suffix of the path of a missing key, by problem type."""
-
-
-def is_gap(detail: ErrorDetails) -> bool:
-    """Return whether a problem is only a missing key."""
-    return detail["type"] in _MISSING
-
-
-def is_unknown_kind(detail: ErrorDetails) -> bool:
-    """Return whether a problem is an unknown kind; tables with a single kind report it as a wrong literal."""
-    return detail["type"] == "union_tag_invalid" or (detail["type"] == "literal_error" and detail["loc"][-1] == "kind")
 
 
 def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
@@ -54,7 +39,7 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
         if detail["loc"] in containers:
             continue
         key = _key_at(detail["loc"], model)
-        if is_gap(detail):
+        if detail["type"] in _MISSING:
             # Of a table that is missing its required keys are named, which the next refusal would ask for.
             fields = key.value_type.model_fields if _is_model(key.value_type) else {}
             required = [f"{key.path}.{name}" for name, field in fields.items() if field.is_required()]
@@ -71,12 +56,6 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
     if missing:
         messages.append(said_missing(list(dict.fromkeys(missing))))
     return "; ".join(messages)
-
-
-def quote(value: object) -> str:
-    """Quote a value for a message, shortened to one line."""
-    quoted = one_line(repr(value))
-    return quoted if len(quoted) <= _LONGEST_VALUE else f"{quoted[:_LONGEST_VALUE]}..."
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,10 +124,6 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
             kind = detail["ctx"]["tag"]
             words = _allowed_words(kind, detail["ctx"]["expected_tags"], nearest_kind)
             return f"{key.path}.kind = {quote(kind)} is not known{words}"
-        case "string_pattern_mismatch" if detail["loc"][-1] == "[key]":
-            # Pydantic marks a name that is the key of a table.
-            table = one_line(".".join(map(str, detail["loc"][:-2])))
-            return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
         case "string_pattern_mismatch":
             return f"{assignment} {_TEXT_RULES.get(detail['ctx']['pattern'], _TEXT_RULES[NAME])}"
         case "string_type":
@@ -182,7 +157,7 @@ def _tables_with(name: str, model: type[BaseModel]) -> list[str]:
         inner: list[tuple[str, type[BaseModel]]] = []
         for path, table in level:
             # Tables may contain themselves.
-            if (path, table) in seen or len(path) > _LONGEST_VALUE:
+            if (path, table) in seen or len(path) > LONGEST_VALUE:
                 continue
             seen.add((path, table))
             if name in table.model_fields:

@@ -19,6 +19,13 @@ from ppafo.errors import PpafoError
 from ppafo.wording import nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
+NAME = r"^[a-z0-9][a-z0-9_-]*$"
+"""Pattern of the name of a set or scenario."""
+NAME_RULE = "must consist of lower-case letters, digits, '-' and '_'"
+SCHEMA = "https://json-schema.org/draft/2020-12/schema"
+"""JSON Schema version of the published file layouts."""
+LONGEST_VALUE = 60
+"""Largest number of characters of a value in a message."""
 _RESULT = "run.json"
 """File of a result folder that describes the run."""
 _MAXIMUM_NAMED = 3
@@ -165,3 +172,9 @@ def label(file: str) -> str:
     """Return the label of a file in messages: its name on one line, shortened in the middle if very long."""
     name = one_line(file)
     return name if len(name) <= _LONGEST_LABEL else f"{name[:_KEPT_AT_EACH_END]}...{name[-_KEPT_AT_EACH_END:]}"
+
+
+def quote(value: object) -> str:
+    """Quote a value for a message, shortened to one line."""
+    quoted = one_line(repr(value))
+    return quoted if len(quoted) <= LONGEST_VALUE else f"{quoted[:LONGEST_VALUE]}..."

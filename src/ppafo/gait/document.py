@@ -1,20 +1,30 @@
 """Gait files: layout, conversion to a ``Gait``, and conversion of a gait to the text of a file."""
 
-import functools
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from pydantic import BaseModel, Field
+from typing import Any, get_args
 
 from ppafo.arguments import checked
-from ppafo.documents.models import SchemaVersion, make_schema, optional, table, validate
-from ppafo.documents.problems import NAME, QUANTITY
+from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label, value_text
-from ppafo.errors import DataError, UnitError, refused_as
+from ppafo.errors import DataError
 from ppafo.gait.gait import CURVES, REQUIRED, Gait, GaitCurve, Origin, plain_unit
 from ppafo.gait.plausible import check_gait
-from ppafo.units import from_si, parse_quantity, to_si
+from ppafo.model.declaration import Number, Quantity
+from ppafo.parameters.declared import (
+    SHORT_NAME,
+    Field,
+    InnerTable,
+    Many,
+    Words,
+    check_keys,
+    inside,
+    number_in,
+    schema_of,
+    value_at,
+)
+from ppafo.units import from_si, to_si
 
 _MAXIMUM_HARMONICS = 40
 """Largest number of harmonics of a curve in a gait file."""
@@ -27,121 +37,87 @@ _SUMMARIES = {
     "knee_forward": "acceleration of the knee in walking direction",
     "knee_up": "acceleration of the knee upwards, without gravity",
 }
-_LIMITS = {
-    "subject.body_mass": ("kg", 1.0, 500.0),
-    "subject.stature": ("m", 0.5, 2.5),
-    "subject.walking_speed": ("m/s", 0.05, 4.0),
-    "subject.recorded_speed": ("m/s", 0.05, 4.0),
-    "stride.time": ("s", 0.3, 5.0),
-    "stride.time_deviation": ("s", 0.0, 2.0),
-    "stride.stance_share": ("", 0.2, 0.95),
-    "stride.stance_share_deviation": ("", 0.0, 0.5),
+_NUMBERS: dict[str, tuple[str, Quantity]] = {
+    "subject.body_mass": ("body_mass", Number("kg", "mass of the wearer, such as '62 kg'", None, 1.0, 500.0)),
+    "subject.stature": ("stature", Number("m", "height of the wearer", None, 0.5, 2.5, optional=True)),
+    "subject.walking_speed": ("walking_speed", Number("m/s", "speed of this gait", None, 0.05, 4.0, optional=True)),
+    "subject.recorded_speed": (
+        "recorded_speed",
+        Number(
+            "m/s", "speed at which the curves were recorded, where it is another one", None, 0.05, 4.0, optional=True
+        ),
+    ),
+    "stride.time": (
+        "stride_time",
+        Number("s", "time from heel strike to heel strike of the same foot", None, 0.3, 5.0),
+    ),
+    "stride.time_deviation": (
+        "stride_time_deviation",
+        Number("s", "its standard deviation between strides", 0.0, 0.0, 2.0),
+    ),
+    "stride.stance_share": (
+        "stance_share",
+        Number("", "fraction of the stride until toe-off, such as '62 percent'", None, 0.2, 0.95),
+    ),
+    "stride.stance_share_deviation": (
+        "stance_share_deviation",
+        Number("", "its standard deviation between strides", 0.0, 0.0, 0.5),
+    ),
+    "stride.count": (
+        "strides",
+        Number("", "number of strides behind the curves; 0: unknown", 0.0, 0.0, whole=True),
+    ),
 }
-"""Unit, lowest and highest value of the numbers in a gait file; wide limits that exclude only typing errors."""
+"""Numbers of a gait file by path, each with its attribute; wide limits that exclude only typing errors."""
+_COEFFICIENT = Number("", "", plain=True)
 
 
-@functools.cache
-def gait_file() -> type[BaseModel]:
-    """Return the Pydantic model of a gait file."""
-    text = Annotated[str, Field(pattern=QUANTITY)]
-    number = Annotated[float, Field(allow_inf_nan=False)]
-    series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]
-    subject = {
-        "body_mass": (text, Field(description="mass of the wearer, such as '62 kg'")),
-        "stature": optional(text, "height of the wearer, such as '1.75 m', where it is known"),
-        "walking_speed": optional(text, "speed of this gait, such as '1.33 m/s'"),
-        "recorded_speed": optional(text, "speed at which the curves were recorded, where it is another one"),
-    }
-    stride = {
-        "time": (
-            text,
-            Field(description="stride time, from one heel strike to the next of the same foot, such as '1.04 s'"),
-        ),
-        "time_deviation": optional(text, "its standard deviation between strides"),
-        "stance_share": (text, Field(description="fraction of the stride until toe-off, such as '62 percent'")),
-        "stance_share_deviation": optional(text, "its standard deviation between strides"),
-        "count": (Annotated[int, Field(ge=0)], Field(0, description="number of strides behind the curves; 0: unknown")),
-    }
-    fields: dict[str, Any] = {
-        "schema_version": (SchemaVersion, ...),
-        "name": (str, Field(pattern=NAME, max_length=100)),
-        "title": (str, Field("", description="one line: who walks, and how")),
-        "origin": (
-            Origin,
-            Field(
-                description="imported: from a file that does not state its origin; synthetic: made by a model, not "
-                "recorded from a person"
-            ),
-        ),
-        "source": (Annotated[str, Field(min_length=1)], Field(description="where the numbers come from")),
-        "notes": (str, Field("", description="further remarks")),
-        "subject": (table("Subject", subject), Field(description="the wearer")),
-        "stride": (table("Stride", stride), Field(description="times of the stride")),
+def declared(_document: Mapping[str, Any]) -> dict[str, Field]:
+    """Return every field of a gait file, by path."""
+    fields: dict[str, Field] = {
+        "schema_version": Words("version of this layout", True, (1,)),
+        "name": Words(required=True, pattern=SHORT_NAME),
+        "title": Words("one line: who walks, and how"),
+        "origin": Words("imported: from a file that states none; synthetic: by a model", True, get_args(Origin)),
+        "source": Words("where the numbers come from", True),
+        "notes": Words("further remarks"),
+        "subject": InnerTable("the wearer", True),
+        "stride": InnerTable("times of the stride", True),
+        **{path: quantity for path, (_, quantity) in _NUMBERS.items()},
     }
     for name, unit in CURVES.items():
         # Only angles have two units; every other curve has the one of its SI quantity.
-        units: Any = Literal["deg", "rad"] if unit == "rad" else Literal[unit]
-        columns = {
-            "unit": (units, Field(description="unit of every number of this curve")),
-            "mean": (number, Field(description="mean over the stride")),
-            "cosine": (series, Field(description="amplitudes of the cosines, first harmonic first")),
-            "sine": (series, Field(description="amplitudes of the sines, as many as of the cosines")),
-            "deviation": (
-                Annotated[number, Field(ge=0.0)],
-                Field(0.0, description="standard deviation between strides, root mean square over the stride"),
-            ),
+        curve: dict[str, Field] = {
+            "unit": Words("unit of every number of this curve", True, ("deg", "rad") if unit == "rad" else (unit,)),
+            "mean": Number("", "mean over the stride", plain=True),
+            "cosine": Many(_COEFFICIENT, "amplitudes, first harmonic first", True, 1, _MAXIMUM_HARMONICS),
+            "sine": Many(_COEFFICIENT, "amplitudes, as many as of the cosines", True, 1, _MAXIMUM_HARMONICS),
+            "deviation": Number("", "standard deviation between strides, root mean square", 0.0, 0.0, plain=True),
         }
-        curve = table("".join(part.capitalize() for part in name.split("_")), columns)
-        required = (curve, Field(description=_SUMMARIES[name]))
-        fields[name] = required if name in REQUIRED else optional(curve, _SUMMARIES[name])
-    return table("GaitFile", fields)
+        fields |= inside(name, curve, _SUMMARIES[name], name in REQUIRED)
+    return fields
 
 
-def gait_of(document: dict[str, Any], file: str) -> Gait:
-    """Return the gait in a parsed gait file; ``file`` is its name in messages.
-
-    Raises DataError if the document is not a valid gait.
-    """
-    validate(gait_file(), document, file, DataError)
-    numbers = {path: _number(document, path, file) for path in _LIMITS}
-    curves: dict[str, Any] = {name: _curve(document[name], name, file) for name in CURVES if name in document}
-    # Required by the schema already: this tells the type checker.
-    if numbers["stride.time"] is None or numbers["stride.stance_share"] is None or numbers["subject.body_mass"] is None:
-        raise DataError(f"{file}: [subject] and [stride] are incomplete; import the gait again")
-    return Gait(
-        name=document["name"],
-        title=document.get("title", ""),
-        origin=document["origin"],
-        source=document["source"],
-        body_mass=numbers["subject.body_mass"],
-        stature=numbers["subject.stature"],
-        walking_speed=numbers["subject.walking_speed"],
-        recorded_speed=numbers["subject.recorded_speed"],
-        stride_time=numbers["stride.time"],
-        stance_share=numbers["stride.stance_share"],
-        stride_time_deviation=numbers["stride.time_deviation"] or 0.0,
-        stance_share_deviation=numbers["stride.stance_share_deviation"] or 0.0,
-        strides=document["stride"].get("count", 0),
-        notes=document.get("notes", ""),
-        **curves,
-    )
-
-
-def _number(document: dict[str, Any], path: str, file: str) -> float | None:
-    section, _, key = path.partition(".")
-    text = document[section].get(key)
-    if text is None:
-        return None
-    unit, low, high = _LIMITS[path]
-    with refused_as(DataError, f"{file}: {path} = {text!r}", UnitError):
-        value = parse_quantity(text, unit)
-    if not low <= value <= high:
-        raise DataError(f"{file}: {path} = {text!r}: must be from {low:g} to {high:g} {unit}".strip())
-    return value
+def parse_gait(content: bytes, file: str) -> Gait:
+    """Return the gait in the content of a gait file; ``file`` names it in messages. Raises DataError if invalid."""
+    place = label(file)
+    document = _FILE.parse(content, place)
+    check_keys(document, declared(document), place, DataError, decoded(content))
+    numbers = {
+        name: quantity.default if (value := value_at(document, path)) is None else number_in(value, quantity)
+        for path, (name, quantity) in _NUMBERS.items()
+    }
+    strides = int(numbers.pop("strides") or 0)
+    texts = {name: document.get(name, "") for name in ("name", "title", "origin", "source", "notes")}
+    curves: dict[str, Any] = {name: _curve(document[name], name, place) for name in CURVES if name in document}
+    gait = Gait(**texts, **numbers, strides=strides, **curves)  # type: ignore[arg-type]  # required numbers are there
+    # A file that is well formed may still have a reversed sign or a wrong zero.
+    check_gait(gait, place)
+    return gait
 
 
 def _curve(table: dict[str, Any], name: str, file: str) -> GaitCurve:
-    # The schema checks each list by itself; that both agree is said here.
+    # The layout has each list by itself; that both agree is said here.
     if len(table["cosine"]) != len(table["sine"]):
         counts = f"{len(table['cosine'])} numbers in cosine and {len(table['sine'])} in sine"
         raise DataError(f"{file}: {name} has {counts}; both lists must have the same length")
@@ -159,7 +135,7 @@ def _curve(table: dict[str, Any], name: str, file: str) -> GaitCurve:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a gait file."""
-    return make_schema(gait_file(), "ppafo gait")
+    return schema_of("ppafo gait", declared)
 
 
 NORMATIVE = "falisse2019-subject1"
@@ -196,14 +172,6 @@ def load_gait(gait: str | Path = NORMATIVE) -> Gait:
     1.038 s at 1.33 m/s
     """
     return parse_gait(_FILE.read(gait), str(gait))
-
-
-def parse_gait(content: bytes, file: str) -> Gait:
-    """Return the gait in the content of a gait file; ``file`` names it in messages. Raises DataError if invalid."""
-    gait = gait_of(_FILE.parse(content, label(file)), label(file))
-    # A file that is well formed may still have a reversed sign or a wrong zero.
-    check_gait(gait, label(file))
-    return gait
 
 
 WRITTEN_UNITS: dict[str, str] = {"rad": "deg"}

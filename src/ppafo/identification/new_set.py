@@ -53,7 +53,7 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
         # Rounded to the digits of its interval, static friction may be below dynamic friction.
         entry, below = (parameter_set.numbers[item.path] for item in (static, dynamic))
         if entry.unit == below.unit and entry.value < below.value:
-            higher = entry.model_copy(update={"value": below.value})
+            higher = replace(entry, value=below.value)
             parameter_set = replace(parameter_set, numbers={**parameter_set.numbers, static.path: higher})
     problem = ""
     try:

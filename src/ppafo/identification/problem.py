@@ -8,13 +8,11 @@ from typing import Annotated
 from pydantic import Field
 
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
-from ppafo.documents.problems import NAME
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.toml_text import NAME, TomlKind, label
 from ppafo.errors import IdentificationError
 from ppafo.identification.procedures import ProcedureProblem
 from ppafo.identification.tolerances import BenchSection
 from ppafo.identification.trajectory.layout import TrajectorySection
-from ppafo.parameters.parameter_set import Citation
 from ppafo.storage.column_map import ColumnMap
 from ppafo.wording import known_names
 
@@ -31,6 +29,16 @@ class DeviceProblem(StrictTable):
     overrides: Texts = Field((), description="overrides of the set, kept in the new set")
 
 
+class CitationSection(StrictTable):
+    """Table [citation] of a problem file, as of a parameter set."""
+
+    title: Text
+    authors: Texts = ()
+    year: Annotated[int | None, Field(ge=1800, le=2200)] = None
+    doi: str = ""
+    note: str = ""
+
+
 class ProblemFile(StrictTable):
     """Layout of a problem file: initial parameter set, recordings, procedures and trajectory fit."""
 
@@ -38,7 +46,9 @@ class ProblemFile(StrictTable):
     name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")
     title: str = Field("", description="title of the new parameter set")
     device: DeviceProblem = Field(description="the set to start from")
-    citation: Citation | None = Field(None, description="authors of the measurements; default: as in the starting set")
+    citation: CitationSection | None = Field(
+        None, description="authors of the measurements; default: as in the starting set"
+    )
     columns: dict[str, ColumnMap] = Field({}, description="column maps by name, for files with columns of other names")
     bench: BenchSection | None = Field(None, description="tolerances of the bench")
     procedure: tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...] = Field(

@@ -27,6 +27,14 @@ class Quantity:
     """False if the value must be above ``minimum``."""
     follows: tuple[str, ...] = ()
     """Names of terms added to the default: of ``control.kind``, or of a loop in ``control``."""
+    words: tuple[str, ...] = ()
+    """Words that a file may have in place of the number."""
+    optional: bool = False
+    """True if a file may omit a number without a default."""
+    whole: bool = False
+    """True for a whole number, which a file gives bare."""
+    plain: bool = False
+    """True if a file gives the bare number, its unit beside it."""
 
 
 Number = partial(Quantity, "")

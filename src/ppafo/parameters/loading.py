@@ -1,40 +1,52 @@
 """Parameter set files: loading by name or path, parsing, layout from the declarations, and writing."""
 
-import functools
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
-from types import GenericAlias
-from typing import Annotated, Any, Literal
-
-from pydantic import BaseModel, Field
+from typing import Any
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional, table, validate
-from ppafo.documents.problems import NAME
-from ppafo.documents.toml_text import TomlKind, assignments, beside, label, table_lines
-from ppafo.errors import ParameterError, UnitError, refused_as
-from ppafo.model.actuators.kind import ActuatorKind
-from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, device_effects, find_effects
+from ppafo.documents.regular_file import decoded
+from ppafo.documents.toml_text import NAME, TomlKind, assignments, beside, label, table_lines
+from ppafo.errors import KindError, ParameterError, UnitError, refused_as
+from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.kind import SECTION, Effect
-from ppafo.model.valves.kind import ValveKind
+from ppafo.model.effects.kind import SECTION
 from ppafo.parameters import declaration
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER, WHY_ONE_CHAMBER, alternatives
+from ppafo.parameters.declared import (
+    FREE_KEY,
+    JOINT_WORDS,
+    Field,
+    Fields,
+    InnerTable,
+    Many,
+    Words,
+    check_keys,
+    inside,
+    kind_at,
+    layout_of,
+    schema_of,
+    value_at,
+)
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.joint import ANKLE, OPPOSITES, JointNames
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
-    Accepted,
+    CITATION,
+    FLAG_ENTRY,
+    NUMBER_ENTRY,
+    TEXT_ENTRY,
     Citation,
     Entry,
     FlagEntry,
     ParameterSet,
     TextEntry,
     chosen_valve,
+    number_entry,
+    written,
     written_units,
 )
 from ppafo.plugins import Plugins, name_plugins
@@ -116,83 +128,114 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     The file of a measured actuator is searched relative to ``folder``. Raises ParameterError if the set is not usable.
     """
     document = _FILE.parse(content, file)
-    # The kind of an actuator is optional: by default it is a vane.
-    if isinstance(actuator := document.get("actuator"), dict):
-        actuator.setdefault("kind", VANE)
-    _load_named_kinds(document)
-    parsed = validate(parameter_file(), document, file, ParameterError, whole_parameter_file)
-    parameter_set = _parameter_set(parsed, file, folder or Path())
+    with refused_as(ParameterError, file, KindError):
+        fields = declared(document)
+    if next(layout_of(fields).faults(document), None):
+        # So that the messages know every kind of this package.
+        for catalogue in (VALVES, ACTUATORS, EFFECTS):
+            catalogue.load_own()
+        check_keys(document, declared(document), file, ParameterError, decoded(content))
+    parameter_set = _parameter_set(document, fields, file, folder or Path())
     # Refuses a default valve that the set does not have.
     chosen_valve(parameter_set, None)
     _check_numbers(parameter_set)
     return replace(parameter_set, shown=written_units(parameter_set.numbers))
 
 
-def _load_named_kinds(document: Mapping[str, Any]) -> None:
-    """Load the valves, the actuator and the effects that an unchecked document names, those of other packages too."""
-    valves, actuator, effects = (
-        section if isinstance(section := document.get(name), dict) else {} for name in ("valves", "actuator", SECTION)
-    )
-    for catalogue, tables in ((VALVES, valves.values()), (ACTUATORS, [actuator])):
-        for kind in [component.get("kind") for component in tables if isinstance(component, dict)]:
-            if isinstance(kind, str):
-                catalogue.get(kind)
-    find_effects(f"{SECTION}.{name}" for name in effects)
+def declared(document: Mapping[str, Any]) -> dict[str, Field]:
+    """Return every field that a parameter set with the kinds of a document may have, by path.
+
+    Sections other than the valves are optional: a set may be incomplete. Raises KindError for a component that
+    cannot be loaded.
+    """
+    find_effects(f"{SECTION}.{name}" for name in _table(document, SECTION))
+    actuator = kind_at(document, "actuator") or VANE
+    known_actuator = actuator if actuator in ACTUATORS else VANE
+    names = [str(name) for name in _table(document, "valves")]
+    kinds = {name: kind_at(document, f"valves.{name}") for name in names}
+    known = {name: kind for name, kind in kinds.items() if kind in VALVES}
+    reported = _table(_table(document, "reported"), "valves")
+    quantities = declaration.quantities({**dict.fromkeys(reported, next(iter(VALVES))), **known}, known_actuator)
+    is_measured = ACTUATORS[known_actuator].model.table is not None
+    fields: dict[str, Field] = {
+        **_HEAD,
+        **{section: InnerTable(f"section {section}") for section in _ORDER},
+        **inside("gas.species", TEXT_ENTRY, "name of the gas"),
+        "actuator.kind": Words("", allowed=ACTUATORS, default=VANE),
+        **({"actuator.file": Words("file name, relative to the folder of the set", True)} if is_measured else {}),
+        **inside("supply.relieving", FLAG_ENTRY, declaration.RELIEVING),
+        **inside(f"reported.{declaration.REPORTED_FORMULA}", TEXT_ENTRY, "exponent inside C1, a formula in k"),
+        "valves": InnerTable("valves by name", True, FREE_KEY),
+        "reported.valves": InnerTable("reported values of the valves, by valve name", keys=FREE_KEY),
+        **{f"valves.{name}.kind": Words("", True, VALVES) for name in names},
+    }
+    for path, quantity in quantities.items():
+        if not (path.startswith("valves.") and path.split(".")[1] not in known):
+            fields |= inside(path, NUMBER_ENTRY, f"{quantity.summary} [{quantity.unit or '-'}]")
+    return fields
 
 
-def _parameter_set(parsed: Any, file: str, folder: Path) -> ParameterSet:
-    """Return the set of a validated file, whose entries are now keyed by dotted path."""
-    entries = dict(_entries(parsed, ""))
-    actuator = parsed.actuator
-    stated = ("name", "title", "citation", "notes", "completed_by", "default_valve")
+def _table(document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = document.get(name)
+    return table if isinstance(table, Mapping) else {}
+
+
+def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folder: Path) -> ParameterSet:
+    """Return the set of a document whose keys have been checked."""
+    paths = [path for path, field in fields.items() if isinstance(field, InnerTable) and f"{path}.value" in fields]
+    # Section by section, the valves last.
+    paths.sort(key=lambda path: (_ORDER.index(path.partition(".")[0]), path.startswith("reported.valves.")))
+    entries = {path: table for path in paths if (table := value_at(document, path)) is not None}
+    texts, flags = {}, {}
+    numbers: dict[str, Entry] = {}
+    for path, table in entries.items():
+        if isinstance(fields[f"{path}.value"], Quantity):
+            numbers[path] = number_entry(table)
+        elif isinstance(table["value"], bool):
+            flags[path] = FlagEntry(**table)
+        else:
+            texts[path] = TextEntry(**table)
+    actuator = _table(document, "actuator")
+    kind = actuator.get("kind", VANE)
+    citation = document.get("citation")
+    parent, joint = document.get("parent", ""), document.get("joint")
     return ParameterSet(
         file=file,
-        **{name: getattr(parsed, name) for name in stated},
-        parent=beside(parsed.parent, folder, list_sets()) if parsed.parent else "",
-        valve_kinds={name: valve.kind for name, valve in parsed.valves.items()},
-        actuator_kind=VANE if actuator is None else actuator.kind,
-        actuator_file=getattr(actuator, "file", ""),
-        actuator_table=None if actuator is None else _measured_curves(actuator, folder),
-        numbers={path: entry for path, entry in entries.items() if isinstance(entry, Entry)},
-        texts={path: entry for path, entry in entries.items() if isinstance(entry, TextEntry)},
-        flags={path: entry for path, entry in entries.items() if isinstance(entry, FlagEntry)},
-        accepted={finding.finding: finding.reason for finding in parsed.accepted},
-        joint=ANKLE if parsed.joint is None else _joint_names(parsed.joint, file),
+        **{name: document.get(name, "") for name in ("name", "title", "notes", "completed_by", "default_valve")},
+        citation=None if citation is None else Citation(**{**citation, "authors": tuple(citation.get("authors", ()))}),
+        parent=beside(parent, folder, list_sets()) if parent else "",
+        valve_kinds={name: valve["kind"] for name, valve in document["valves"].items()},
+        actuator_kind=kind,
+        actuator_file=actuator.get("file", ""),
+        actuator_table=_measured_curves(kind, folder / actuator["file"]) if "file" in actuator else None,
+        numbers=numbers,
+        texts=texts,
+        flags=flags,
+        accepted={item["finding"]: item["reason"] for item in document.get("accepted", ())},
+        joint=ANKLE if joint is None else _joint_names(joint, file),
     )
 
 
-def _entries(node: object, path: str) -> Iterator[tuple[str, object]]:
-    """Yield every entry of a validated file with its dotted path."""
-    if isinstance(node, Entry | TextEntry | FlagEntry):
-        yield path, node
-    elif isinstance(node, BaseModel | dict):
-        for name, child in dict(node).items():
-            yield from _entries(child, f"{path}.{name}" if path else name)
-
-
-def _measured_curves(actuator: Any, folder: Path) -> Any:
-    """Return the curves in the file of a measured actuator; None for an actuator without such a file."""
-    table_kind = ACTUATORS[actuator.kind].model.table
-    if table_kind is None:
-        return None
+def _measured_curves(kind: str, file: Path) -> Any:
+    """Return the curves in the file of a measured actuator."""
     # Imported late, since few devices have a measured actuator.
-    from ppafo.model.actuators.table import Table
+    from ppafo.model.actuators.table import Table as Measured
     from ppafo.parameters.actuator_table import read_actuator_table
 
     # The file of another package's actuator may have another form, which is not read here.
-    return read_actuator_table(folder / actuator.file) if table_kind is Table else None
+    return read_actuator_table(file) if ACTUATORS[kind].model.table is Measured else None
 
 
-def _joint_names(words: Any, file: str) -> JointNames:
+def _joint_names(words: Mapping[str, str], file: str) -> JointNames:
     """Return the names of the joint of a validated file. Raises ParameterError without a name for a falling angle."""
-    negative = words.negative or OPPOSITES.get(words.positive)
+    negative = words.get("negative") or OPPOSITES.get(words["positive"])
     if negative is None:
-        hint = nearest_name(words.positive, OPPOSITES)
+        hint = nearest_name(words["positive"], OPPOSITES)
         raise ParameterError(
-            f"{file}: joint.positive = '{words.positive}': the name of the opposite direction is unknown{hint}; "
+            f"{file}: joint.positive = '{words['positive']}': the name of the opposite direction is unknown{hint}; "
             "also give joint.negative"
         )
-    return JointNames(words.name, words.positive, negative)
+    return JointNames(words["name"], words["positive"], negative)
 
 
 def _check_numbers(parameter_set: ParameterSet) -> None:
@@ -215,119 +258,30 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a parameter set file, with the valves, actuators and effects of all packages."""
     for catalogue in (VALVES, ACTUATORS, EFFECTS):
         catalogue.load_all()
-    return make_schema(parameter_file(), "ppafo parameter set")
+    return schema_of("ppafo parameter set", declared)
 
 
-def whole_parameter_file() -> type[BaseModel]:
-    """Return the validation model of a parameter set file with all valves, actuators and effects of this package."""
-    for catalogue in (VALVES, ACTUATORS, EFFECTS):
-        catalogue.load_own()
-    return parameter_file()
-
-
-def parameter_file() -> type[BaseModel]:
-    """Return the validation model of a parameter set file, for the loaded valves, actuators and effects.
-
-    If a file names no valve or actuator, all kinds of this package are used.
-    """
-    valves, actuators = VALVES.loaded_or_own(), ACTUATORS.loaded_or_own()
-    return _file_model(tuple(valves.items()), tuple(actuators.items()), device_effects())
-
-
-# A dotted path names a valve: a dot or a blank in its name would make it another path.
-_VALVE_NAME = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
-_VALVE_KEYS = Field(json_schema_extra={"additionalProperties": False})
-_JOINT_WORDS = Annotated[str, Field(pattern=r"^[a-z][a-z ]{0,39}$")]
-_JOINT = table(
-    "JointNames",
-    {
-        "name": (_JOINT_WORDS, Field(description="name of the joint, such as 'elbow'")),
-        "positive": (_JOINT_WORDS, Field(description="what a growing angle is called, such as 'flexion'")),
-        "negative": optional(_JOINT_WORDS, "what a falling angle is called; the opposite unless given"),
-    },
-)
-_HEAD: dict[str, Any] = {
-    "schema_version": (SchemaVersion, ...),
-    "name": (str, Field(pattern=NAME)),
-    "title": (str, Field(min_length=1)),
-    "citation": optional(Citation, "where the set was published"),
-    "notes": (str, ""),
-    "completed_by": (str, Field("", description="name of a set that completes this one")),
-    "parent": (
-        str,
-        Field("", description="parent set, a name or a path relative to this file; the audit lists the changes"),
+_HEAD: Mapping[str, Field] = {
+    "schema_version": Words("version of this layout", True, (1,)),
+    "name": Words(required=True, pattern=NAME),
+    "title": Words(required=True),
+    **inside("citation", CITATION, "where the set was published"),
+    "notes": Words(),
+    "completed_by": Words("name of a set that completes this one"),
+    "parent": Words("parent set, a name or a path relative to this file; the audit lists the changes"),
+    "default_valve": Words("name of the valve that a device has by default", True),
+    "accepted": Many(
+        lambda _: {"finding": Words("as 'ppafo sets audit' prints it", True), "reason": Words(required=True)},
+        "contradictions kept for a reason",
     ),
-    "default_valve": (str, Field(description="name of the valve that a device has by default")),
-    "accepted": (list[Accepted], Field(default_factory=list, description="contradictions kept for a reason")),
-    "joint": optional(_JOINT, "the joint that the actuator turns, in words; the ankle unless given"),
+    "joint": InnerTable("the joint that the actuator turns, in words; the ankle unless given"),
+    "joint.name": Words("name of the joint, such as 'elbow'", True, pattern=JOINT_WORDS),
+    "joint.positive": Words("what a growing angle is called, such as 'flexion'", True, pattern=JOINT_WORDS),
+    "joint.negative": Words("what a falling angle is called; the opposite unless given", pattern=JOINT_WORDS),
 }
 """Keys of a parameter set file before its sections of values."""
-
-
-@functools.lru_cache(maxsize=4)
-def _file_model(
-    valves: tuple[tuple[str, ValveKind], ...],
-    actuators: tuple[tuple[str, ActuatorKind], ...],
-    effects: tuple[Effect, ...],
-) -> type[BaseModel]:
-    """Return the validation model of a file; sections other than the valves are optional: a set may be incomplete."""
-    valve_report = _section("ReportedOfAValve", declaration.REPORTED_OF_A_VALVE)
-    reported = {
-        declaration.REPORTED_FORMULA: optional(TextEntry, "exponent inside C1, a formula in k"),
-        "valves": optional(
-            Annotated[GenericAlias(dict, (_VALVE_NAME, valve_report)), _VALVE_KEYS],
-            "reported values of the valves, by valve name",
-        ),
-    }
-    effect_sections = {
-        effect.name: optional(_section(f"{effect.name.capitalize()}Effect", effect.quantities), effect.summary)
-        for effect in effects
-    }
-    sections = {
-        "gas": _section("Gas", declaration.GAS, species=optional(TextEntry, "name of the gas")),
-        "actuator": one_of([_actuator_section(*actuator) for actuator in actuators]),
-        "friction": _section("Friction", declaration.FRICTION),
-        "foot_plate": _section("FootPlate", declaration.FOOT_PLATE),
-        "supply": _section("Supply", declaration.SUPPLY, relieving=optional(FlagEntry, declaration.RELIEVING)),
-        "flow": _section("Flow", declaration.FLOW),
-        SECTION: table("Effects", effect_sections),
-        "reported": _section("Reported", declaration.REPORTED, **reported),
-    }
-    valve_tables = [
-        _section(
-            f"{name.capitalize()}Valve",
-            declaration.ORIFICE + kind.quantities,
-            kind=(Literal[name], Field(description=kind.summary)),
-        )
-        for name, kind in valves
-    ]
-    optional_sections = {name: optional(model, f"section {name}") for name, model in sections.items()}
-    by_valve = (
-        Annotated[GenericAlias(dict, (_VALVE_NAME, one_of(valve_tables))), _VALVE_KEYS],
-        Field(min_length=1, description="valves by name"),
-    )
-    return table("ParameterFile", _HEAD | optional_sections | {"valves": by_valve})
-
-
-def _actuator_section(name: str, kind: ActuatorKind) -> Any:
-    """Return the validation model of the actuator section; key ``kind`` is optional for a vane."""
-    default: Any = VANE if name == VANE else ...
-    keys: dict[str, Any] = {
-        "kind": (Literal[name], Field(default, description=kind.summary)),
-        "leak": optional(_section("Leak", declaration.ORIFICE), "leak from chamber 1 to chamber 2"),
-    }
-    if kind.model.table is not None:
-        keys["file"] = (str, Field(min_length=1, description="file name, relative to the folder of the set"))
-    model_name = "Actuator" if name == VANE else f"{name.capitalize()}Actuator"
-    return _section(model_name, declaration.actuator_quantities(name), **keys)
-
-
-def _section(name: str, quantities: tuple[Quantity, ...], /, **keys: Any) -> Any:
-    """Return the validation model of a section: an optional entry for each quantity, and other ``keys``."""
-    entries = {
-        quantity.name: optional(Entry, f"{quantity.summary} [{quantity.unit or '-'}]") for quantity in quantities
-    }
-    return table(re.sub(r"\W", "_", name, flags=re.ASCII), entries | keys)
+_ORDER = "gas", "actuator", "friction", "foot_plate", "supply", "flow", SECTION, "reported", "valves"
+"""Sections with values, in their order."""
 
 
 def parameter_set_toml(parameter_set: ParameterSet) -> str:
@@ -336,7 +290,7 @@ def parameter_set_toml(parameter_set: ParameterSet) -> str:
     head = {key: value for key in keys if (value := getattr(parameter_set, key))}
     lines = [*assignments({"schema_version": 1, **head})]
     if parameter_set.citation is not None:
-        lines += table_lines("citation", parameter_set.citation.model_dump(exclude_defaults=True))
+        lines += table_lines("citation", written(parameter_set.citation))
     if parameter_set.joint != ANKLE:
         lines += table_lines("joint", asdict(parameter_set.joint))
     if parameter_set.actuator_kind != VANE:
@@ -349,7 +303,7 @@ def parameter_set_toml(parameter_set: ParameterSet) -> str:
         valve = path.split(".")[1] if path.startswith("valves.") else ""
         if valve in kinds_to_write:
             lines += table_lines(f"valves.{valve}", {"kind": kinds_to_write.pop(valve)})
-        lines += table_lines(path, entries[path].model_dump(exclude_defaults=True))
+        lines += table_lines(path, written(entries[path]))
     # A valve of which nothing but its kind is known has a table all the same.
     for valve, kind in kinds_to_write.items():
         lines += table_lines(f"valves.{valve}", {"kind": kind})

@@ -3,17 +3,15 @@
 import contextlib
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
-
-from pydantic import Field
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, Quantity
 from ppafo.parameters.declaration import alternatives, fits, is_within, quantities, range_rule
+from ppafo.parameters.declared import Many, Words, fields_of
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
     DISPLACEMENT_PATH,
@@ -41,57 +39,74 @@ CONFIDENCE = 0.95
 """Confidence level [-] of the interval whose half-width an entry states."""
 
 
-class Entry(StrictTable):
+_Origin = Annotated[Origin, Words("origin of the value", allowed=get_args(Origin))]
+_Source = Annotated[str, Words("source: page, equation, data sheet, recording")]
+_Note = Annotated[str, Words("reason, conflict or remark")]
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
     """Number in a parameter set, in its given unit, with origin and source."""
 
-    value: Annotated[float, Field(description="the number, in the unit beside it")]
-    unit: Annotated[str, Field(description="such as 'mm^2', 'psi_g' (gauge), 'psi_a' (absolute); '' for a number")]
-    origin: Annotated[Origin, Field(description="origin of the value")]
-    source: Annotated[Text, Field(description="source: page, equation, data sheet, recording")]
-    note: Annotated[str, Field(description="reason, conflict or remark")] = ""
-    uncertainty: Annotated[float | None, Field(ge=0.0, description="half width of the 95 % interval, same unit")] = None
+    value: Annotated[float, Number("", "the number, in the unit beside it", plain=True)]
+    unit: Annotated[str, Words("such as 'mm^2', 'psi_g' (gauge), 'psi_a' (absolute); '' for a number", is_filled=False)]
+    origin: _Origin
+    source: _Source
+    note: _Note = ""
+    uncertainty: Annotated[
+        float | None, Number("", "half width of the 95 % interval, same unit", minimum=0.0, plain=True)
+    ] = None
     key: Annotated[
-        str,
-        Field(
-            description="statement that gives the number, with which it is audited: 'PUBLICATION/ID' or "
-            "'PUBLICATION/ID.ARGUMENT'"
-        ),
+        str, Words("statement that gives the number, with which it is audited: 'PUBLICATION/ID[.ARGUMENT]'")
     ] = ""
 
 
-class TextEntry(StrictTable):
+@dataclass(frozen=True, slots=True)
+class TextEntry:
     """Name or formula in a parameter set, with origin and source."""
 
-    value: Text
-    origin: Annotated[Origin, Field(description="origin of the value")]
-    source: Annotated[Text, Field(description="source of the value")]
-    note: Annotated[str, Field(description="reason, conflict or remark")] = ""
+    value: Annotated[str, Words("name or formula")]
+    origin: _Origin
+    source: _Source
+    note: _Note = ""
 
 
-class FlagEntry(StrictTable):
+@dataclass(frozen=True, slots=True)
+class FlagEntry:
     """True or false in a parameter set, with origin and source."""
 
-    value: Annotated[bool, Field(description="true or false")]
-    origin: Annotated[Origin, Field(description="origin of the value")]
-    source: Annotated[Text, Field(description="source of the value")]
-    note: Annotated[str, Field(description="reason, conflict or remark")] = ""
+    value: Annotated[bool, Words("true or false", form=bool)]
+    origin: _Origin
+    source: _Source
+    note: _Note = ""
 
 
-class Citation(StrictTable):
+@dataclass(frozen=True, slots=True)
+class Citation:
     """Publication or report behind a parameter set; unknown fields are left out."""
 
-    title: Text
-    authors: Texts = ()
-    year: Annotated[int | None, Field(ge=1800, le=2200)] = None
-    doi: str = ""
-    note: str = ""
+    title: Annotated[str, Words()]
+    authors: Annotated[tuple[str, ...], Many(Words("", True))] = ()
+    year: Annotated[int | None, Number("", "year of publication", None, 1800.0, 2200.0, whole=True)] = None
+    doi: Annotated[str, Words()] = ""
+    note: Annotated[str, Words()] = ""
 
 
-class Accepted(StrictTable):
-    """Contradiction in a parameter set that its author accepts, with the reason."""
+NUMBER_ENTRY, TEXT_ENTRY, FLAG_ENTRY, CITATION = map(fields_of, (Entry, TextEntry, FlagEntry, Citation))
 
-    finding: Annotated[Text, Field(description="identifier of the finding, as 'ppafo sets audit' prints it")]
-    reason: Text
+
+def number_entry(table: Mapping[str, Any]) -> Entry:
+    """Return the entry of a table that has been checked."""
+    return Entry(**{**table, **{name: float(table[name]) for name in ("value", "uncertainty") if name in table}})
+
+
+def written(entry: Entry | TextEntry | FlagEntry | Citation) -> dict[str, Any]:
+    """Return the table of an entry in a file, without defaults."""
+    return {
+        item.name: list(value) if isinstance(value, tuple) else value
+        for item in fields(entry)
+        if (value := getattr(entry, item.name)) != item.default
+    }
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -297,7 +312,7 @@ def with_followers(parameter_set: ParameterSet) -> ParameterSet:
     followers = {}
     if pressure is not None and not parameter_set.has_one_chamber:
         note = f"follows {PRESSURE_PATH}"
-        followers[SECOND_PRESSURE_PATH] = pressure.model_copy(update={"note": note, "key": ""})
+        followers[SECOND_PRESSURE_PATH] = replace(pressure, note=note, key="")
     if constant is not None and DISPLACEMENT_PATH in parameter_set.declarations():
         followers[DISPLACEMENT_PATH] = Entry(
             value=constant.value,

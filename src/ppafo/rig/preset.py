@@ -4,7 +4,6 @@ Changes of the model are overrides of a run, in the order in which they apply; t
 values are declared here, with unit and range.
 """
 
-import functools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -12,15 +11,22 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, Field
-
-from ppafo.documents.models import SchemaVersion, Text, Texts, make_schema, read_model, table
-from ppafo.documents.toml_text import TomlKind
+from ppafo.documents.regular_file import decoded
+from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import is_within, range_rule
+from ppafo.parameters.declared import (
+    FREE_KEY,
+    Field,
+    InnerTable,
+    Many,
+    Words,
+    check_keys,
+    number_in,
+    schema_of,
+    value_at,
+)
 from ppafo.parameters.overrides import override_set, read_overrides
-from ppafo.units import parse_quantity
 from ppafo.wording import nearest_name
 
 PREFIX = "rig."
@@ -61,35 +67,24 @@ PATHS: dict[str, Quantity] = {
 """Values of a preset by dotted path, each with a default."""
 
 
-@functools.cache
-def _layout() -> type[BaseModel]:
-    """Return the layout of a preset file."""
-    fields: dict[str, Any] = {
-        "schema_version": (SchemaVersion, ...),
-        "name": (str, Field(description="name of the preset")),
-        "title": (str, Field(description="which test bench it represents, in one line")),
-        "notes": (str, Field(description="what is on, what is off, and where the values come from")),
-        "model": (Texts, Field(default=(), description="overrides of each run: what the identified model has not")),
-        "valves": (dict[str, Texts], Field(default={}, description="further overrides by kind of valve")),
+def declared(document: Mapping[str, Any]) -> dict[str, Field]:
+    """Return every field of a preset file with the kinds of valve of a document, by path."""
+    valves = document.get("valves")
+    return {
+        "schema_version": Words("version of this layout", True, (1,)),
+        "name": Words("name of the preset", True),
+        "title": Words("which test bench it represents, in one line", True),
+        "notes": Words("what is on, what is off, and where the values come from", True),
+        "model": Many(Words(required=True), "overrides of each run: what the identified model has not"),
+        "valves": InnerTable("further overrides by kind of valve", keys=FREE_KEY),
+        **{f"valves.{kind}": Many(Words(required=True)) for kind in (valves if isinstance(valves, Mapping) else ())},
+        **PATHS,
     }
-    for section, members in SECTIONS.items():
-        values: dict[str, Any] = {
-            item.name: (
-                Text,
-                Field(
-                    default=f"{item.default:g} {item.unit}".strip(), description=f"{item.summary} [{item.unit or '-'}]"
-                ),
-            )
-            for item in members
-        }
-        layout = table("".join(part.capitalize() for part in section.split("_")), values)
-        fields[section] = (layout, Field(default_factory=layout))
-    return table("RigPreset", fields)
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a preset."""
-    return make_schema(_layout(), "ppafo rig preset")
+    return schema_of("ppafo rig preset", declared)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,25 +109,21 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
     ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``. Raises ParameterError for an invalid preset or
     override.
     """
-    layout, file = read_model(_FILE, _layout(), name_or_path)
-    read: Any = layout
-    values = {}
-    for path, quantity in PATHS.items():
-        section, _, name = path.partition(".")
-        values[path] = _value(f"{file}: {path}", getattr(getattr(read, section), name), quantity)
+    file, content = label(str(name_or_path)), _FILE.read(name_or_path)
+    document = _FILE.parse(content, file)
+    check_keys(document, declared(document), file, ParameterError, decoded(content))
+    values = {
+        path: float(quantity.default or 0.0)
+        if (given := value_at(document, path)) is None
+        else number_in(given, quantity)
+        for path, quantity in PATHS.items()
+    }
     for typed, override in override_set(read_overrides(overrides)).items():
         path = typed.removeprefix(PREFIX)
         if path not in PATHS:
             hint = nearest_name(typed, [f"{PREFIX}{known}" for known in PATHS])
             raise ParameterError(f"override '{override}': the simulated test bench has no value '{typed}'{hint}")
-        values[path] = _value(f"override '{override}'", override.text, PATHS[path])
-    return Preset(read.name, read.title, read.model, read.valves, values)
-
-
-def _value(place: str, text: str, quantity: Quantity) -> float:
-    """Return the number [SI] of a text with a unit. Raises ParameterError if it has none or is out of range."""
-    with refused_as(ParameterError, place, UnitError):
-        value = parse_quantity(text, quantity.unit)
-    if not (math.isfinite(value) and is_within(value, quantity)):
-        raise ParameterError(f"{place} = {text}: {range_rule(quantity, quantity.unit)}")
-    return value
+        with refused_as(ParameterError, f"override '{override}'", UnitError):
+            values[path] = number_in(override.text, PATHS[path])
+    valves = {kind: tuple(texts) for kind, texts in document.get("valves", {}).items()}
+    return Preset(document["name"], document["title"], tuple(document.get("model", ())), valves, values)

@@ -4,10 +4,11 @@ from collections.abc import Iterable, Mapping
 
 from ppafo.errors import ScenarioError
 from ppafo.parameters.declaration import RELIEVING_PATH
+from ppafo.parameters.declared import value_at
 from ppafo.parameters.overrides import Override
 from ppafo.parameters.parameter_set import entry_text
 from ppafo.simulation.declaration import OF_A_VANE, SUPPLY_LINE, line_entries, quantities
-from ppafo.simulation.document import DocumentReader, value_at
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.hardware import Hardware
 from ppafo.simulation.overrides import device_paths
 from ppafo.simulation.scenario import Assumption

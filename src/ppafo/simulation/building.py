@@ -3,12 +3,13 @@
 Each mistake in the document raises an error of one line.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters.declaration import WHY_ONE_CHAMBER
+from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph, LinkedDefault, follows, gauge_link
 from ppafo.simulation.assumptions import assumed_lines, read_assumptions
@@ -18,7 +19,6 @@ from ppafo.simulation.declaration import (
     AT_REST,
     INITIAL,
     LOCKED_ANGLE,
-    PRESSURE_WORDS,
     PURPOSE,
     SEED,
     SENSORS,
@@ -33,7 +33,7 @@ from ppafo.simulation.declaration import (
     reference_settings,
 )
 from ppafo.simulation.default_gains import default_gain_terms
-from ppafo.simulation.document import REFERENCE_OF, DocumentReader, ScenarioRequest, controlled_in, kind_at, value_at
+from ppafo.simulation.document import REFERENCE_OF, DocumentReader, ScenarioRequest, controlled_in
 from ppafo.simulation.following import read_followers
 from ppafo.simulation.hardware import Hardware, device_error, read_device, read_hardware
 from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_scenario
@@ -42,6 +42,7 @@ from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument
 from ppafo.simulation.profiles import read_profile, reference_problem
 from ppafo.simulation.scenario import (
+    PRESSURE_WORDS,
     Control,
     FreeMotion,
     GasModel,
@@ -70,7 +71,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     Raises ScenarioError or ParameterError for the first value that cannot be used.
     """
     document = changed.document
-    reading = DocumentReader(request.file, document, changed.paths)
+    reading = DocumentReader(request.file, document, changed.paths, request.text)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     # Refusals are in the units of the set.
@@ -134,11 +135,9 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         return scenario
 
 
-def origin_of(
-    request: ScenarioRequest, changed: OverriddenDocument, hardware: Hardware, named: Iterable[str] = ()
-) -> Origin:
-    """Return the origin of a scenario; ``named`` are the overrides that state the paths of ``request.instead``."""
-    overrides = (*(override.words for override in request.overrides), *named)
+def origin_of(request: ScenarioRequest, changed: OverriddenDocument, hardware: Hardware) -> Origin:
+    """Return the origin of a scenario."""
+    overrides = tuple(override.words for override in request.overrides)
     set_name, kept = changed.document["device"]["set"], "; ".join(filter(None, (hardware.replaced, changed.kept)))
     return Origin(request.path, set_name, hardware.valve, overrides, request.content, kept)
 

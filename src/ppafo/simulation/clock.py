@@ -5,10 +5,11 @@ from typing import Any
 
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Numeric, choose, larger, rounded_up, smaller, truncated
+from ppafo.parameters.declared import value_at
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.parameters.overrides import read_overrides
 from ppafo.simulation.declaration import PERIOD, RATE, RUN
-from ppafo.simulation.document import DocumentReader, value_at
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.overrides import override_document
 from ppafo.simulation.scenario import Scenario

@@ -1,29 +1,38 @@
 """Declaration of every value of a scenario: section, name, SI unit, range, default and meaning.
 
-The schema, the conversion to SI, the messages and the overrides all read these lists; the settings of controllers and
-profiles come from their own catalogues. The ranges are wide: they exclude typing errors and values that no solver
-could handle.
+``declared(document)`` is the only list of what a scenario file may contain: checks, schema, overrides and messages read
+it. The settings of controllers and profiles come from their own catalogues. The ranges are wide: they exclude typing
+errors and values that no solver could handle.
 """
 
 import functools
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, replace
 from importlib import resources
 from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
-from ppafo.documents.problems import quote
-from ppafo.errors import KindError, ScenarioError, refused_as
+from ppafo.errors import KindError, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
+from ppafo.parameters.declared import (
+    SHORT_NAME,
+    Content,
+    Field,
+    InnerTable,
+    Many,
+    Words,
+    kind_at,
+    numbers,
+    quantities_in,
+)
 from ppafo.parameters.parameter_set import Entry
-from ppafo.plugins import nearest_kind
-from ppafo.simulation.document import REFERENCE_OF, controlled_in, kind_at
-from ppafo.simulation.motion_kind import MOTIONS, MotionKind, MotionSection, is_walk
+from ppafo.simulation.document import controlled_in
+from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, MotionSection, is_walk
 from ppafo.simulation.scenario import (
     FreeMotion,
     GasModel,
@@ -47,12 +56,6 @@ SHANK_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 GAIT_SHANK = "gait"
 GAIT_START = Quantity("start", "1", "phase in strides at time 0, from heel strike", 0.0, 0.0, 1.0)
 INITIAL = quantities_of(Initial)
-PRESSURE_WORDS = {
-    "supply": "pressure",
-    "dorsiflexion_supply": "dorsiflexion_pressure",
-    "atmosphere": "atmospheric_pressure",
-}
-"""Words for the pressures of the device, mapped to the names of these pressures in its supply."""
 AT_REST = "atmosphere"
 
 _DELAY, *_OF_SIGNALS, SEED = quantities_of(Sensors)
@@ -63,8 +66,8 @@ ISOTHERMAL = "isothermal"
 THERMAL_GAS = quantities_of(GasModel)
 WALL_AREA = "gas_model.wall_area_per_volume"
 
-RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.0e-6, 1.0e8)
-PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6)
+RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.0e-6, 1.0e8, optional=True)
+PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6, optional=True)
 SAMPLING = (RATE, PERIOD)
 
 PURPOSE = "reference.beyond_reach"
@@ -75,45 +78,102 @@ ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
 SUPPLY_LINE = "supply_line"
 SUPPLY_LINES = tuple(line.name for line in fields(SupplyLine))
-
 _REGULATED = quantities_of(RegulatedLine)
 
-SECTIONS = (
-    "device",
-    "run",
-    "motion",
-    "initial",
-    "controller",
-    "reference",
-    "sensors",
-    "gas_model",
-    SUPPLY_LINE,
-    "assumed",
-)
 TEXTS = ("name", "description", "device.set", "device.valve")
 
+HEAD: dict[str, Field] = {
+    "schema_version": Words("version of this layout", True, (1,)),
+    "name": Words(required=True, pattern=SHORT_NAME),
+    "description": Words("purpose of this file"),
+    "device": InnerTable("the hardware", True),
+    "device.set": Words("name of a parameter set, or a path relative to this file", True),
+    "device.valve": Words("name of one of the set's valves; its default valve unless given"),
+    "device.overrides": Many(Words(), "such as 'valve.area=12.6mm^2'"),
+}
+"""Fields at the beginning of the files of scenarios and walks."""
 
-@dataclass(frozen=True, slots=True)
-class DeclaredContent:
-    """Possible content of the files of one scenario type, as functions of a document and the components it names.
 
-    ``find_kinds`` loads components (controller, profile, motion) of other packages. ``texts`` gives the paths of texts,
-    ``quantities`` the declarations of numbers by path. ``same`` maps a path to an equivalent path under which the
-    document keeps the value. ``appended`` maps a path to the section in whose own list of overrides the value belongs,
-    and to the path within that section. ``check_motion`` raises an error for a motion that these files cannot have;
-    its second argument is the start of the message.
+def tail(document: Mapping[str, Any]) -> dict[str, Field]:
+    """Return the fields at the end of the files of scenarios and walks: gas, supply lines, assumptions."""
+    return {
+        "gas_model": InnerTable("how the gas in the chambers behaves; isothermal unless given"),
+        "gas_model.kind": Words("", True, (ISOTHERMAL, THERMAL)),
+        **numbers("gas_model", THERMAL_GAS if kind_at(document, "gas_model") == THERMAL else ()),
+        SUPPLY_LINE: InnerTable("regulators and lines of the gas; constant pressures unless given"),
+        **line_paths(),
+        "assumed": Words("assumed values without a source, with the reason for each", form=dict),
+    }
+
+
+def declared(document: Mapping[str, Any], motion: MotionSection | None = None) -> dict[str, Field]:
+    """Return every field that a scenario file with the kinds of a document may have, by path.
+
+    ``motion`` is the section of a motion that the document does not name. Raises KindError for a component that cannot
+    be loaded, and for a walk.
     """
+    controlled, profile = controlled_in(document), kind_at(document, "reference")
+    motion = motion or section_of(document)
+    law = named(CONTROLLERS, document, "controller")
+    named(PROFILES, document, "reference")
+    return {
+        **HEAD,
+        "run": InnerTable("times of the run, and its accuracy", True),
+        **numbers("run", (*RUN, ACCURACY)),
+        "motion": InnerTable("motion of the vane", True),
+        "motion.kind": Words("", True, _motions()),
+        **({} if motion is None else motion_fields(motion, document)),
+        "initial": InnerTable("state of the gas at the start; atmosphere unless given"),
+        **numbers("initial", INITIAL),
+        "controller": InnerTable("controller of the valve", True),
+        "controller.kind": Words("", True, CONTROLLERS),
+        **numbers("controller", (*SAMPLING, *(() if law is None else law_settings(law, controlled)))),
+        "reference": InnerTable("reference of the controller, a torque unless 'of' names another quantity"),
+        "reference.kind": Words("", True, PROFILES),
+        "reference.of": Words("controlled quantity; torque unless given", allowed=CONTROLLED),
+        PURPOSE: Words("reason for a reference intentionally beyond the reach of the device"),
+        **numbers("reference", reference_settings(profile, controlled)),
+        "sensors": InnerTable("sensors of the controller; ideal unless given"),
+        **numbers("sensors", (*SENSORS, SEED)),
+        **tail(document),
+    }
 
-    find_kinds: Callable[[Mapping[str, Any], str], None]
-    texts: Callable[[Mapping[str, Any]], tuple[str, ...]]
-    quantities: Callable[[Mapping[str, Any]], dict[str, Quantity]]
-    same: Mapping[str, str] = field(default_factory=dict)
-    appended: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    check_motion: Callable[[object, str], None] = lambda _kind, _place: None
 
-    def paths(self, document: Mapping[str, Any]) -> tuple[str, ...]:
-        """Return every path that an override can set, apart from the paths of the device."""
-        return (*self.texts(document), *self.quantities(document), *self.appended)
+def _motions() -> tuple[str, ...]:
+    """Return the motions of a vane alone: all of this package, and loaded ones of other packages."""
+    # A walk is not loaded for the list.
+    others = (name for name, kind in MOTIONS.loaded().items() if kind.section is not None)
+    return tuple(dict.fromkeys((*VANE_MOTIONS, *others, WALK)))
+
+
+def named(catalogue: Kinds[Any], document: Mapping[str, Any], section: str) -> Any:
+    """Return the component that a section names; None for an unknown name. KindError if it cannot be loaded."""
+    with refused_as(KindError, f"{section}.kind", KindError):
+        return catalogue.get(kind_at(document, section))
+
+
+def motion_fields(section: MotionSection, document: Mapping[str, Any]) -> dict[str, Field]:
+    """Return the fields of the motion of a document."""
+    found: dict[str, Field] = {**numbers("motion", section.numbers)}
+    profile = section.profile
+    if profile is None:
+        return found
+    path = f"motion.{profile.name}"
+    kind = kind_at(document, path)
+    if kind not in profile.own:
+        named(PROFILES, document, path)
+    found |= {
+        path: InnerTable(profile.summary, True),
+        f"{path}.kind": Words("", True, (*PROFILES, *profile.own)),
+        **{f"{path}.{name}": Words(text, True) for name, text in profile.own.get(kind, {}).items()},
+    }
+    return found | numbers(path, profile.settings(kind))
+
+
+def quantities(document: Mapping[str, Any], motion: MotionSection | None = None) -> dict[str, Quantity]:
+    """Return the declaration of every number that a document with its components has, keyed by path."""
+    lines = () if SUPPLY_LINE in document else line_paths()
+    return {path: item for path, item in quantities_in(declared(document, motion)).items() if path not in lines}
 
 
 def changes_reach(paths: Iterable[str]) -> bool:
@@ -172,97 +232,20 @@ def shank_settings(kind: str) -> tuple[Quantity, ...]:
     return (GAIT_START,) if kind == GAIT_SHANK else profile_settings(kind, SHANK_LEVEL)
 
 
-def by_path(section: str, items: Iterable[Quantity]) -> dict[str, Quantity]:
-    """Return the declarations of a section, keyed by path."""
-    return {f"{section}.{quantity.name}": quantity for quantity in items}
-
-
 def section_of(document: Mapping[str, Any]) -> MotionSection | None:
-    """Return the ``[motion]`` section of the motion that a document names; None for an unknown motion and a walk."""
-    kind = MOTIONS.get(kind_at(document, "motion"))
-    return None if kind is None else kind.section
+    """Return the ``[motion]`` section of the motion that a document names; None for an unknown motion.
 
-
-def motion_quantities(section: MotionSection | None, profile_kind: str) -> dict[str, Quantity]:
-    """Return the declarations of the numbers of a motion with the named profile, keyed by path."""
-    if section is None:
-        return {}
-    profile = section.profile
-    inner = {} if profile is None else by_path(f"motion.{profile.name}", profile.settings(profile_kind))
-    return by_path("motion", section.numbers) | inner
-
-
-def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | None = None) -> dict[str, Quantity]:
-    """Return the declaration of every number that a document with its components can contain, keyed by path.
-
-    ``of_motion`` are declarations of the motion, if the document does not name it.
+    Raises KindError for a walk.
     """
-    if of_motion is None:
-        section = section_of(document)
-        of_motion = motion_quantities(section, kind_at(document, profile_path(section)))
-    controlled = controlled_in(document)
-    declared = {
-        **by_path("run", (*RUN, ACCURACY)),
-        **of_motion,
-        **by_path("initial", INITIAL),
-        **by_path("controller", SAMPLING + controller_settings(kind_at(document, "controller"), controlled)),
-        **by_path("reference", reference_settings(kind_at(document, "reference"), controlled)),
-        **by_path("sensors", (*SENSORS, SEED)),
-        **by_path("gas_model", THERMAL_GAS if kind_at(document, "gas_model") == THERMAL else ()),
-    }
-    return declared | line_paths() if SUPPLY_LINE in document else declared
-
-
-def profile_path(section: MotionSection | None) -> str:
-    """Return the path of the profile in a motion's section; "" for a motion without a profile."""
-    return "" if section is None or section.profile is None else f"motion.{section.profile.name}"
-
-
-def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the path of every text that a document can contain."""
-    kinds = ("motion.kind", "controller.kind", "reference.kind", REFERENCE_OF, PURPOSE, "gas_model.kind")
-    section = section_of(document)
-    if section is None or section.profile is None:
-        return (*TEXTS, *kinds)
-    path = profile_path(section)
-    own = section.profile.own.get(kind_at(document, path), ())
-    return (*TEXTS, *kinds, f"{path}.kind", *(f"{path}.{name}" for name in own))
-
-
-def find_kinds(document: Mapping[str, Any], file: str) -> None:
-    """Load the motion, controller and profiles that a document names, from other packages too.
-
-    ``file`` is the document's name in messages. Raises ScenarioError if a component cannot be loaded.
-    """
-    check_motion_kind(kind_at(document, "motion"), f"{file}: motion.kind")
     kind = kind_at(document, "motion")
-    # A kind that is missing is refused by the layout, which says what it may be.
-    with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
-        is_known = not kind or kind in MOTIONS
-    if not is_known:
-        known = tuple(MOTIONS)
-        hint = nearest_kind(kind, known, MotionKind)
-        raise ScenarioError(f"{file}: motion.kind = {quote(kind)} is not known{hint}; allowed: {', '.join(known)}")
-    sections: dict[str, Kinds[Any]] = {"controller": CONTROLLERS, "reference": PROFILES}
-    motion = section_of(document)
-    path = profile_path(motion)
-    # A kind of the table's own, such as the gait of a shank, is no profile.
-    if motion is not None and motion.profile is not None and kind_at(document, path) not in motion.profile.own:
-        sections[path] = PROFILES
-    for section, kinds in sections.items():
-        with refused_as(ScenarioError, f"{file}: {section}.kind", KindError):
-            kinds.get(kind_at(document, section))
-
-
-def check_motion_kind(kind: object, place: str) -> None:
-    """Raise ScenarioError if the motion is a walk; the message starts with ``place``."""
-    with refused_as(ScenarioError, place, KindError):
-        walks = isinstance(kind, str) and is_walk(kind)
-    if walks:
-        raise ScenarioError(
-            f"{place}: a walk needs a walk file, not a scenario file, which moves the vane only; 'ppafo new walk' "
-            f"writes a walk file"
-        )
+    with refused_as(KindError, "motion.kind", KindError):
+        if is_walk(kind):
+            raise KindError(
+                "a walk needs a walk file, not a scenario file, which moves the vane only; 'ppafo new walk' writes a "
+                "walk file"
+            )
+    motion = named(MOTIONS, document, "motion")
+    return None if motion is None else motion.section
 
 
 @functools.cache
@@ -270,7 +253,7 @@ def line_entries() -> dict[str, Entry]:
     """Return the defaults of values that ``[supply_line]`` omits, keyed by path such as ``dorsiflexion.droop``."""
     document = tomllib.loads((resources.files("ppafo.simulation") / "supply_line.toml").read_text(encoding="utf-8"))
     return {
-        f"{line}.{quantity.name}": Entry.model_validate(document[line][quantity.name])
+        f"{line}.{quantity.name}": Entry(**document[line][quantity.name])
         for line in SUPPLY_LINES
         for quantity in _REGULATED
     }
@@ -285,14 +268,15 @@ def line_quantities(line: str) -> tuple[Quantity, ...]:
     )
 
 
+@functools.cache
 def line_paths() -> dict[str, Quantity]:
     """Return the declarations of all numbers of both lines, by path such as ``supply_line.dorsiflexion.droop``."""
     return {
-        f"{SUPPLY_LINE}.{line}.{quantity.name}": quantity for line in SUPPLY_LINES for quantity in line_quantities(line)
+        path: quantity
+        for line in SUPPLY_LINES
+        for path, quantity in numbers(f"{SUPPLY_LINE}.{line}", line_quantities(line)).items()
     }
 
 
-OF_A_VANE = DeclaredContent(
-    find_kinds, texts, lambda document: quantities(document) | line_paths(), check_motion=check_motion_kind
-)
+OF_A_VANE = Content(declared)
 """Possible content of the file of a vane alone; a file without supply lines can be given some."""

@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.declared import value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import number_under
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
-from ppafo.simulation.document import DocumentReader, value_at
+from ppafo.simulation.document import DocumentReader
 
 
 def read_followers(

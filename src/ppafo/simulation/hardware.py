@@ -10,6 +10,7 @@ from typing import Any
 from ppafo.errors import ParameterError
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
+from ppafo.parameters.declared import value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
 from ppafo.parameters.overrides import CHOSEN_VALVE, Override, check_valve, one_path, read_overrides, with_overrides
@@ -21,7 +22,7 @@ from ppafo.parameters.parameter_set import (
     links_of_set,
     units_of_texts,
 )
-from ppafo.simulation.document import DocumentReader, ScenarioRequest, value_at
+from ppafo.simulation.document import DocumentReader, ScenarioRequest
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Origin
 from ppafo.wording import nearest_name, one_line, override_text

@@ -7,20 +7,18 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
-
-from ppafo.documents.problems import all_problems, is_gap, is_unknown_kind
+from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ScenarioError
+from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.parameters import ParameterSet
-from ppafo.parameters.overrides import FORMS, either, in_two_forms, read_overrides
+from ppafo.parameters.declared import KIND, Content, layout_of, line_of, refuse, value_at
+from ppafo.parameters.overrides import FORMS, Override, either, in_two_forms, read_overrides
 from ppafo.simulation.building import build_scenario
-from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent
-from ppafo.simulation.document import DocumentReader, ScenarioRequest, value_at
+from ppafo.simulation.declaration import OF_A_VANE
+from ppafo.simulation.document import DocumentReader, ScenarioRequest
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.overrides import OverriddenDocument, override_document
 from ppafo.simulation.scenario import Origin, Scenario
-from ppafo.simulation.schema import scenario_file, whole_scenario_file
 from ppafo.wording import one_line, override_text
 
 FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)
@@ -28,19 +26,14 @@ FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Layout of the files of one scenario type: file type, possible content, schema models, builder.
-
-    ``model`` has only the sections and components that a document names; ``whole`` has all, for messages.
-    """
+    """Layout of the files of one scenario type: file type, possible content, builder."""
 
     file: TomlKind
-    declared: DeclaredContent
-    model: Callable[[Mapping[str, Any]], type[BaseModel]]
-    whole: Callable[[Mapping[str, Any]], type[BaseModel]]
+    content: Content
     build: Callable[[ScenarioRequest, OverriddenDocument], Scenario]
 
 
-VANE = Layout(FILE, OF_A_VANE, scenario_file, lambda _: whole_scenario_file(), build_scenario)
+VANE = Layout(FILE, OF_A_VANE, build_scenario)
 """Scenarios of a vane alone; the scenarios of a leg are in a package above this one."""
 
 
@@ -63,9 +56,21 @@ def load_scenario(
     ``valve.area=12.6mm^2``. ``parameter_set`` replaces the set that the scenario names; the scenario's changes of its
     device apply to this one. Raises ScenarioError or ParameterError for anything that cannot be used.
     """
-    document = FILE.parse(FILE.read(name_or_path), label(str(name_or_path)))
-    folder, file, given = Path(name_or_path).parent, str(name_or_path), read_overrides(overrides, ScenarioError)
-    return scenario_of(ScenarioRequest(label(file), file, folder, document, given, parameter_set), VANE)
+    return scenario_of(request_of_file(name_or_path, read_overrides(overrides, ScenarioError), parameter_set), VANE)
+
+
+def request_of_file(
+    name_or_path: str | Path,
+    overrides: tuple[Override, ...] = (),
+    parameter_set: ParameterSet | None = None,
+    file: TomlKind = FILE,
+) -> ScenarioRequest:
+    """Return the request for the scenario of a file."""
+    name, content = label(str(name_or_path)), file.read(name_or_path)
+    document, text = FILE.parse(content, name), decoded(content)
+    return ScenarioRequest(
+        name, str(name_or_path), Path(name_or_path).parent, document, overrides, parameter_set, text=text
+    )
 
 
 def scenario_or_load(
@@ -126,47 +131,58 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
             f"{request.file}: is a parameter set, not a scenario; "
             f"give the name of a scenario and {override_text(of_set)}"
         )
-    declared = layout.declared
-    declared.find_kinds(request.content, request.file)
+    file, content = request.file, layout.content
     # What is wrong in the file itself is said as such; what it lacks an override may give.
-    if request.overrides:
-        _check_layout(request.content, request.file, layout, may_have_gaps=True)
+    _check_layout(request.content, request, content, may_have_gaps=bool(request.overrides))
     try:
-        changed = override_document(request.content, request.overrides, request.file, declared)
+        changed = override_document(request.content, request.overrides, file, content)
     except ScenarioError:
         # A kind that is not known has no values: where one is given, it is the mistake.
         kinds = [override for override in request.overrides if override.typed.endswith(".kind")]
-        chosen = override_document(request.content, kinds, request.file, declared)
-        _check_layout(chosen.document, request.file, layout, of_kinds_alone=True)
+        chosen = override_document(request.content, kinds, file, content)
+        _check_layout(chosen.document, request, content, of_kinds_alone=True)
         raise
-    # Overrides may name kinds that the file does not.
-    declared.find_kinds(changed.document, request.file)
-    _check_layout(changed.document, request.file, layout)
+    if request.overrides:
+        _check_layout(changed.document, request, content)
     paths = [f"{section}.{name}" for section in FORMS for name in value_at(changed.document, section) or ()]
     pair = in_two_forms(paths)
     if pair is not None:
-        raise DocumentReader(request.file, changed.document, changed.paths).refusal(pair[1], either(pair[1]))
+        raise DocumentReader(file, changed.document, changed.paths, request.text).refusal(pair[1], either(pair[1]))
     return layout.build(request, changed)
 
 
 def _check_layout(
-    document: dict[str, Any], file: str, layout: Layout, may_have_gaps: bool = False, of_kinds_alone: bool = False
+    document: dict[str, Any],
+    request: ScenarioRequest,
+    content: Content,
+    may_have_gaps: bool = False,
+    of_kinds_alone: bool = False,
 ) -> None:
-    """Raise ScenarioError for unknown keys and components, and for missing keys unless ``may_have_gaps``.
+    """Raise ScenarioError for unknown keys and kinds, wrong texts, and missing keys unless ``may_have_gaps``.
 
-    With ``of_kinds_alone`` only an unknown ``kind`` is an error.
+    Beside these, numbers that cannot be read are named. With ``of_kinds_alone`` only an unknown ``kind`` is an error.
     """
-    # The whole layout has every kind of everything: it is made for a message alone.
-    for model in (layout.model, layout.whole):
-        try:
-            model(document).model_validate(document)
-        except ValidationError as error:
-            errors = error.errors(include_url=False)
-        else:
-            return
-    if of_kinds_alone:
-        problems = [detail for detail in errors if is_unknown_kind(detail)]
-    else:
-        problems = [detail for detail in errors if not (may_have_gaps and is_gap(detail))]
-    if problems:
-        raise ScenarioError(f"{file}: {all_problems(problems, layout.whole(document))}")
+    file = request.file
+
+    def place(path: str) -> str:
+        is_of_file = value_at(document, path) == value_at(request.content, path)
+        return line_of(request.text, path) if is_of_file else ""
+
+    with refused_as(ScenarioError, file, KindError):
+        fields = content.declare(document)
+    found = dict(layout_of(fields, reads_numbers=False).faults(document))
+    if found.get("motion.kind"):
+        # Another motion may be of another file: nothing else is known.
+        raise ScenarioError(f"{file}: {place('motion.kind')}{found['motion.kind']}")
+    gaps = [path for path, fault in found.items() if not fault]
+    faults = [path for path, fault in found.items() if fault and (not of_kinds_alone or path.endswith(f".{KIND}"))]
+    if not faults and (may_have_gaps or of_kinds_alone or not gaps):
+        return
+    # Where something is wrong anyway, numbers that cannot be read are named with it.
+    found = found if of_kinds_alone else dict(layout_of(fields).faults(document))
+    said = {
+        path: fault
+        for path, fault in found.items()
+        if (path in faults if of_kinds_alone else fault or not may_have_gaps)
+    }
+    refuse(said, file, ScenarioError, place)

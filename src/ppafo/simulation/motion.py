@@ -14,6 +14,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.errors import DataError, ScenarioError
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import (
     ANGLE,
@@ -24,16 +25,14 @@ from ppafo.simulation.declaration import (
     LOCKED_ANGLE,
     SUPPLY_LINE,
     THERMAL,
-    motion_quantities,
     profile_settings,
     quantities,
     shank_settings,
 )
-from ppafo.simulation.document import DocumentReader, kind_at, value_at
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.motion_kind import VANE, LawSignals, Measured, MotionSection, ProfileTable, RunTimes
 from ppafo.simulation.profiles import TOLERANCE, profile_problem, read_profile, stops_of
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
-from ppafo.simulation.schema import profile_table, shank_table
 from ppafo.units.shown import shown_text
 from ppafo.wording import one_line
 
@@ -73,17 +72,19 @@ class VaneKind:
     def quantities(self, scenario: Scenario) -> dict[str, Quantity]:
         """Return the declarations of all numbers of a scenario except those of its device, keyed by path."""
         profile = self.section.profile
-        kind = "" if profile is None else getattr(scenario.motion, profile.name).kind
-        of_motion = motion_quantities(self.section, kind)
-        # Numbers that are not where their path says come last, where those of a vane are listed.
-        elsewhere = {path: of_motion.pop(path) for path in self.places if path in of_motion}
-        document: dict[str, Any] = {"controller": {"kind": scenario.controller.kind}}
+        moved = {} if profile is None else {profile.name: {"kind": getattr(scenario.motion, profile.name).kind}}
+        document: dict[str, Any] = {
+            "motion": moved,
+            "controller": {"kind": scenario.controller.kind},
+        }
         # A constant command follows no reference, whatever the scenario has in its place.
         if self.follows_reference(scenario):
             document["reference"] = {"kind": scenario.reference.kind, "of": scenario.controlled}
         document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
         document |= {} if scenario.supply_line is None else {SUPPLY_LINE: {}}
-        return quantities(document, of_motion) | elsewhere
+        declared = quantities(document, self.section)
+        # Numbers that are not where their path says come last, where those of a vane are listed.
+        return declared | {path: declared.pop(path) for path in self.places if path in declared}
 
     def clock(self, scenario: Scenario, times: Mapping[str, Any]) -> "tuple[RunTimes, tuple[Problem, ...]]":
         """Return the clock with other times [s], by path, and the problems of contradictory times."""
@@ -199,7 +200,6 @@ PRESCRIBED_MOTION = VaneKind(
             "profile",
             "angle in time",
             partial(profile_settings, prescribed=ANGLE_LEVEL),
-            partial(profile_table, ANGLE_LEVEL, "Angle"),
         ),
     ),
     plan=_plan,
@@ -252,7 +252,10 @@ LEG_MOTION = VaneKind(
         LEG,
         _read_leg,
         ProfileTable(
-            "shank", "angle of the shank in time, 0 upright", shank_settings, shank_table, {GAIT_SHANK: ("gait",)}
+            "shank",
+            "angle of the shank in time, 0 upright",
+            shank_settings,
+            {GAIT_SHANK: {"gait": "name of a gait, or a path relative to this file"}},
         ),
     ),
     plan=_plan_leg,

@@ -153,15 +153,14 @@ class MotionSection:
 class ProfileTable:
     """Table of a profile within ``[motion]``: its ``kind`` and settings; ``name`` is also the motion's attribute.
 
-    ``settings(kind)`` declares its numbers, ``layout()`` is the model of the table. ``own`` maps ``kind`` values that
-    are no profiles to the texts that each requires.
+    ``settings(kind)`` declares its numbers. ``own`` maps ``kind`` values that are no profiles to the texts that each
+    requires, with the meaning of each.
     """
 
     name: str
     summary: str
     settings: Callable[[str], tuple[Quantity, ...]]
-    layout: Callable[[], Any]
-    own: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    own: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 VANE, WALK = "vane", "walk"

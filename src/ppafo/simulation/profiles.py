@@ -15,9 +15,10 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity, Ends
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.declared import kind_at
 from ppafo.parameters.device import Device
 from ppafo.signals.recording import OF_SECOND_CHAMBER
-from ppafo.simulation.document import DocumentReader, kind_at
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 from ppafo.units.shown import in_units, shown_text
 

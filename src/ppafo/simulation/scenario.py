@@ -28,6 +28,13 @@ PYTHON_CONTROLLER = "python"
 LARGEST_SEED = 2**32 - 1
 """Largest random seed, of noise and of draws (32 bits), exactly representable in a column of floats."""
 
+PRESSURE_WORDS = {
+    "supply": "pressure",
+    "dorsiflexion_supply": "dorsiflexion_pressure",
+    "atmosphere": "atmospheric_pressure",
+}
+"""Words for the pressures of the device, mapped to the names of these pressures in its supply."""
+
 UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques in N m"
 
 
@@ -214,8 +221,12 @@ class RunSettings:
 class Initial:
     """Initial pressures of both chambers [Pa absolute]."""
 
-    pressure_1: Annotated[float, Number("Pa_a", "pressure in chamber 1 at the start", None, 1.0e3, 1.0e8)]
-    pressure_2: Annotated[float, Number("Pa_a", "pressure in chamber 2 at the start", None, 1.0e3, 1.0e8)]
+    pressure_1: Annotated[
+        float, Number("Pa_a", "pressure in chamber 1 at the start", None, 1.0e3, 1.0e8, words=tuple(PRESSURE_WORDS))
+    ]
+    pressure_2: Annotated[
+        float, Number("Pa_a", "pressure in chamber 2 at the start", None, 1.0e3, 1.0e8, words=tuple(PRESSURE_WORDS))
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,7 +294,7 @@ class Sensors:
     ] = 0.0
     angle_resolution: Annotated[float, Number("rad", "resolution of the measured angle", 0.0, 0.0, 10.0)] = 0.0
     pressure_resolution: Annotated[float, Number("Pa_d", "resolution of the measured pressures", 0.0, 0.0, 1.0e8)] = 0.0
-    seed: Annotated[int, Number("", "seed of the noise, a whole number", 1.0, 0.0, float(LARGEST_SEED))] = 1
+    seed: Annotated[int, Number("", "seed of the noise, a whole number", 1.0, 0.0, float(LARGEST_SEED), whole=True)] = 1
     angle_bandwidth: float = 0.0
     pressure_bandwidth: float = 0.0
 

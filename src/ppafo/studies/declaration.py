@@ -10,7 +10,8 @@ from typing import Annotated, Literal, get_args
 from pydantic import Field
 
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema
-from ppafo.documents.problems import LABEL, NAME
+from ppafo.documents.problems import LABEL
+from ppafo.documents.toml_text import NAME
 from ppafo.simulation.scenario import LARGEST_SEED
 
 MAXIMUM_RUNS = 2**32

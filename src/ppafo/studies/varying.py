@@ -11,9 +11,9 @@ from ppafo.errors import ScenarioError, UnitError, refused_as
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import fits, is_within, range_rule
+from ppafo.parameters.declared import PLAIN
 from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, in_first_unit, unit_in
-from ppafo.simulation.document import PLAIN
 from ppafo.simulation.hardware import parameter_set_of
 from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario

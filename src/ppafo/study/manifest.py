@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from ppafo.documents.json_text import plain
 from ppafo.documents.models import validate
-from ppafo.documents.problems import quote
+from ppafo.documents.toml_text import quote
 from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError, UnitError
 from ppafo.metrics import METRICS

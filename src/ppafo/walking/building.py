@@ -6,14 +6,15 @@ from pathlib import Path
 
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.errors import DataError, ParameterError, ScenarioError, refused_as
-from ppafo.gait import NORMATIVE, Gait, load_gait
+from ppafo.gait import NORMATIVE, load_gait
+from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.assumptions import assumed_lines
 from ppafo.simulation.building import origin_of, read_gas_model, read_supply_line
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
 from ppafo.simulation.default_gains import default_gain_terms
-from ppafo.simulation.document import DocumentReader, ScenarioRequest, kind_at, value_at
+from ppafo.simulation.document import DocumentReader, ScenarioRequest
 from ppafo.simulation.following import read_followers
 from ppafo.simulation.hardware import read_device, read_hardware
 from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
@@ -21,7 +22,7 @@ from ppafo.simulation.motion_kind import MOTIONS, WALK
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument
 from ppafo.simulation.scenario import Assumption, Control, Initial, RunSettings, Scenario, Sensors
-from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
+from ppafo.walking.bottle.supply import BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
     DURATION,
@@ -46,14 +47,12 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     Raises ScenarioError, ParameterError or DataError for the first value that cannot be used.
     """
     document = changed.document
-    if BOTTLE_NAME in request.instead:
-        document.setdefault(BOTTLE, {})["name"] = request.instead[BOTTLE_NAME]
-    reading = DocumentReader(request.file, document, changed.paths)
+    reading = DocumentReader(request.file, document, changed.paths, request.text)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     with refused_as(ParameterError, f"{request.file}: [device]", ParameterError):
         device.check_pressurised("a walk, whose controllers fill the chambers,")
-    bottle = read_bottle(reading, device, Path() if BOTTLE_NAME in request.instead else request.folder)
+    bottle = read_bottle(reading, device, request.folder)
     if bottle is not None:
         # A bottle always feeds lines, by default those of the declarations.
         document.setdefault(SUPPLY_LINE, {})
@@ -65,11 +64,6 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, sensors)
     atmosphere = device.supply.atmospheric_pressure
-    # The origin has absolute paths, which are valid in any folder.
-    instead = tuple(
-        f"{path}={Path(name).absolute() if Path(name).suffix == '.toml' else name}"
-        for path, name in request.instead.items()
-    )
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
@@ -84,7 +78,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=_assumed(reading, bottle),
-        origin=origin_of(request, changed, hardware, instead),
+        origin=origin_of(request, changed, hardware),
         gas_model=read_gas_model(reading),
         supply_line=line,
         links={**links, **links_of_stature(reading.document)},
@@ -101,7 +95,11 @@ def _motion(
     sensors: Mapping[str, float],
 ) -> WalkMotion:
     """Return the motion of a walk: wearer, gait, tasks, bottle; ``sensors`` are the sensor settings [SI]."""
-    gait, is_named = _gait(reading, request)
+    name = reading.document.get("gait", NORMATIVE)
+    # A relative path starts in the folder of the document.
+    with refused_as(DataError, reading.quote("gait"), DataError):
+        gait = load_gait(request.folder / name if Path(name).suffix == ".toml" else name)
+    is_named = "gait" in reading.document
     return WalkMotion(
         motion_kind=MOTIONS[kind_at(reading.document, "motion") or WALK],
         gait=gait,
@@ -110,22 +108,6 @@ def _motion(
         bottle=bottle,
         wearer_origin=wearer_origin(reading, gait, is_named),
     )
-
-
-def _gait(reading: DocumentReader, request: ScenarioRequest) -> tuple[Gait, bool]:
-    """Return the gait of a walk, and whether it is named; a relative path is resolved in the folder of the document.
-
-    An error about a gait that the document names starts with its key; an option names its file itself.
-    """
-    if "gait" in request.instead:
-        return load_gait(request.instead["gait"]), True
-    name = reading.document.get("gait")
-    if name is None:
-        return load_gait(NORMATIVE), False
-    if Path(name).suffix == ".toml" and not Path(name).is_absolute():
-        name = str(request.folder / name)
-    with refused_as(DataError, reading.quote("gait"), DataError):
-        return load_gait(name), True
 
 
 def _control(reading: DocumentReader, device: Device, sensors: Mapping[str, float]) -> tuple[Control, Graph]:

@@ -15,7 +15,8 @@ from ppafo.control.catalog import switching_remedy
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at
-from ppafo.simulation.document import DocumentReader, value_at
+from ppafo.parameters.declared import quantities_in, value_at
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import split_quantity
 from ppafo.units.shown import shown_in, shown_text, units_beside
@@ -88,7 +89,7 @@ def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
             continue
         if path in _OF_DEVICE:
             raise ScenarioError(f"{reading.file}: {path}: {reason(0)}")
-        quantity, given = OF_A_WALK.quantities(reading.document).get(path), value_at(reading.document, path)
+        quantity, given = quantities_in(OF_A_WALK.declare(reading.document)).get(path), value_at(reading.document, path)
         units = dict(scenario.device.shown)
         # Limits in the unit of the value that is refused.
         if quantity is not None and isinstance(given, str):

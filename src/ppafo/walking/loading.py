@@ -7,25 +7,24 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.arguments import Overrides, checked
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ScenarioError, at_fault
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.simulation.document import ScenarioRequest
 from ppafo.simulation.loading import FILE as SCENARIO_FILE
-from ppafo.simulation.loading import Layout, list_scenarios, request_again, scenario_of
+from ppafo.simulation.loading import Layout, list_scenarios, request_again, request_of_file, scenario_of
 from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME
 from ppafo.walking.building import build_walk
-from ppafo.walking.declaration import OF_A_WALK, walk_file
+from ppafo.walking.declaration import OF_A_WALK
 from ppafo.walking.motion import walk_of
-from ppafo.wording import argument_text, one_line
+from ppafo.wording import argument_text
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
-WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
+WALKING = Layout(FILE, OF_A_WALK, build_walk)
 """Layout of scenarios whose motion is a walk."""
 
 
@@ -85,23 +84,20 @@ def load_walk(
     'solenoid'
     """
     name_plugins(plugins)
-    file, changes = label(str(scenario)), read_overrides(overrides, ScenarioError)
     chosen = {"gait": gait, BOTTLE_NAME: bottle}
-    instead = {path: str(value) for path, value in chosen.items() if value is not None}
-    # An override of a file that is given as an argument is refused.
-    for override in changes:
-        path = override.typed
-        other = instead.get(OF_A_WALK.same.get(path, path))
-        if other is not None:
-            raise ScenarioError(
-                f"{file}: override '{override}': the {path.partition('.')[0]} is already given as "
-                f"'{one_line(other)}'; omit one of them"
-            )
+    named = [f"{path}={from_here(value)}" for path, value in chosen.items() if value is not None]
+    changes, replacing = read_overrides((*overrides, *named), ScenarioError), set_or_load(parameter_set)
     with at_fault("scenario"):
-        content = (SCENARIO_FILE if str(scenario) in list_scenarios() else FILE).read(scenario)
-    document, folder = FILE.parse(content, file), Path(scenario).parent
-    request = ScenarioRequest(file, str(scenario), folder, document, changes, set_or_load(parameter_set), instead)
+        request = request_of_file(
+            scenario, changes, replacing, SCENARIO_FILE if str(scenario) in list_scenarios() else FILE
+        )
     return scenario_of(request, WALKING)
+
+
+def from_here(name: str | Path) -> str:
+    """Return the path of a file from the working folder as an absolute one, which holds in any folder."""
+    text = str(name)
+    return str(Path(text).absolute()) if "/" in text or Path(text).suffix == ".toml" else text
 
 
 def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable[str] = ()) -> Scenario:
@@ -117,16 +113,16 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
             f"{scenario.name}: this walk differs from its file (the walk, the file or the package was changed after "
             f"loading): give {argument_text('bottle')} when loading the walk"
         )
-    content, before, instead = request.content, request.overrides, {}
+    content, before = request.content, request.overrides
     if bottle is not None:
         # Another bottle replaces the whole section, including its overrides.
         content = {name: section for name, section in content.items() if name != BOTTLE}
         before = tuple(override for override in before if not override.typed.startswith(f"{BOTTLE}."))
-        instead = {BOTTLE_NAME: str(bottle)}
     prefix = f"{BOTTLE}."
-    texts = (text if text.startswith(prefix) else f"{prefix}{text}" for text in overrides)
-    combined = over_layer(content, before, read_overrides(texts, ScenarioError), scenario.name, WALKING.declared)
-    return scenario_of(replace(request, content=content, overrides=combined, instead=instead), WALKING)
+    texts = [text if text.startswith(prefix) else f"{prefix}{text}" for text in overrides]
+    texts += [] if bottle is None else [f"{BOTTLE_NAME}={from_here(bottle)}"]
+    combined = over_layer(content, before, read_overrides(texts, ScenarioError), scenario.name, WALKING.content)
+    return scenario_of(replace(request, content=content, overrides=combined), WALKING)
 
 
 def _without_bottle(scenario: Scenario) -> tuple[Any, ...]:

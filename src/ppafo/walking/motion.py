@@ -13,11 +13,12 @@ from ppafo.gait import Gait
 from ppafo.gait.plausible_angles import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
-from ppafo.simulation.declaration import THERMAL, line_paths
+from ppafo.parameters.declared import quantities_in
+from ppafo.simulation.declaration import THERMAL
 from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BottleSupply
-from ppafo.walking.declaration import FORCES, by_path, sections
+from ppafo.walking.declaration import FORCES, declared
 from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
 
@@ -80,10 +81,17 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 """Attributes or keys that lead to the numbers of a walk that other scenarios do not have, by path."""
 
 
+_SECTIONS = "wearer", "controller", "sensors", "run", "gas_model", "supply_line"
+"""Sections with numbers of a walk, in the order in which they are listed."""
+
+
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of all numbers of a walk except those of the device, by path."""
-    declared = sections(scenario.controller.kind, "" if scenario.gas_model is None else THERMAL)
-    return by_path(declared) | ({} if scenario.supply_lines is None else line_paths())
+    document: dict[str, Any] = {"controller": {"kind": scenario.controller.kind}}
+    document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
+    found = quantities_in(declared(document))
+    sections = _SECTIONS if scenario.supply_lines is not None else _SECTIONS[:-1]
+    return {path: found[path] for section in sections for path in found if path.partition(".")[0] == section}
 
 
 def record_interval(seconds: float) -> float:

@@ -18,9 +18,10 @@ from ppafo.gait import Gait
 from ppafo.model.binding import made_of
 from ppafo.model.declaration import Number, PlainFunction, Quantity, quantities_of
 from ppafo.model.leg import LegParameters
+from ppafo.parameters.declared import value_at
 from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.simulation.declaration import FOOT
-from ppafo.simulation.document import DocumentReader, value_at
+from ppafo.simulation.document import DocumentReader
 
 SHANK_SHARE = 0.246
 """Shank length as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement,

@@ -43,7 +43,7 @@ class Interrupt:
                 raise
 
 sys.meta_path.insert(0, Interrupt())
-sys.argv = ["ppafo", "doctor", "--schema", "scenario"]
+sys.argv = ["ppafo", "doctor", "--schema", "study"]
 from ppafo.__main__ import start
 sys.exit(start())
 """

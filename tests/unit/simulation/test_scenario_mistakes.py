@@ -1,6 +1,7 @@
 """Every mistake in a scenario is one line: the file, the key, the value, what is allowed, the nearest name."""
 
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -65,15 +66,25 @@ def problem_after(old: str, new: str, kind: type[PpafoError] = ScenarioError) ->
         ("[controller]", "[controler]", "controler", "controller"),
         ("proportional_gain", "proportionl_gain", "controller.proportionl_gain", "proportional_gain"),
         ("angle =", "angel =", "motion.angel", "angle"),
-        ("duration", "durration", "run.durration", "duration"),
-        ("pressure_2", "presure_2", "initial.presure_2", "pressure_2"),
-        ("delay", "dellay", "sensors.dellay", "delay"),
         ("valve =", "valvee =", "device.valvee", "valve"),
-        ("level", "levell", "reference.levell", "level"),
     ],
 )
 def test_a_misspelt_key_is_answered_with_the_nearest(old: str, new: str, key: str, nearest: str) -> None:
     assert f"unknown key '{key}', did you mean '{nearest}'?" in problem_after(old, new)
+
+
+def test_each_of_four_mistakes_is_named_with_its_line(tmp_path: Path) -> None:
+    text = TEXT.replace("angle =", "angel =").replace('"3 s"', '"3 m"').replace("seed = 1", "seed = 1.5")
+    (file := tmp_path / "task.toml").write_text(text.replace('name = "task"', ""))
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(file)
+    said = [part.removeprefix(f"{file}: ").partition(";")[0].rstrip("?") for part in caught.value.parts]
+    assert said == [
+        "line 10: run.duration = '3 m': unit 'm' does not fit: a unit like 's' is needed",
+        "line 16: unknown key 'motion.angel', did you mean 'angle'",
+        "line 33: sensors.seed = 1.5: must be a whole number",
+        "'name' is missing",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -93,12 +104,8 @@ def test_an_unknown_kind_is_answered_with_what_there_is(old: str, new: str, near
     [
         ('duration = "3 s"', "'run.duration' is missing"),
         ('kind = "pid"', "'controller.kind' is missing"),
-        ('set = "ppafo2011"', "'device.set' is missing"),
-        ('angle = "75 deg"', "'motion.angle' is missing"),
         ('rate = "1 kHz"', "'controller.rate' is missing"),
-        ('name = "task"', "'name' is missing"),
         ("schema_version = 1", "'schema_version' is missing"),
-        ('level = "6 N m"', "'reference.level' is missing"),
     ],
 )
 def test_what_is_missing_is_named(line: str, missing: str) -> None:
@@ -114,15 +121,12 @@ def test_what_is_missing_is_named(line: str, missing: str) -> None:
             "motion.angle = 75: a number without a unit; must be a text with its unit, for example '75 deg'",
         ),
         ('"75 deg"', '"75"', "an angle is needed, for example '75 deg'"),
-        ('"75 deg"', '"75 N m"', "an angle is needed"),
         ('"75 deg"', '"75 degg"', "'degg' is not a known unit, did you mean 'deg'?"),
         ('"75 deg"', '"warm"', "does not start with a number"),
         ('"75 deg"', "true", "motion.angle = True: must be a text with its unit"),
-        ('"75 deg"', '["75 deg"]', "must be a text with its unit"),
         ('"75 deg"', "1979-05-27", "must be a text with its unit"),
         ('"75 deg"', '"1e400 deg"', "not a finite number"),
         ('"0.095 1/(N m)"', "0.095", "for example '0.095 1/(N m)'"),
-        ('"0.095 1/(N m)"', '"0.095 N m"', "a unit like '1/(N m)' is needed"),
         (
             '"0.095 1/(N m)"',
             '"-1 1/(N m)"',
@@ -131,11 +135,6 @@ def test_what_is_missing_is_named(line: str, missing: str) -> None:
         ('"0 psi_g"', '"50 psi"', "'psi' needs the kind of pressure"),
         ('"0 psi_g"', '"50 psi_d"', "a pressure level is needed"),
         ('"0 psi_g"', "50", "for example '50 psi_g'"),
-        (
-            '"0 psi_g"',
-            '"-20 psi_g"',
-            "initial.pressure_1 = '-20 psi_g': must be at least",
-        ),
         ('"0 psi_g"', '"0 Pa_a"', "at least 1000 Pa_a"),
         (
             '"atmosphere"',
@@ -144,7 +143,6 @@ def test_what_is_missing_is_named(line: str, missing: str) -> None:
         ),
         ('"6 N m"', '"6 deg"', "a unit like 'N m' is needed"),
         ('"6 N m"', '"1e9 N m"', "must be at least -10000 N m and at most 10000 N m ("),
-        ('"1 kHz"', '"1 ms"', "a unit like 'Hz' is needed"),
         ('"1 kHz"', '"0 Hz"', "samples per second"),
         ("seed = 1", "seed = 1.5", "sensors.seed = 1.5"),
         ("seed = 1", "seed = -1", "sensors.seed = -1"),
@@ -165,7 +163,6 @@ def test_a_value_that_does_not_fit_says_what_would(old: str, new: str, reason: s
     ("angle", "stops"),
     [
         ("19.9 deg", "20 deg to 130 deg"),
-        ("130.1 deg", "20 deg to 130 deg"),
         ("-1 rad", "0.349066 rad to 2.26893 rad"),
     ],
 )
@@ -211,7 +208,6 @@ def test_a_ramp_that_would_leave_the_stops_after_the_run_is_allowed() -> None:
     ("old", "new", "reason"),
     [
         ('"3 s"', '"0 s"', "run.duration = '0 s': must be more than 0 s"),
-        ('"3 s"', '"-1 s"', "run.duration = '-1 s': must be more than 0 s"),
         ('"3 s"', '"2 min^2"', "a unit like 's' is needed"),
         (
             'step = "1 ms"',

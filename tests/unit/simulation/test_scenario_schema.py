@@ -8,8 +8,8 @@ import jsonschema  # type: ignore[import-untyped]
 import pytest
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.loading import json_schema
 from ppafo.simulation.loading import list_scenarios
-from ppafo.simulation.schema import json_schema
 
 
 def document_of(name: str) -> dict[str, Any]:

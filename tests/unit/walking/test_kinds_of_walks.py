@@ -34,7 +34,7 @@ def test_a_kind_of_another_package_plans(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_kind_that_is_not_there_is_refused_with_those_that_are() -> None:
-    with pytest.raises(ScenarioError, match=r"motion\.kind=wlak' is not known, did you mean 'walk'"):
+    with pytest.raises(ScenarioError, match=r"motion\.kind = 'wlak' is not known, did you mean 'walk'"):
         load_walk("proportional", ["motion.kind=wlak"])
 
 

@@ -26,7 +26,7 @@ from ppafo.identification.trajectory.section import SectionContext, solve_sectio
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
-from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
+from ppafo.parameters.parameter_set import Citation, ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
 from ppafo.progress import Report, report_nothing
 from ppafo.signals.recording import TIME
 from ppafo.storage.column_map import MappedChannel
@@ -241,7 +241,7 @@ def _described_set(identification: Identification, problem: ProblemFile) -> Para
         file=f"{problem.name}.toml",
         name=problem.name,
         title=problem.title or f"{old.title}, {outcome} on {old.name} from {shown}",
-        citation=problem.citation or old.citation,
+        citation=old.citation if (cited := problem.citation) is None else Citation(**cited.model_dump()),
         # The new set may go anywhere, where the path of a file would not lead to its parent.
         parent=problem.device.set if problem.device.set in list_sets() else "",
         notes=f"{old.notes.rstrip()}\n{origins}".lstrip(),

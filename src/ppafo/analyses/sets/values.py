@@ -22,12 +22,12 @@ def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
     entries = sorted(parameter_set.entries().items(), key=lambda entry: _SECTIONS.index(entry[0].partition(".")[0]))
     return {
         **fields_of(parameter_set, "name", "title", "completed_by", "parent", "default_valve"),
-        "citation": None if citation is None else citation.model_dump(mode="json"),
+        "citation": None if citation is None else asdict(citation),
         "notes": parameter_set.notes.strip(),
         "valves": dict(parameter_set.valve_kinds),
         "actuator": parameter_set.actuator_kind,
         "joint": asdict(parameter_set.joint),
-        "values": [{"path": path, **entry.model_dump(mode="json")} for path, entry in entries],
+        "values": [{"path": path, **asdict(entry)} for path, entry in entries],
         "accepted": dict(parameter_set.accepted),
     }
 

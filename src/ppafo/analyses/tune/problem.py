@@ -13,8 +13,7 @@ from pydantic import Field
 
 from ppafo.arguments import Overrides, checked
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
-from ppafo.documents.problems import NAME
-from ppafo.documents.toml_text import TomlKind, beside
+from ppafo.documents.toml_text import NAME, TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.plugins import Plugins, name_plugins

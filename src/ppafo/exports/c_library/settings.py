@@ -8,11 +8,11 @@ from ppafo.model.catalog import device_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import consistency
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
+from ppafo.parameters.declared import value_at
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.clock import step_unless_given, step_with_output, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE
-from ppafo.simulation.document import value_at
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form, path_of_locked_angle
 from ppafo.simulation.profiles import TOLERANCE
 from ppafo.simulation.scenario import Scenario

@@ -15,8 +15,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, make_schema, read_model
-from ppafo.documents.problems import NAME
-from ppafo.documents.toml_text import TomlKind
+from ppafo.documents.toml_text import NAME, TomlKind
 from ppafo.errors import DataError, UnitError, raise_noted, refused_as
 from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.units import parse_quantity

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ppafo.documents.models import StrictTable, Text, Texts
-from ppafo.documents.problems import NAME
+from ppafo.documents.toml_text import NAME
 from ppafo.identification.keys import Columns, Confidence
 from ppafo.identification.trajectory.experiment import ALL_INPUTS
 

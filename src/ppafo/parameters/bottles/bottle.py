@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.documents.models import read_model
+from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.model.cold_gas import ColdSupply, Passage
@@ -21,10 +21,11 @@ from ppafo.model.source import (
     liquid_density,
     pressure_reserve,
 )
-from ppafo.parameters.bottles.declaration import FILLS, PATHS, REQUIRED, SECTIONS, WARMING, bottle_file
+from ppafo.parameters.bottles.declaration import FILLS, PATHS, REQUIRED, WARMING, declared
 from ppafo.parameters.bottles.fluid import Fluid, check_temperature, filled_mass, filling_text, load_fluid
+from ppafo.parameters.declared import check_keys, value_at
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
-from ppafo.parameters.parameter_set import SOURCE, Entry, allowed_number
+from ppafo.parameters.parameter_set import SOURCE, Entry, allowed_number, number_entry
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_text
 from ppafo.wording import changed_text, known_names, nearest_name, said_missing
@@ -85,9 +86,9 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     name, bundled = label(str(name_or_path)), list_bottles()
     if not (name in bundled or Path(name_or_path).suffix == ".toml" or "/" in name):
         raise ParameterError(f"there is no bottle '{name}'{known_names(name, bundled)}, or give a .toml file")
-    parsed, file = read_model(FILE, bottle_file(), name_or_path)
+    parsed, file = _read(name_or_path)
     # A file need not state how its regulator and hose warm the gas: they then do so as the paper's.
-    paper = _entries_of(read_model(FILE, bottle_file(), PAPER_BOTTLE)[0])
+    paper = _entries_of(_read(PAPER_BOTTLE)[0])
     entries = {path: paper[path] for path in WARMING} | _entries_of(parsed)
     changes = override_set(read_overrides(overrides), forms=FILLS)
     for path, override in changes.items():
@@ -105,17 +106,24 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     return replace(bottle, title=f"{bottle.title} ({changed})") if changes else bottle
 
 
-def _entries_of(parsed: Any) -> dict[str, Entry]:
+def _read(name_or_path: str | Path) -> tuple[dict[str, Any], str]:
+    """Read and check a bottle file. Returns its document and the label used in messages."""
+    file, content = label(str(name_or_path)), FILE.read(name_or_path)
+    document = FILE.parse(content, file)
+    check_keys(document, declared(document), file, ParameterError, decoded(content))
+    return document, file
+
+
+def _entries_of(document: Mapping[str, Any]) -> dict[str, Entry]:
     """Return the numbers given in a bottle file, by dotted path."""
-    sections = {section: getattr(parsed, section) for section in SECTIONS}
-    entries = {path: getattr(sections[path.partition(".")[0]], path.partition(".")[2], None) for path in PATHS}
-    return {path: entry for path, entry in entries.items() if entry is not None}
+    tables = {path: table for path in PATHS if (table := value_at(document, path)) is not None}
+    return {path: number_entry(table) for path, table in tables.items()}
 
 
-def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
+def _build(parsed: Mapping[str, Any], entries: Mapping[str, Entry], file: str) -> Bottle:
     """Build a bottle from its values. Raises ParameterError for missing or impossible values."""
-    with refused_as(ParameterError, f"{file}: gas = '{parsed.gas.value}'", ParameterError):
-        fluid = load_fluid(parsed.gas.value)
+    with refused_as(ParameterError, f"{file}: gas = '{parsed['gas']['value']}'", ParameterError):
+        fluid = load_fluid(parsed["gas"]["value"])
     values: dict[str, float] = {}
     wrong: list[PpafoError] = []
     for path, entry in entries.items():
@@ -131,8 +139,8 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
         wrong.append(ParameterError(f"{file}: {said_missing(missing)}{filling}; {remedy}"))
     raise_noted(wrong)
     bottle = Bottle(
-        name=parsed.name,
-        title=parsed.title,
+        name=parsed["name"],
+        title=parsed["title"],
         fluid=fluid,
         heat_capacity_ratio=SPECIES[fluid.name].heat_capacity_ratio,
         volume=values["bottle.volume"],

@@ -1,15 +1,13 @@
 """Declarations of the numbers of a bottle file with their ranges, and file layout."""
 
-import functools
+from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel, Field
-
-from ppafo.documents.models import SchemaVersion, make_schema, optional, table
-from ppafo.documents.problems import NAME
+from ppafo.documents.toml_text import NAME
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.declared import Field, InnerTable, Words, inside, schema_of
 from ppafo.parameters.overrides import Forms
-from ppafo.parameters.parameter_set import Entry, TextEntry
+from ppafo.parameters.parameter_set import NUMBER_ENTRY, TEXT_ENTRY
 
 BOTTLE = (
     Quantity("volume", "m^3", "internal volume of the bottle", minimum=1e-6, maximum=1.0),
@@ -91,25 +89,21 @@ WARMING = (*(f"regulator.{quantity.name}" for quantity in BODY), *(f"hose.{quant
 """Paths of values for the warming of the gas in regulator and hose; defaults from the paper's bottle."""
 
 
-@functools.cache
-def bottle_file() -> type[BaseModel]:
-    """Return the validation model of a bottle file."""
-    fields: dict[str, Any] = {
-        "schema_version": (SchemaVersion, ...),
-        "name": (str, Field(pattern=NAME)),
-        "title": (str, Field(min_length=1)),
-        "notes": (str, ""),
-        "gas": (TextEntry, Field(description="name of the fluid, which needs a property table")),
+def declared(_document: Mapping[str, Any]) -> dict[str, Field]:
+    """Return every field of a bottle file, by path."""
+    fields: dict[str, Field] = {
+        "schema_version": Words("version of this layout", True, (1,)),
+        "name": Words(required=True, pattern=NAME),
+        "title": Words(required=True),
+        "notes": Words(),
+        **inside("gas", TEXT_ENTRY, "name of the fluid, which needs a property table", required=True),
+        **{section: InnerTable(f"section {section}", section != _OPTIONAL) for section in SECTIONS},
     }
-    for name, members in SECTIONS.items():
-        numbers = {
-            quantity.name: optional(Entry, f"{quantity.summary} [{quantity.unit or '-'}]") for quantity in members
-        }
-        section, summary = table(f"{name.capitalize()}OfABottle", numbers), f"section {name}"
-        fields[name] = optional(section, summary) if name == _OPTIONAL else (section, Field(description=summary))
-    return table("BottleFile", fields)
+    for path, quantity in PATHS.items():
+        fields |= inside(path, NUMBER_ENTRY, f"{quantity.summary} [{quantity.unit or '-'}]")
+    return fields
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a bottle file."""
-    return make_schema(bottle_file(), "ppafo bottle")
+    return schema_of("ppafo bottle", declared)

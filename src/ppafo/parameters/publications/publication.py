@@ -14,8 +14,7 @@ from typing import Literal
 from pydantic import Field
 
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, read_model
-from ppafo.documents.problems import NAME
-from ppafo.documents.toml_text import TomlKind
+from ppafo.documents.toml_text import NAME, TomlKind
 from ppafo.errors import ScenarioError
 from ppafo.wording import first_twice
 

@@ -1,7 +1,7 @@
 """Gas bottle of a walk file: parameters, gas downstream of the regulator, and settings that conflict with a bottle."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,11 @@ from ppafo.model.gas import specific_gas_constant
 from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_density
 from ppafo.parameters.bottles.bottle import Bottle, load_bottle
 from ppafo.parameters.bottles.declaration import PATHS
+from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
 from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL
-from ppafo.simulation.document import DocumentReader, kind_at, value_at
+from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.scenario import SupplyLine
 from ppafo.units import format_quantity, to_si
 from ppafo.units.shown import shown_text
@@ -125,7 +126,7 @@ class BottleSupply:
             "temperature": self.temperature,
             "least_torque": self.least_torque,
             "coupling": self.coupling,
-            "values": {path: entry.model_dump() for path, entry in self.bottle.entries.items()},
+            "values": {path: asdict(entry) for path, entry in self.bottle.entries.items()},
         }
 
 

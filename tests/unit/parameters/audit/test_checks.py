@@ -212,7 +212,7 @@ def test_an_area_that_is_the_bore_of_a_tube_is_noted() -> None:
 
 
 def with_key(path: str, key: str) -> list[AuditFinding]:
-    numbers = {**BASE.numbers, path: BASE.numbers[path].model_copy(update={"key": key})}
+    numbers = {**BASE.numbers, path: replace(BASE.numbers[path], key=key)}
     return [item for item in findings_of(replace(BASE, numbers=numbers)) if item.id.endswith("-against-statement")]
 
 

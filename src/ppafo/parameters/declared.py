@@ -1,0 +1,462 @@
+"""Declared content of a file with kinds: a field for each dotted path.
+
+``declare(document)`` returns the fields of a file; each ``kind`` in the document decides which there are. Checks,
+refusals, overrides and the JSON Schema follow from these fields alone.
+"""
+
+import contextlib
+import copy
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import MISSING, dataclass, field, fields, replace
+from functools import lru_cache
+from typing import Any, get_args, get_type_hints
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.toml_text import NAME, NAME_RULE, SCHEMA, quote
+from ppafo.errors import KindError, PpafoError, UnitError, raise_noted
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.declaration import is_within, range_rule
+from ppafo.plugins import nearest_kind
+from ppafo.units import format_quantity, parse_quantity, split_quantity
+from ppafo.units.shown import shown_unit
+from ppafo.wording import nearest_name, one_line, said_missing
+
+KIND = "kind"
+"""Key of a section that names its component, such as a controller, and so decides the other keys of the section."""
+PLAIN = ("", "1")
+"""Units of a plain number."""
+SHORT_NAME = r"^[a-z0-9][a-z0-9_-]{0,99}$"
+"""Pattern of the name of a scenario."""
+FREE_KEY = r"^[A-Za-z0-9_-]+$"
+"""Pattern of a free key: a dotted path names it, so a dot or a blank in it would make it another path."""
+JOINT_WORDS = r"^[a-z][a-z ]{0,39}$"
+RULES = {
+    NAME: NAME_RULE,
+    SHORT_NAME: f"{NAME_RULE}, at most 100",
+    FREE_KEY: "must consist of letters, digits, '-' and '_'",
+    JOINT_WORDS: "must consist of lower-case letters and blanks, at most 40",
+}
+"""Message endings for a text that does not match a pattern, by pattern."""
+_MAXIMUM_FAULTS = 5
+_MAXIMUM_TABLES = 3
+"""Largest number of tables named in a message as containing an unknown key."""
+_FORMS: Mapping[type, str] = {str: "a text in quotation marks", bool: "true or false", dict: "a table of texts"}
+_LINE = re.compile(r"\s*(?:(\[{1,2})\s*([^]#]+?)\s*\]|([\w.\"' -]+?)\s*=)")
+"""Header of a table, or key of a value."""
+_LONG_TEXT = re.compile(r"\"\"\".*?\"\"\"|'''.*?'''", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Field that is no number: a text, true or false, or (``form`` dict) a table of texts with keys of any kind.
+
+    A ``default`` is the value of a ``kind`` that may be omitted.
+    """
+
+    summary: str = ""
+    required: bool = False
+    allowed: Iterable[Any] = ()
+    form: type = str
+    pattern: str = ""
+    is_filled: bool = True
+    """False if a required text may be empty."""
+    default: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class InnerTable:
+    """Table of a file; with ``keys``, a pattern, its keys are free names."""
+
+    summary: str = ""
+    required: bool = False
+    keys: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Many:
+    """List of at least ``least`` values of one field, or of tables, whose fields ``of`` returns for each."""
+
+    of: "Quantity | Words | Declare"
+    summary: str = ""
+    required: bool = False
+    least: int = 0
+    most: int = 10**9
+
+
+Field = Quantity | Words | InnerTable | Many
+Fields = Mapping[str, Field]
+Declare = Callable[[Mapping[str, Any]], Fields]
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """Possible content of the files of one type.
+
+    ``same`` maps a path to an equivalent path under which the document keeps the value. ``appended`` maps a path to the
+    section in whose own list of overrides the value belongs, and to the path within that section.
+    """
+
+    declare: Declare
+    same: Mapping[str, str] = field(default_factory=dict)
+    appended: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    def paths(self, document: Mapping[str, Any]) -> tuple[str, ...]:
+        """Return every path that an override can set, apart from the paths of the device."""
+        found = self.declare(document)
+        texts = [path for path, item in found.items() if isinstance(item, Words) and item.form is str]
+        return (*texts, *quantities_in(found), *self.appended)
+
+
+def numbers(section: str, quantities: Iterable[Quantity]) -> dict[str, Quantity]:
+    """Return the declarations of a section, keyed by path."""
+    return {f"{section}.{quantity.name}": quantity for quantity in quantities}
+
+
+def inside(path: str, fields: Fields, summary: str = "", required: bool = False) -> dict[str, Field]:
+    """Return the fields of a table at a path."""
+    return {path: InnerTable(summary, required), **{f"{path}.{name}": field for name, field in fields.items()}}
+
+
+def fields_of(record: type[Any]) -> dict[str, Field]:
+    """Return the fields that a dataclass declares; one with a default may be omitted."""
+    hints, found = get_type_hints(record, include_extras=True), dict[str, Field]()
+    for item in fields(record):
+        is_given = item.default is MISSING
+        for declared in get_args(hints[item.name])[1:]:
+            if isinstance(declared, Quantity):
+                found[item.name] = replace(declared, name=item.name, optional=not is_given)
+            elif isinstance(declared, Words | Many):
+                found[item.name] = replace(declared, required=is_given)
+    return found
+
+
+def quantities_in(fields: Fields) -> dict[str, Quantity]:
+    """Return the numbers among fields."""
+    return {path: field for path, field in fields.items() if isinstance(field, Quantity)}
+
+
+def value_at(document: Mapping[str, Any], path: str) -> Any:
+    """Return the value of a document at a dotted path; None if there is none."""
+    node: Any = document
+    for part in path.split("."):
+        node = node.get(part) if isinstance(node, Mapping) else None
+    return node
+
+
+def kind_at(document: Mapping[str, Any], section: str) -> str:
+    """Return the value of ``kind`` in a section; "" if the section has no ``kind``."""
+    kind = value_at(document, _joined(section, KIND))
+    return kind if isinstance(kind, str) else ""
+
+
+def _joined(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name
+
+
+def number_in(value: Any, quantity: Quantity, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return a value of a file in the quantity's SI unit. Raises UnitError with the reason for an unusable one."""
+    is_text, unit = isinstance(value, str), quantity.unit
+    # True and false are whole numbers to Python.
+    if quantity.whole and (isinstance(value, bool) or not isinstance(value, int)):
+        raise UnitError("must be a whole number")
+    if isinstance(value, bool) or not isinstance(value, str | int | float) or (is_text and quantity.plain):
+        raise UnitError(f"must be {_form(quantity, 1.0)}")
+    try:
+        result = parse_quantity(value, unit, atmosphere) if isinstance(value, str) else float(value)
+    except OverflowError as error:  # a whole number of a file may be larger than any float
+        raise UnitError(str(error)) from error
+    if not is_text and not math.isfinite(result):
+        raise UnitError("is not a finite number")
+    if not is_text and not quantity.plain and unit not in PLAIN:
+        raise UnitError(f"a number without a unit; must be {_form(quantity, result)}")
+    if not is_within(result, quantity):
+        raise UnitError(range_rule(quantity, split_quantity(str(value))[1] if is_text else unit))
+    return result
+
+
+def _form(quantity: Quantity, number: float) -> str:
+    if quantity.plain or quantity.unit in PLAIN:
+        return "a number"
+    return f"a text with its unit, for example '{format_quantity(number, shown_unit(quantity.unit))}'"
+
+
+def line_of(text: str, path: str) -> str:
+    """Return the place of a path in the text of a file, ``line 12: ``, else that of its table; empty without a text."""
+    lines = _lines_in(text) if text else {}
+    while path and path not in lines:
+        path = path.rpartition(".")[0]
+    return f"line {lines[path]}: " if path else ""
+
+
+@lru_cache(maxsize=4)
+def _lines_in(text: str) -> dict[str, int]:
+    """Return the number of the line of each path in the text of a file; of a list of tables each has its number."""
+    lines, table = dict[str, int](), ""
+    for number, line in enumerate(_LONG_TEXT.sub(lambda found: "\n" * found[0].count("\n"), text).split("\n"), 1):
+        if (found := _LINE.match(line)) is None:
+            continue
+        name = re.sub(r"[\"'\s]", "", found[2] or found[3])
+        if found[1]:
+            table = name
+        if found[1] == "[[":
+            count = 0
+            while (table := f"{name}.{count}") in lines:
+                count += 1
+        lines.setdefault(table if found[1] else _joined(table, name), number)
+    return lines
+
+
+def is_required(field: Field) -> bool:
+    """Return whether a field must be given wherever its table is."""
+    if isinstance(field, Quantity):
+        return field.default is None and not (field.follows or field.words or field.optional)
+    return field.required
+
+
+@dataclass(frozen=True, slots=True)
+class FieldLayout:
+    """Fields of a document by table, for its check."""
+
+    fields: Fields
+    names: Mapping[str, list[str]]
+    reads_numbers: bool
+
+    def faults(self, table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, str]]:
+        """Yield the path of each unknown key, wrong value or missing key in a table, with the fault; "" for a gap."""
+        inner = {name: _joined(path, name) for name in self.names.get(path, ())}
+        is_decided = KIND in inner and (KIND in table or is_required(self.fields[inner[KIND]]))
+        if is_decided and (fault := self._of_value(inner[KIND], self.fields[inner[KIND]], table.get(KIND, ""))):
+            # Of an unknown kind no other key is known.
+            yield inner[KIND], fault if KIND in table else ""
+            return
+        field = self.fields.get(path)
+        keys = field.keys if isinstance(field, InnerTable) else ""
+        for name, value in table.items():
+            at = _joined(path, one_line(name))
+            if keys and not re.fullmatch(keys, str(name)):
+                yield at, f"{path}: the name {quote(name)} {RULES[keys]}"
+            elif name not in inner:
+                yield at, f"unknown key '{at}'{self._hint(str(name), list(inner))}"
+            else:
+                yield from self._inside(inner[name], value)
+        unknown = table.keys() - inner.keys()
+        for name in inner.keys() - table.keys():
+            # A key that is there under a wrong name is one mistake, not two.
+            if not any(f"did you mean '{name}'" in nearest_name(str(key), inner) for key in unknown):
+                yield from self._gaps(inner[name])
+
+    def _inside(self, path: str, value: Any) -> Iterator[tuple[str, str]]:
+        field = self.fields.get(path, InnerTable())
+        if isinstance(field, InnerTable) and isinstance(value, Mapping):
+            yield from self.faults(value, path)
+        elif isinstance(field, InnerTable):
+            required = [gap.rpartition(".")[2] for gap, _ in self._gaps(path, is_given=True)]
+            keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{path}]"
+            yield path, f"{path} = {quote(value)} must be a table{keys}"
+        elif isinstance(field, Many) and isinstance(value, list | tuple) and field.least <= len(value) <= field.most:
+            of = field.of
+            for number, item in enumerate(value):
+                at = f"{path}.{number}"
+                if isinstance(of, Quantity | Words):
+                    yield from ((at, fault) for fault in [self._of_value(at, of, item)] if fault)
+                elif isinstance(item, Mapping):
+                    yield from layout_of(
+                        {f"{at}.{name}": each for name, each in of(item).items()}, self.reads_numbers
+                    ).faults(item, at)
+                else:
+                    yield at, f"{at} = {quote(item)} must be a table, [[{path}]]"
+        elif isinstance(field, Many):
+            of, count = field.of, f"{field.least} or more " * (field.least > 0)
+            what = (
+                "numbers" if isinstance(of, Quantity) else "texts" if isinstance(of, Words) else f"tables, [[{path}]]"
+            )
+            most = f", at most {field.most}" * isinstance(of, Quantity)
+            yield path, f"{path} = {quote(value)} must be a list of {count}{what}{most}"
+        elif fault := self._of_value(path, field, value):
+            yield path, fault
+
+    def _gaps(self, path: str, is_given: bool = False) -> Iterator[tuple[str, str]]:
+        """Yield the keys that are missing where a field is not given: of a table its required keys."""
+        field = self.fields.get(path, InnerTable())
+        inner = self.names.get(path, ()) if isinstance(field, InnerTable) and (field.required or is_given) else ()
+        for name in inner:
+            yield from self._gaps(f"{path}.{name}")
+        if not inner and is_required(field):
+            yield path, ""
+
+    def _of_value(self, path: str, field: Any, value: Any) -> str:
+        """Return what is wrong with a number or text; empty if nothing is."""
+        given = f"{path} = {quote(value)}"
+        if isinstance(field, Quantity):
+            if self.reads_numbers and not (isinstance(value, str) and value.strip() in field.words):
+                try:
+                    number_in(value, field)
+                except UnitError as error:
+                    return f"{given}: {error}"
+            return ""
+        if field.allowed:
+            # A catalogue looks a text up, and knows nothing else.
+            known = field.allowed if isinstance(value, str) else tuple(field.allowed)
+            if not isinstance(value, bool | float | list | dict) and value in known:
+                return ""
+            names, is_kind = [str(name) for name in field.allowed], path.rpartition(".")[2] == KIND
+            hint = (nearest_kind if is_kind else nearest_name)(str(value), names)
+            return f"{given} is not {'known' if is_kind else 'allowed'}{hint}; allowed: {', '.join(names)}"
+        if not isinstance(value, field.form):
+            return f"{given} must be {_FORMS[field.form]}{': ' * bool(field.summary)}{field.summary}"
+        for name, item in value.items() if isinstance(value, dict) else ():
+            if not (isinstance(name, str) and isinstance(item, str)):
+                return f"{path}.{one_line(name)} = {quote(item)} must be a text in quotation marks"
+        if field.pattern and not re.fullmatch(field.pattern, value):
+            return f"{given} {RULES[field.pattern]}"
+        return f"{given} must not be empty" if field.required and field.is_filled and value == "" else ""
+
+    def _hint(self, name: str, here: list[str]) -> str:
+        """Return the hint on an unknown key: the tables that have it, else the nearest key of its own table."""
+        tables = [
+            f"[{table}]" if table else "the top of the file" for table, names in self.names.items() if name in names
+        ]
+        is_elsewhere = 0 < len(tables) <= _MAXIMUM_TABLES
+        hint = f", which is a key of {' and '.join(tables)}" if is_elsewhere else nearest_name(name, here)
+        return f"{hint}; allowed here: {', '.join(here)}"
+
+
+def layout_of(fields: Fields, reads_numbers: bool = True) -> FieldLayout:
+    """Return the layout of a file with these fields."""
+    names: dict[str, list[str]] = {}
+    for path in fields:
+        section = path
+        while section:
+            section, _, name = section.rpartition(".")
+            if name in names.setdefault(section, []):
+                break
+            names[section].append(name)
+    return FieldLayout(fields, names, reads_numbers)
+
+
+def check_keys(
+    document: Mapping[str, Any], fields: Fields, place: str, error: type[PpafoError], text: str = ""
+) -> None:
+    """Raise ``error`` with all that is wrong in a document; messages start with ``place``."""
+    refuse(dict(layout_of(fields).faults(document)), place, error, lambda path: line_of(text, path))
+
+
+def refuse(faults: Mapping[str, str], place: str, error: type[PpafoError], line: Callable[[str], str]) -> None:
+    """Raise ``error`` with faults by path, "" for a gap; ``line`` returns the place of a path in the file."""
+    found = [error(f"{place}: {line(path)}{fault}") for path, fault in faults.items() if fault]
+    gaps = [path for path, fault in faults.items() if not fault]
+    wrong = found[:_MAXIMUM_FAULTS]
+    if len(found) > _MAXIMUM_FAULTS:
+        wrong.append(error(f"{place}: and {len(found) - _MAXIMUM_FAULTS} more like these"))
+    raise_noted([*wrong, *([error(f"{place}: {said_missing(gaps)}")] if gaps else [])])
+
+
+def schema_of(title: str, *declares: Declare) -> dict[str, Any]:
+    """Return the JSON Schema of a file with the fields of one declaration, or of any of several."""
+    definitions: dict[str, dict[str, Any]] = {}
+    forms = [_table_schema(declare, {}, "", definitions) for declare in declares]
+    whole = forms[0] if len(forms) == 1 else {"anyOf": forms}
+    return {"$schema": SCHEMA, "title": title, **whole, "$defs": definitions}
+
+
+def _table_schema(
+    declare: Declare, document: Mapping[str, Any], path: str, definitions: dict[str, dict[str, Any]]
+) -> dict[str, Any]:
+    """Return the schema of a table as a reference to one of the ``definitions``, for a ``kind`` to one of each kind."""
+    fields = declare(document)
+    kind, chosen = fields.get(_joined(path, KIND)), kind_at(document, path)
+    if isinstance(kind, Words) and chosen not in kind.allowed:
+        forms = []
+        for name in kind.allowed:
+            with contextlib.suppress(KindError):  # a kind of another file, such as a walk in a scenario
+                forms.append(_table_schema(declare, _with(document, _joined(path, KIND), name), path, definitions))
+        return {"oneOf": forms} if len(forms) > 1 else forms[0]
+    described: dict[str, Any] = {"type": "object", "additionalProperties": False}
+    table = fields.get(path)
+    if isinstance(table, InnerTable) and table.keys:
+        at = f"{path}.NAME"
+        named = _with(document, at, {})
+        described["patternProperties"] = {
+            table.keys: _schema(declare(named).get(at, InnerTable()), declare, named, at, definitions)
+        }
+        described["minProperties"] = int(table.required)
+    else:
+        inner = {name: _joined(path, name) for name in layout_of(fields).names.get(path, ())}
+        described["properties"] = {
+            name: {"const": chosen}
+            if name == KIND and isinstance(kind, Words)
+            else _schema(fields.get(at, InnerTable()), declare, document, at, definitions)
+            for name, at in inner.items()
+        }
+        is_default = isinstance(kind, Words) and chosen == kind.default
+        described["required"] = [
+            name
+            for name, at in inner.items()
+            if is_required(fields.get(at, InnerTable()))
+            or (name == KIND and isinstance(kind, Words) and not is_default)
+        ]
+    if not path:
+        return described
+    # One definition for tables of the same content, such as the entries of a parameter set.
+    wanted = f"{path}.{chosen}" if chosen else path
+    name = next((known for known, other in definitions.items() if other == described), "")
+    while not name:
+        name, wanted = (wanted, "") if wanted not in definitions else ("", f"{wanted}'")
+    definitions[name] = described
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _with(document: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """Return a copy of a document with another value at a path."""
+    changed = copy.deepcopy(dict(document))
+    *tables, name = path.split(".")
+    node = changed
+    for table in tables:
+        node = node.setdefault(table, {})
+    node[name] = value
+    return changed
+
+
+def _schema(
+    field: Field, declare: Declare, document: Mapping[str, Any], path: str, definitions: dict[str, dict[str, Any]]
+) -> dict[str, Any]:
+    """Return the schema of a field with its description."""
+    summary, form = "", dict[str, Any]()
+    if isinstance(field, Quantity):
+        default = "" if field.default is None else f"; {field.default:g} unless given"
+        default = "; the device's unless given" if field.default is None and field.follows else default
+        summary = f"{field.summary} [{field.unit or '-'}]{default}".lstrip()
+        form = _number_schema(field)
+    else:
+        summary = field.summary
+    if isinstance(field, InnerTable):
+        form = _table_schema(declare, document, path, definitions)
+    elif isinstance(field, Many):
+        of = field.of
+        items = (
+            _schema(of, declare, document, path, definitions)
+            if isinstance(of, Quantity | Words)
+            else _table_schema(of, {}, "", definitions)
+        )
+        form = {"type": "array", "items": items, "minItems": field.least}
+    elif isinstance(field, Words):
+        texts = {"type": "string"} | ({"pattern": field.pattern} if field.pattern else {})
+        forms: dict[type, dict[str, Any]] = {
+            bool: {"type": "boolean"},
+            dict: {"type": "object", "additionalProperties": texts},
+        }
+        form = {"enum": list(field.allowed)} if field.allowed else forms.get(field.form, texts)
+    return form | ({"description": summary} if summary else {})
+
+
+def _number_schema(quantity: Quantity) -> dict[str, Any]:
+    if quantity.whole or quantity.plain:
+        limits = {"minimum": quantity.minimum, "maximum": quantity.maximum}
+        given = {name: limit for name, limit in limits.items() if math.isfinite(limit)}
+        return {"type": "integer" if quantity.whole else "number", **given}
+    forms: list[dict[str, Any]] = [{"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)"}]
+    forms += [{"type": "number"}] if quantity.unit in PLAIN else []
+    forms += [{"enum": list(quantity.words)}] if quantity.words else []
+    return {"anyOf": forms} if len(forms) > 1 else forms[0]
