@@ -10,9 +10,8 @@ of figure 7, and how many of the six fitted rows of ``ppafo reproduce`` are met.
 
 import argparse
 
-from ppafo.analyses.reproduce.decision_phases import phased_runs
-from ppafo.analyses.reproduce.solve import torque_task_claims, torque_task_observations
 from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
+from ppafo.analyses.reproduce.torque_task import phased_runs, torque_task_claims, torque_task_observations
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 

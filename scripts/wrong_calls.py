@@ -159,7 +159,6 @@ ARGUMENTS: Mapping[str, str] = {
     ),
     "compare_walks": "scenario minutes? progress",
     "design": "problem:object profile? threads? progress?",
-    "endurance_of_walk": "result bottle?",
     "evaluate": "recording columns?",
     "find": "scenario vary such_that highest grid overrides threads? progress?",
     "identify": "problem progress",
@@ -205,7 +204,6 @@ def right_values(recording: Path) -> dict[str, dict[str, Any]]:
         "compare": {"configurations": [TASK, "torque-task-solenoid"], "draws": 64},
         "compare_walks": {"scenario": WALK},
         "design": {"problem": "push-off"},
-        "endurance_of_walk": {"result": ppafo.walk(WALK, minutes=0.1)},
         "evaluate": {"recording": recording},
         "find": {
             "scenario": TASK,

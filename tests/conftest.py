@@ -11,8 +11,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.analyses.reproduce.result import Reproduction
-from ppafo.analyses.reproduce.solve import reproduce_paper
+from ppafo.analyses.reproduce.solve import Reproduction, reproduce_paper
 from ppafo.engine.cache import kept
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario

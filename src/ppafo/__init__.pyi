@@ -1,19 +1,18 @@
 # Written by scripts/public_api.py
 
 from ppafo.analyses.compare.question import compare as compare
-from ppafo.analyses.design.answer import Sizing as Sizing
-from ppafo.analyses.design.loading import load_design as load_design
+from ppafo.analyses.design.problem import load_design as load_design
 from ppafo.analyses.design.question import design as design
-from ppafo.analyses.endurance.answer import Endurance as Endurance
+from ppafo.analyses.design.search import Sizing as Sizing
+from ppafo.analyses.endurance.discharge import Endurance as Endurance
 from ppafo.analyses.endurance.question import bottle as bottle
-from ppafo.analyses.endurance.solve import endurance_of_walk as endurance_of_walk
 from ppafo.analyses.find.question import find as find
 from ppafo.analyses.identify.answer import Identification as Identification
 from ppafo.analyses.identify.question import identify as identify
 from ppafo.analyses.linearise.model import LinearModel as LinearModel
 from ppafo.analyses.linearise.question import linearise as linearise
 from ppafo.analyses.reproduce.question import reproduce as reproduce
-from ppafo.analyses.reproduce.result import Reproduction as Reproduction
+from ppafo.analyses.reproduce.solve import Reproduction as Reproduction
 from ppafo.analyses.sensitivity.question import sensitivity as sensitivity
 from ppafo.analyses.sets.audit import audit as audit
 from ppafo.analyses.sweep.answer import load_study_results as load_study_results
@@ -108,7 +107,6 @@ __all__ = [
     "compare",
     "compare_walks",
     "design",
-    "endurance_of_walk",
     "evaluate",
     "find",
     "identify",

@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.errors import KindError
-from ppafo.plugins import OBJECT, is_working_folder, object_of, without_working_folder
+from ppafo.plugins import OBJECT, is_working_folder, named_kinds, object_of, without_working_folder
 from ppafo.wording import one_line
 
 if TYPE_CHECKING:
@@ -93,8 +93,11 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         self._kinds |= {name: kind_at(location) for name, location in self._places.items() if name not in self._kinds}
 
     def load_all(self) -> tuple[str, ...]:
-        """Load every installed component; return and log a line for each unusable component."""
+        """Load every component that is installed or in a module of the user; return and log a line for each problem."""
         self.load_own()
+        # A module may be named in two ways, and its components are loaded once.
+        loaded = {getattr(kind, "name", name) for name, kind in self._kinds.items()}
+        self._kinds |= {word: kind for word, kind in named_kinds(self._kind_type) if kind.name not in loaded}
         problems = []
         for point in _entry_points(self.group, _installed_path()):
             try:

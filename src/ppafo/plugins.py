@@ -142,6 +142,15 @@ def object_of(word: str) -> Any:
 def nearest_kind(name: str, allowed: Iterable[str], kind_type: type = object) -> str:
     """Return a hint as ``nearest_name`` does, also of components in modules that the user named: ``module:OBJECT``."""
     words = list(allowed)
+    for word, item in named_kinds(kind_type):
+        words.append(word)
+        if item.name == name:
+            return f", did you mean '{word}'?"
+    return nearest_name(name, words)
+
+
+def named_kinds(kind_type: type) -> Iterator[tuple[str, Any]]:
+    """Yield the components in modules that the user named, with their words ``module:OBJECT``."""
     for plugin in named_plugins():
         try:
             module = _imported(plugin.module, plugin.folder)
@@ -149,12 +158,8 @@ def nearest_kind(name: str, allowed: Iterable[str], kind_type: type = object) ->
             continue
         for key, item in vars(module).items():
             own_name = getattr(item, "name", None) if type(item).__module__.startswith("ppafo.") else None
-            if not isinstance(own_name, str) or not isinstance(item, kind_type):
-                continue
-            words.append(f"{plugin.module}:{key}")
-            if own_name == name:
-                return f", did you mean '{words[-1]}'?"
-    return nearest_name(name, words)
+            if isinstance(own_name, str) and isinstance(item, kind_type):
+                yield f"{plugin.module}:{key}", item
 
 
 def plugin_words(text: str) -> list[str]:

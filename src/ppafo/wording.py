@@ -56,14 +56,22 @@ def said_missing(names: Sequence[str]) -> str:
     return f"{listed} is missing" if len(quoted) == 1 else f"{listed} are missing"
 
 
-_OF_DATA_SHEETS: Mapping[str, str] = {
-    "cv": "3.87 L/(s bar) for each Cv [US gal/min, psi]",
-    "kv": "4.48 L/(s bar) for each Kv [m^3/h, bar]",
-    "qn": "qn/254 L/(s bar) for qn [L/min] from 6 to 5 bar gauge",
+_OF_DATA_SHEETS: Mapping[str, tuple[str, str]] = {
+    "cv": ("sonic_conductance", ", 3.87 L/(s bar) for each Cv [US gal/min, psi]"),
+    "kv": ("sonic_conductance", ", 4.48 L/(s bar) for each Kv [m^3/h, bar]"),
+    "qn": ("sonic_conductance", ", qn/254 L/(s bar) for qn [L/min] from 6 to 5 bar gauge"),
+    "c": ("sonic_conductance", ", C of ISO 6358"),
+    "b": ("critical_ratio", ", b of ISO 6358"),
+    "diameter": ("area", ", pi/4 of the diameter squared"),
 }
-"""Conversion of data-sheet flow coefficients to C of ISO 6358 at b = 0.3, as text."""
-_C, _B = "sonic_conductance", "critical_ratio"
+"""Name in a set, and conversion as text, of what data sheets state of a valve."""
 _SPELT_OTHERWISE = {"kvs": "kv", "qnn": "qn", "nominal_flow": "qn", "flow_coefficient": "cv", "flow_factor": "kv"}
+_SPELT_OTHERWISE |= dict.fromkeys(("orifice", "orifice_diameter", "bore", "nominal_diameter", "dn"), "diameter")
+
+
+def name_in_data_sheets(word: str) -> str:
+    """Return the usual name in data sheets of a number of a valve: ``kv`` for ``Kvs``, ``diameter`` for ``orifice``."""
+    return _SPELT_OTHERWISE.get(word.lower(), word.lower())
 
 
 def nearest_name(name: str, allowed: Iterable[str]) -> str:
@@ -73,9 +81,10 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
     """
     word, known = str(name), list(allowed)
     before, dot, last = word.rpartition(".")
-    sheet = _OF_DATA_SHEETS.get(_SPELT_OTHERWISE.get(last.lower(), last.lower()))
-    if sheet is not None and any(name.rpartition(".")[2] == _C for name in known):
-        return f", which is '{before}{dot}{_C}', {sheet}, with '{before}{dot}{_B}' 0.3"
+    meant, conversion = _OF_DATA_SHEETS.get(name_in_data_sheets(last), ("", ""))
+    if meant and f"{before}{dot}{meant}" in known:
+        too = f", with '{before}{dot}critical_ratio' 0.3" if meant == "sonic_conductance" else ""
+        return f", which is '{before}{dot}{meant}'{conversion}{too}"
     # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
     near = difflib.get_close_matches(word, known, n=max(len(known), 1), cutoff=0.6)
     # A section that both have makes names alike that have nothing else in common.

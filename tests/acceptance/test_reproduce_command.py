@@ -11,7 +11,7 @@ import pytest
 
 from ppafo.analyses.reproduce import solve
 from ppafo.analyses.reproduce.claim import VERDICTS
-from ppafo.analyses.reproduce.result import Reproduction
+from ppafo.analyses.reproduce.solve import Reproduction
 from ppafo.cli.main import main
 from ppafo.progress import Report
 from ppafo.storage import read_csv

@@ -4,10 +4,12 @@ import itertools
 import math
 import random
 import re
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from ppafo import load_device
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
@@ -16,6 +18,8 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.plant import Openings
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import ValveKind, ValveModel
+from ppafo.parameters.natural_laws import valve_departure
+from ppafo.parameters.plant import plant_parameters
 
 CATALOGS = [*CONTROLLERS.items(), *WALKING_CONTROLLERS.items(), *PROFILES.items(), *VALVES.items()]
 
@@ -129,6 +133,10 @@ def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
         openings = model.instant(valve, state, command)
         assert isinstance(openings, Openings), name
         assert all(0.0 <= share <= 1.0 for share in openings)
+    plant = plant_parameters(load_device("ppafo2011"))
+    assert valve_departure(model, settings, plant).size < 1e-9
+    half = replace(model, instant=lambda *given: Openings(*(0.5 * share for share in model.instant(*given))))
+    assert valve_departure(half, settings, plant).size > 0.1
 
 
 @pytest.mark.parametrize(("name", "model", "settings"), valve_models())

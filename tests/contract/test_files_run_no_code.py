@@ -270,6 +270,8 @@ def test_results_never_import_and_need_no_module_of_their_own(folder: Path) -> N
     (folder / "own_metric.py").write_text(METRIC, encoding="utf-8")
     (folder / "study.toml").write_text(STUDY.replace("rms_error", "own_metric:KIND"), encoding="utf-8")
     made = ppafo.sweep("study.toml", out="out", plugins=["own_metric.py"])
+    single = ppafo.simulate("torque-task-proportional").metrics
+    assert single["own"] == single["rms_error"]
     del sys.modules["own_metric"], METRICS["own_metric:KIND"]
     plugins._named.clear()
     os.environ.pop(plugins.VARIABLE)

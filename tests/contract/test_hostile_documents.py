@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.analyses.design.loading import load_design
+from ppafo.analyses.design.problem import load_design
 from ppafo.analyses.reproduce.publication import load_publication
 from ppafo.analyses.tune.problem import load_tuning
 from ppafo.cli.doctor import FORMATS

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.endurance.solve import LONGEST
-from ppafo.analyses.linearise.solve import EQUILIBRIUM
+from ppafo.analyses.linearise.model import EQUILIBRIUM
 from ppafo.analyses.reproduce.publication import SEED
 from ppafo.cli import output
 from ppafo.cli.command_line import Command, CommandGroup, option_of, parameters_of
@@ -44,7 +43,6 @@ def test_every_parameter_of_a_verb_has_its_help_and_every_option_one_meaning(nam
 
 def test_defaults_that_are_written_in_a_signature_are_those_of_the_modules() -> None:
     defaults = {
-        "bottle longest": LONGEST,
         "validate longest_delay": DEFAULT_LIMIT,
         "linearise at": EQUILIBRIUM,
         "reproduce study": SEED,

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ppafo.analyses.design.loading import load_design
+from ppafo.analyses.design.problem import load_design
 from ppafo.analyses.tune.problem import load_tuning
 from ppafo.errors import PpafoError
 from ppafo.gait import Gait

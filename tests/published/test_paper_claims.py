@@ -3,7 +3,7 @@
 import pytest
 
 from ppafo.analyses.reproduce.claim import Claim, Observation
-from ppafo.analyses.reproduce.result import Reproduction
+from ppafo.analyses.reproduce.solve import Reproduction
 from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
 from ppafo.running import simulate
 

@@ -19,6 +19,7 @@ from tests.compilers_here import compilers_here, first_compiler
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 needs_zig = pytest.mark.skipif("zig" not in compilers_here(), reason="no zig on this machine")
 CHEAP = "torque-task-proportional"
+QUICK = (CHEAP, "solenoid", "proportional")
 
 
 def test_every_scenario_and_walk_has_golden_hashes() -> None:
@@ -32,10 +33,8 @@ def test_every_scenario_and_walk_has_golden_hashes() -> None:
 @pytest.mark.parametrize(
     ("backend", "name"),
     [
-        ("", CHEAP),
+        *(pytest.param("", name, marks=() if name in QUICK else pytest.mark.long) for name in names()),
         pytest.param("gcc", "off", marks=needs_gcc),
-        ("", "solenoid"),
-        ("", "proportional"),
         pytest.param("zig", CHEAP, marks=[pytest.mark.long, needs_zig]),
         pytest.param("zig", "off", marks=[pytest.mark.long, needs_zig]),
     ],

@@ -3,6 +3,7 @@
 import logging
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import KindError, ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.studies.study import with_overrides
 
 LAW = """
 from dataclasses import replace
@@ -125,6 +127,21 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
     ):
         with pytest.raises(ScenarioError, match=problem):
             load_scenario("torque-task-proportional", [f"controller.kind={name}"])
+
+
+def test_another_law_forgets_a_number_of_the_same_name_in_another_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    pid, task, chosen = CONTROLLERS["pid"], "torque-task-proportional", "controller.kind=other"
+    gains = [
+        replace(each, unit="1/s", default=2.0, follows=()) if each.name == "integral_gain" else each
+        for each in pid.quantities
+    ]
+    monkeypatch.setitem(CONTROLLERS, "other", replace(pid, name="other", quantities=tuple(gains)))
+    later = with_overrides(load_scenario(task, ["controller.integral_gain=0.3 1/(N m s)"]), [chosen])
+    for scenario in (load_scenario(task, [chosen]), later):
+        assert (scenario.controller.settings["integral_gain"], scenario.controller.settings["proportional_gain"]) == (
+            2.0,
+            0.095,
+        )
 
 
 def test_profiles_and_metrics_are_found_too(install: Install) -> None:

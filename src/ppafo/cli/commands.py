@@ -89,7 +89,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "design": Command(
             f"{_ANALYSES}.design.question:design",
             first_line="Find valve, supply pressure, gains and bottle for a torque profile.",
-            library="ppafo.analyses.design.loading:FILE",
+            library="ppafo.analyses.design.problem:FILE",
         ),
         "bottle": Command(
             f"{_ANALYSES}.endurance.question:bottle",

@@ -16,7 +16,7 @@ FORMATS: dict[str, str] = {
     "scenario": "ppafo.loading",
     "study": "ppafo.studies.declaration",
     "tuning": "ppafo.analyses.tune.problem",
-    "design": "ppafo.analyses.design.loading",
+    "design": "ppafo.analyses.design.problem",
     "walk": "ppafo.walking.declaration",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.column_map",

@@ -21,7 +21,12 @@ def json_text(document: Mapping[str, Any]) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Convert a value to dicts, lists, texts and finite numbers; infinity to None, a controller to its type name."""
+    """Convert a value to dicts, lists, texts and finite numbers; infinity to None, a controller to its type name.
+
+    A result that has a method ``json_document()`` is what it returns.
+    """
+    if hasattr(type(value), "json_document"):
+        return value.json_document()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         # Links are no part of what is run: what is not compared is not shown.
         shown = {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}

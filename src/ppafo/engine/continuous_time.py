@@ -11,7 +11,6 @@ from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.pneumatics import StageFlows, plant_with_leak_at, stage_flows
 from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows
-from ppafo.model.actuators.kind import Chambers
 from ppafo.model.plant import (
     ActuatorFunctions,
     Openings,
@@ -43,34 +42,6 @@ class GasRates(NamedTuple):
     vented: float
 
 
-class _TurningChambers(NamedTuple):
-    """Both chambers, and rates of volume change due to the rotation [m^3/s]."""
-
-    now: Chambers
-    growth_1: float
-    growth_2: float
-
-
-def turning_chambers(
-    plant: PlantParameters,
-    angle: float,
-    angular_velocity: float,
-    pressure_1: float,
-    pressure_2: float,
-    *,
-    parts: ActuatorFunctions,
-) -> _TurningChambers:
-    """Both chambers at an angle [rad], angular velocity [rad/s] and absolute pressures [Pa]. Equations (4), (5)."""
-    less = parts.chambers(plant, angle - NEAR, pressure_1, pressure_2)
-    more = parts.chambers(plant, angle + NEAR, pressure_1, pressure_2)
-    per_angle = angular_velocity / (2.0 * NEAR)
-    return _TurningChambers(
-        now=parts.chambers(plant, angle, pressure_1, pressure_2),
-        growth_1=(more.volume_1 - less.volume_1) * per_angle,
-        growth_2=(more.volume_2 - less.volume_2) * per_angle,
-    )
-
-
 def flows_at(plant: PlantParameters, openings: Openings, pressure_1: float, pressure_2: float) -> StageFlows:
     """Flows [kg/s] through both ports and the leakage, for valve openings [-]. Equations (6) to (8)."""
     leaking = plant_with_leak_at(plant, pressure_1, pressure_2)
@@ -78,85 +49,55 @@ def flows_at(plant: PlantParameters, openings: Openings, pressure_1: float, pres
     return stage_flows(leaking, pressure_1, pressure_2, port_1, port_2, blended_port_flow)
 
 
-def isothermal_rates(
-    plant: PlantParameters, openings: Openings, at: _TurningChambers, pressure_1: float, pressure_2: float
-) -> GasRates:
-    """Rates of isothermal gas at absolute pressures [Pa]. Equations (3), (9)."""
-    in_1, in_2, leak = flows_at(plant, openings, pressure_1, pressure_2)
-    supplied = in_1.from_source + in_2.from_source
-    rate_1, rate_2 = pressure_rates(plant, at, pressure_1, pressure_2, in_1.total - leak, in_2.total + leak)
-    return GasRates(
-        pressure_1=rate_1,
-        pressure_2=rate_2,
-        temperature_1=0.0,
-        temperature_2=0.0,
-        supplied=supplied,
-        vented=supplied - in_1.total - in_2.total,
-    )
-
-
-def thermal_rates(
+def gas_rates(
     plant: PlantParameters,
-    thermal: ThermalParameters,
+    thermal: ThermalParameters | None,
     openings: Openings,
-    at: _TurningChambers,
-    pressure_1: float,
-    pressure_2: float,
-    temperature_1: float,
-    temperature_2: float,
+    motion: tuple[float, float],
+    pressures: tuple[float, float],
+    temperatures: tuple[float, float],
+    *,
+    parts: ActuatorFunctions,
 ) -> GasRates:
-    """Rates of gas with an energy balance at absolute pressures [Pa] and temperatures [K]. Equations (3), (9)."""
-    in_1, in_2, leak = flows_at(plant, openings, pressure_1, pressure_2)
-    content_1 = chamber_mass(pressure_1, at.now.volume_1, plant.gas_product)
-    content_2 = chamber_mass(pressure_2, at.now.volume_2, plant.gas_product)
-    mass_1 = content_1 * thermal.temperature / temperature_1
-    mass_2 = content_2 * thermal.temperature / temperature_2
-    warm = WarmChambers(
-        volume_1=at.now.volume_1,
-        volume_2=at.now.volume_2,
-        growth_1=at.growth_1,
-        growth_2=at.growth_2,
-        give_1=pressure_1 * at.now.compliance_1 / at.now.volume_1,
-        give_2=pressure_2 * at.now.compliance_2 / at.now.volume_2,
-    )
-    # Neither motion nor totals act on the rates of the gas: zeros stand for them.
-    state = PlantState(
-        angle=0.0,
-        angular_velocity=0.0,
-        mass_1=content_1,
-        mass_2=content_2,
-        supplied_mass=0.0,
-        vented_mass=0.0,
-        leaked_mass=0.0,
-    )
-    masses = ThermalState(
-        mass_1=mass_1, mass_2=mass_2, supplied_content=0.0, vented_content=0.0, heat_content=0.0, gas_work=0.0
-    )
-    found = thermal_flows(thermal, state, masses, warm, in_1, in_2, leak)
-    # The contents have the work of the moving wall in them: of equation (3) only the volumes are left.
-    rate_1, rate_2 = pressure_rates(plant, at, pressure_1, pressure_2, found.content_1, found.content_2)
-    return GasRates(
-        pressure_1=rate_1,
-        pressure_2=rate_2,
-        # A temperature is the walls' times content over mass.
-        temperature_1=temperature_1 * (found.content_1 / content_1 - found.mass_1 / mass_1),
-        temperature_2=temperature_2 * (found.content_2 / content_2 - found.mass_2 / mass_2),
-        supplied=found.supplied,
-        vented=found.supplied - found.mass_1 - found.mass_2,
-    )
+    """Rates of the gas at an angle [rad] and rate [rad/s], pressures [Pa] and temperatures [K]. Equations (3) to (9).
 
-
-def pressure_rates(
-    plant: PlantParameters, at: _TurningChambers, pressure_1: float, pressure_2: float, gained_1: float, gained_2: float
-) -> tuple[float, float]:
-    """Rates of both pressures [Pa/s] from the rates of the contents [kg/s]: time derivative of equation (3).
-
-    d(p V) = R T dm, where the volume of a compliant chamber also changes with its pressure.
+    Without ``thermal`` the gas is isothermal. The pressures follow from the time derivative of equation (3), d(p V) =
+    R T dm, where the volume of a compliant chamber also changes with its pressure.
     """
-    product, now = plant.gas_product, at.now
-    rate_1 = (product * gained_1 - pressure_1 * at.growth_1) / (now.volume_1 + pressure_1 * now.compliance_1)
-    rate_2 = (product * gained_2 - pressure_2 * at.growth_2) / (now.volume_2 + pressure_2 * now.compliance_2)
-    return rate_1, rate_2
+    (angle, angular_velocity), (pressure_1, pressure_2), product = motion, pressures, plant.gas_product
+    now, less, more = (parts.chambers(plant, at, *pressures) for at in (angle, angle - NEAR, angle + NEAR))
+    per_angle = angular_velocity / (2.0 * NEAR)
+    growth_1, growth_2 = (more.volume_1 - less.volume_1) * per_angle, (more.volume_2 - less.volume_2) * per_angle
+    in_1, in_2, leak = flows_at(plant, openings, pressure_1, pressure_2)
+    if thermal is None:
+        gained_1, gained_2, warming_1, warming_2 = in_1.total - leak, in_2.total + leak, 0.0, 0.0
+        supplied = in_1.from_source + in_2.from_source
+        vented = supplied - in_1.total - in_2.total
+    else:
+        content_1 = chamber_mass(pressure_1, now.volume_1, product)
+        content_2 = chamber_mass(pressure_2, now.volume_2, product)
+        mass_1 = content_1 * thermal.temperature / temperatures[0]
+        mass_2 = content_2 * thermal.temperature / temperatures[1]
+        give_1, give_2 = pressure_1 * now.compliance_1 / now.volume_1, pressure_2 * now.compliance_2 / now.volume_2
+        warm = WarmChambers(now.volume_1, now.volume_2, growth_1, growth_2, give_1, give_2)
+        # Neither motion nor totals act on the rates of the gas: zeros stand for them.
+        state = PlantState(*[0.0] * len(PlantState._fields))._replace(mass_1=content_1, mass_2=content_2)
+        masses = ThermalState(*[0.0] * len(ThermalState._fields))._replace(mass_1=mass_1, mass_2=mass_2)
+        found = thermal_flows(thermal, state, masses, warm, in_1, in_2, leak)
+        gained_1, gained_2, supplied = found.content_1, found.content_2, found.supplied
+        vented = supplied - found.mass_1 - found.mass_2
+        # A temperature is the walls' times content over mass.
+        warming_1 = temperatures[0] * (gained_1 / content_1 - found.mass_1 / mass_1)
+        warming_2 = temperatures[1] * (gained_2 / content_2 - found.mass_2 / mass_2)
+        # The contents have the work of the moving wall in them: of equation (3) only the volumes are left.
+    return GasRates(
+        pressure_1=(product * gained_1 - pressure_1 * growth_1) / (now.volume_1 + pressure_1 * now.compliance_1),
+        pressure_2=(product * gained_2 - pressure_2 * growth_2) / (now.volume_2 + pressure_2 * now.compliance_2),
+        temperature_1=warming_1,
+        temperature_2=warming_2,
+        supplied=supplied,
+        vented=vented,
+    )
 
 
 def free_motion(

@@ -3,6 +3,7 @@
 To add a metric: a function and its MetricKind in a module of this folder, listed in its METRICS.
 """
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from ppafo.kinds import Kinds
@@ -42,11 +43,14 @@ def metric_kind(name: str) -> MetricKind | None:
     return VERDICT_METRICS.get(name) or METRICS.get(name)
 
 
-def evaluate(recording: Recording) -> dict[str, Metric]:
-    """Compute every metric for which a recording has the channels; none for a single sample."""
+def evaluate(recording: Recording, kinds: Iterable[MetricKind] | None = None) -> dict[str, Metric]:
+    """Compute metrics for which a recording has the channels, by default all; none for a single sample."""
+    if kinds is None:
+        METRICS.load_all()
+        kinds = METRICS.values()
     metrics: dict[str, Metric] = {}
     names = frozenset(recording.names)
-    for kind in METRICS.values():
+    for kind in kinds:
         if kind.compute is None or len(recording) < 2 or not names.issuperset(kind.channels):
             continue
         value = kind.compute(recording)

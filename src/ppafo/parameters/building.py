@@ -30,6 +30,7 @@ from ppafo.parameters.device import (
     Valve,
 )
 from ppafo.parameters.graph import ATMOSPHERE_PATH, DISPLACEMENT_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH, Graph
+from ppafo.parameters.natural_laws import check_laws
 from ppafo.parameters.overrides import FORMS, either, in_two_forms
 from ppafo.parameters.parameter_set import (
     ParameterSet,
@@ -69,11 +70,13 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     device = read_device(parameter_set, name, links)
     for _, line in contradictions(parameter_set, device):
         raise ParameterError(f"{parameter_set.file}: {line}")
-    if device.actuator.kind == VANE:
-        return device
-    # An actuator of another kind has what a vane of its mean size would have, for whatever is made for a vane.
-    growth = shape_and_growth(device)[1]
-    return replace(device, actuator=replace(device.actuator, torque_constant=growth, displacement_per_radian=growth))
+    if device.actuator.kind != VANE:
+        # An actuator of another kind has what a vane of its mean size would have, for whatever is made for a vane.
+        growth = shape_and_growth(device)[1]
+        sizes = {"torque_constant": growth, "displacement_per_radian": growth}
+        device = replace(device, actuator=replace(device.actuator, **sizes))
+    check_laws(device, parameter_set.file)
+    return device
 
 
 def read_device(parameter_set: ParameterSet, name: str, links: Graph) -> Device:

@@ -1,4 +1,4 @@
-"""Conversion of Cv, Kv and nominal flow from data sheets to C and b of ISO 6358.
+"""Conversion of Cv, Kv, nominal flow and orifice from data sheets to C and b of ISO 6358, or to an area.
 
 Nominal flow ``qn`` goes from p1 = 7 bar to p2 = 6 bar, absolute, in litres at ANR. By ISO 6358 it is ``C p1 s`` with
 ``s = sqrt(1 - ((p2/p1 - b)/(1 - b))^2)``, 254.3 L/min per L/(s bar) at b = 0.3. A valve of Cv = 1 passes 984 L/min at
@@ -8,10 +8,11 @@ Rankine, G = 1 for air] at 20 degC. Hence C = 3.87 L/(s bar) per Cv; a Kv is 1.1
 The conversion for liquids, 17.0 mm^2 of orifice per Cv, does not hold for gas: choked flow would be 13 % too small.
 """
 
+import contextlib
 import math
 
 from ppafo.errors import UnitError
-from ppafo.units import split_number, to_si
+from ppafo.units import parse_quantity, split_number, to_si
 from ppafo.units.reference import flow_of, is_volume_flow
 
 USUAL_CRITICAL_RATIO = 0.3
@@ -38,9 +39,20 @@ def nominal_flow_of_cv(cv: float) -> float:
     return _NFPA * cv * math.sqrt(drop * behind / _RANKINE) * _LITRES_PER_CUBIC_FOOT
 
 
+def area_of(text: str) -> float | None:
+    """Parse the diameter of an orifice, ``2 mm``, or its area into the area [m^2]; None for an invalid text."""
+    with contextlib.suppress(UnitError):
+        return 0.25 * math.pi * parse_quantity(text, "m") ** 2
+    with contextlib.suppress(UnitError):
+        return parse_quantity(text, "m^2")
+    return None
+
+
 def conductance_of(name: str, text: str) -> float | None:
-    """Parse ``cv``, ``kv`` or ``qn`` text, ``0.05 m^3/h``, into C [m^3/(s Pa)]; None for an invalid text."""
+    """Parse ``cv``, ``kv``, ``qn`` or ``c`` text, ``0.05 m^3/h``, into C [m^3/(s Pa)]; None for an invalid text."""
     try:
+        if name == "c":
+            return parse_quantity(text, "m^3/(s Pa)")
         value, unit = split_number(text)
         is_flow = bool(unit) and is_volume_flow(unit)
         # Normal litres are taken as those of the nominal flow.

@@ -38,7 +38,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.units import SI, split_number
 from ppafo.units.shown import shown_text
-from ppafo.wording import known_names, nearest_name, one_line, override_text
+from ppafo.wording import known_names, name_in_data_sheets, nearest_name, one_line, override_text
 
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]
@@ -242,7 +242,7 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
         allowed = [*declared, SPECIES_PATH, RELIEVING_PATH]
         if override.typed.startswith(CHOSEN_VALVE):
             allowed = [one_path(known, path.split(".")[1]) for known in allowed]
-        hint = _nearest_value(override, allowed) + _in_conductance(override)
+        hint = _nearest_value(override, allowed) + _as_in_sets(override, allowed)
         raise ParameterError(f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}")
     with refused_as(ParameterError, f"override '{override}'", UnitError):
         value, unit = split_number(override.text)
@@ -273,18 +273,20 @@ def _nearest_value(override: Override, allowed: Sequence[str]) -> str:
     return hint or (f"; '{section}' has {', '.join(near)}" if near else nearest_name(override.typed, allowed))
 
 
-def _in_conductance(override: Override) -> str:
-    """Return a note with the ISO 6358 settings equivalent to a Cv, Kv or nominal flow; empty for other values."""
-    section, _, name = override.typed.rpartition(".")
-    if name.lower() not in ("cv", "kv", "qn"):
+def _as_in_sets(override: Override, allowed: Sequence[str]) -> str:
+    """Return a note with the settings equivalent to a number of a valve's data sheet; empty for other values."""
+    section, _, word = override.typed.rpartition(".")
+    name = name_in_data_sheets(word)
+    target = f"{section}.{'area' if name == 'diameter' else 'sonic_conductance'}"
+    if name not in ("cv", "kv", "qn", "c", "diameter") or target not in allowed:
         return ""
-    from ppafo.parameters.flow_coefficients import USUAL_CRITICAL_RATIO, conductance_of  # few valves are given so
+    from ppafo.parameters.flow_coefficients import USUAL_CRITICAL_RATIO, area_of, conductance_of  # few are given so
 
-    conductance = conductance_of(name.lower(), override.text)
-    if conductance is None:
+    value = area_of(override.text) if name == "diameter" else conductance_of(name, override.text)
+    if value is None or value <= 0.0:
         return ""
-    shown = shown_text(conductance, "m^3/(s Pa)", ".4g")
-    forms = (f"{section}.sonic_conductance={shown}", f"{section}.critical_ratio={USUAL_CRITICAL_RATIO:g}")
+    forms = [f"{target}={shown_text(value, 'm^2' if name == 'diameter' else 'm^3/(s Pa)', '.4g')}"]
+    forms += [] if name == "diameter" else [f"{section}.critical_ratio={USUAL_CRITICAL_RATIO:g}"]
     return f": {override_text(forms)}"
 
 

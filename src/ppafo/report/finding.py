@@ -220,9 +220,8 @@ class Finding(Generic[T_co]):
     @_in_own_units
     def to_dict(self) -> dict[str, Any]:
         """Return the data printed with ``--json``, as plain data in SI units."""
-        document = getattr(self.found, "json_document", None)
         given = {"overrides": list(self.overrides)} if self.overrides else {}
-        return given | dict(plain(self.found) if document is None else document())
+        return given | dict(plain(self.found))
 
     @_in_own_units
     def plot(self, name: str | None = None, width: float | str | None = None) -> "matplotlib.figure.Figure":

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ppafo.errors import ArgumentError
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import fixed_zero
 from ppafo.report.display_units import (
@@ -21,9 +22,11 @@ from ppafo.report.display_units import (
 )
 from ppafo.report.setting_names import label_of
 from ppafo.signals.recording import Floats
-from ppafo.units.shown import quantity_of_unit
-from ppafo.wording import without_exponent
+from ppafo.units.shown import QUANTITIES, quantity_of_unit
+from ppafo.wording import known_names, without_exponent
 
+_FORM = re.compile(r"[-+]?\d*(\.\d+)?[efgd]")
+"""Pattern of a number format, which somebody may give as the quantity."""
 YES_OR_NO = "; 1: yes, 0: no"
 """Remark in the label of a number that answers a question; a mean of several runs lies between."""
 
@@ -56,6 +59,13 @@ class Kind:
     form: str = ".4g"
     zero: float | None = None
     given: str = ""
+
+    def __post_init__(self) -> None:
+        """Raise ArgumentError for an unknown quantity, such as a format in its place."""
+        if self.quantity and self.quantity not in QUANTITIES:
+            is_form = _FORM.fullmatch(self.quantity) is not None
+            hint = f"; give the format as form={self.quantity!r}" if is_form else known_names(self.quantity, QUANTITIES)
+            raise ArgumentError(f"Kind({self.words!r}): there is no quantity {self.quantity!r}{hint}")
 
     @property
     def shown_unit(self) -> str:

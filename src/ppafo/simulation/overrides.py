@@ -129,12 +129,19 @@ def over_layer(
     kind_paths = set(filter(_is_kind_path, later_paths))
     if not kind_paths:
         return tuple(combined.values())
-    changed = _with_preferred_paths(document, file, content)
+    before, changed = (_with_preferred_paths(document, file, content) for _ in range(2))
+    _choose_kinds(before, override_set(earlier, ScenarioError, content.same), file, content)
     _choose_kinds(changed, combined, file, content)
-    known = later_paths.union(content.paths(changed))
+    others = _of_other_units(*(quantities_in(content.declare(each)) for each in (before, changed)))
+    known = later_paths.union(content.paths(changed)) - (others - later_paths)
     return tuple(
         override for path, override in combined.items() if path in known or not deciding_kinds(path, kind_paths)
     )
+
+
+def _of_other_units(before: Mapping[str, Quantity], after: Mapping[str, Quantity]) -> set[str]:
+    """Return the paths that name quantities of different units before and after a change of a ``kind``."""
+    return {path for path in before.keys() & after.keys() if before[path].unit != after[path].unit}
 
 
 def _is_kind_path(path: str) -> bool:
@@ -157,7 +164,7 @@ def _choose_kinds(
 ) -> tuple[str, ...]:
     """Set the overridden ``kind`` of each section, outer sections first, and return the remaining paths.
 
-    What both kinds have stays as the document gives it. The ``kind`` of a missing section is among the remaining paths.
+    What both kinds have in one unit stays as the document gives it. The ``kind`` of a missing section remains.
     """
     done = set()
     # A kind of an outer section decides which sections there are inside it.
@@ -167,7 +174,8 @@ def _choose_kinds(
             with refused_as(ScenarioError, f"override '{override_at[path]}'", KindError):
                 _set(document, path, override_at[path].text, file, content)
                 after = content.declare(document)
-            for gone in before.keys() - after.keys():
+            others = _of_other_units(quantities_in(before), quantities_in(after))
+            for gone in (before.keys() - after.keys()) | others:
                 section, _, name = gone.rpartition(".")
                 (value_at(document, section) or {}).pop(name, None)
             done.add(path)

@@ -52,24 +52,9 @@ def measured(
     ``external_torque`` computes T_ex of equation (1) [N m] from the actuator torque [N m]; ``of_leg`` are the channels
     of a leg.
     """
-    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    actuator = run.program.actuator
-    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
-    torque = np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2))
-    channels = {
-        "angle": (angle, "rad"),
-        "angular_velocity": (rate, "rad/s"),
-        "pressure_1": (pressure_1, "Pa"),
-        "pressure_2": (pressure_2, "Pa"),
-        "torque": (torque, "N m"),
-        "command": (rows["result.command"], "-"),
-        "supplied_mass": (rows["state.supplied_mass"], "kg"),
-        "vented_mass": (rows["state.vented_mass"], "kg"),
-        "leaked_mass": (rows["state.leaked_mass"], "kg"),
-        "external_torque": (external_torque(torque), "N m"),
-        "mass_1": (rows["state.mass_1"], "kg"),
-        "mass_2": (rows["state.mass_2"], "kg"),
-    }
+    channels = device_channels(scenario.device.gas, run, rows)
+    torque = channels["torque"][0]
+    channels["external_torque"] = (external_torque(torque), "N m")
     if scenario.follows_reference:
         # Times of the first samples [s], shape (count,), rounded as the engine does, so that a reference has its bits.
         steps = np.arange(times.size, dtype=np.float64) * run.record_every
@@ -78,25 +63,41 @@ def measured(
         followed = CONTROLLED[scenario.controlled]
         channels[followed.reference] = (profile_values(scenario.reference, moments)[0], followed.unit)
         if followed.name not in channels:
-            value = followed.value(angle, pressure_1, pressure_2, torque)  # type: ignore[arg-type]
+            of = (channels[name][0] for name in ("angle", "pressure_1", "pressure_2", "torque"))
+            value = followed.value(*of)  # type: ignore[arg-type]
             channels[followed.name] = (np.asarray(value), followed.unit)
-    channels |= gas_channels(scenario.device.gas, run, rows)
-    channels |= of_leg or {}
-    absent = OF_SECOND_CHAMBER if run.program.has_one_chamber else frozenset()
-    values = {
-        name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items() if name not in absent
-    }
-    recording = Recording(scenario.name, times, values, kind="simulated")
+    recording = recording_of(scenario.name, run, times, channels | dict(of_leg or {}))
     return recording, evaluate(recording), "completed"
 
 
-def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    """Return the recorded gas channels except pressures, in SI with unit, from rows (samples,) by path.
+def recording_of(label: str, run: Run, times: Floats, channels: Mapping[str, tuple[Floats, str]]) -> Recording:
+    """Return the simulated recording of channels (samples,) [SI] with their units, at times [s]."""
+    absent = OF_SECOND_CHAMBER if run.program.has_one_chamber else frozenset()
+    present = {name: Channel(np.asarray(each), unit) for name, (each, unit) in channels.items() if name not in absent}
+    return Recording(label, times, present, kind="simulated")
+
+
+def device_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
+    """Return the channels of the device, which a joint and a walk record alike, in SI with unit, from rows by path.
 
     With supply lines: line pressures and the gas through the bottle's regulator. With an energy balance: true masses,
     temperatures and energies.
     """
-    channels: dict[str, tuple[Floats, str]] = {}
+    angle, actuator = rows["state.angle"], run.program.actuator
+    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+    channels: dict[str, tuple[Floats, str]] = {
+        "angle": (angle, "rad"),
+        "angular_velocity": (rows["state.angular_velocity"], "rad/s"),
+        "pressure_1": (pressure_1, "Pa"),
+        "pressure_2": (pressure_2, "Pa"),
+        "torque": (np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2)), "N m"),
+        "command": (rows["result.command"], "-"),
+        "supplied_mass": (rows["state.supplied_mass"], "kg"),
+        "vented_mass": (rows["state.vented_mass"], "kg"),
+        "leaked_mass": (rows["state.leaked_mass"], "kg"),
+        "mass_1": (rows["state.mass_1"], "kg"),
+        "mass_2": (rows["state.mass_2"], "kg"),
+    }
     if run.lines is not None:
         lines = rebuilt(LineState, [rows[path] for path in leaf_paths(LineState, "line_state")])
         line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)

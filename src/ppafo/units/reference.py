@@ -45,7 +45,7 @@ _NORMAL = re.compile(
 _EXAMPLE = "70 degF, 14.696 psi_a"
 
 
-class Flow(NamedTuple):
+class WrittenFlow(NamedTuple):
     """Unit as written and as a flow without the word for normal; reference condition and gases, empty if not stated."""
 
     name: str
@@ -60,7 +60,7 @@ class Flow(NamedTuple):
         return bool(self.condition or self.gases)
 
 
-def flow_of(unit: str) -> Flow:
+def flow_of(unit: str) -> WrittenFlow:
     """Split a unit into volume flow, whether it is a normal or standard one, condition and gases."""
     text, words = unit.strip(), ""
     if match := _BEHIND.fullmatch(text):
@@ -70,7 +70,7 @@ def flow_of(unit: str) -> Flow:
     flow, normal = text, _NORMAL.fullmatch(text)
     if normal:
         flow = (normal["word"] or "").upper() or normal["volume"] or f"{normal['milli']}L{normal['per']}"
-    return Flow(text, flow, normal is not None, ", ".join(word for word in said if word not in gases), gases)
+    return WrittenFlow(text, flow, normal is not None, ", ".join(word for word in said if word not in gases), gases)
 
 
 def _split(words: str) -> list[str]:

@@ -65,6 +65,9 @@ def _evaluated(
     strides = per_stride(record, starts)
     averages = mean_curves(recording, starts[SETTLING:])
     metrics = walk_metrics(scenario, recording, strides, averages, starts)
+    METRICS.load_all()
+    others = [kind for name, kind in METRICS.items() if not METRICS.is_own(name) and not lacks(scenario, kind)]
+    metrics |= evaluate(recording, others)
     return WalkResult(
         scenario=scenario,
         recording=recording,

@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.reproduce.publication import COMPUTATIONS, judge, load_publication
+from ppafo.analyses.reproduce.publication import COMPUTATIONS, Studies, judge, load_publication
 from ppafo.analyses.reproduce.question import reproduce
-from ppafo.analyses.reproduce.result import Studies
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
 from ppafo.parameters.publications.publication import FILE, PAPER

@@ -6,14 +6,11 @@ from dataclasses import replace
 import pytest
 
 from ppafo.analyses.reproduce import solve as study
-from ppafo.analyses.reproduce.bench import SyntheticEvidence
 from ppafo.analyses.reproduce.claim import Claim, count_sentence, verdict_counts
-from ppafo.analyses.reproduce.decision_phases import phased_runs
-from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
 from ppafo.analyses.reproduce.question import reproduce
 from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED, ReportedSet, arithmetic_claims, load_reported
-from ppafo.analyses.reproduce.result import Reproduction
-from ppafo.analyses.reproduce.solve import reproduce_paper
+from ppafo.analyses.reproduce.solve import Reproduction, SyntheticEvidence, reproduce_paper
+from ppafo.analyses.reproduce.torque_task import phased_runs, readings_of_u
 from ppafo.errors import SimulationError
 from ppafo.parameters.audit.evidence import Evidence
 from ppafo.simulation.simulate import Result, Status

@@ -5,15 +5,16 @@ import re
 
 import pytest
 
-from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
-from ppafo.analyses.reproduce.page import (
+from ppafo.analyses.reproduce.answer import (
     DEVICE_FIGURE,
     STEP_FIGURE,
     TORQUE_FIGURE,
     reproduction_page,
 )
-from ppafo.analyses.reproduce.result import Reproduction, holding_torque
+from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
+from ppafo.analyses.reproduce.solve import Reproduction
 from ppafo.analyses.reproduce.step_response import SupplyLevels
+from ppafo.analyses.reproduce.torque_task import holding_torque
 from ppafo.report.style import drawn_at
 from ppafo.report.writing import typeset
 from tests.unit.report.test_width_of_figures import texts_of

@@ -43,7 +43,9 @@ def test_what_is_no_flow_coefficient_is_not_converted(text: str) -> None:
     assert conductance_of("cv", text) is None
 
 
-@pytest.mark.parametrize("given", ["valve.cv=0.05", "valve.kv=0.05 m^3/h", "valve.qn=50 L/min", "valve.Cv=0.05"])
+@pytest.mark.parametrize(
+    "given", ["valve.cv=0.05", "valve.kv=0.05 m^3/h", "valve.qn=50 L/min", "valve.Kvs=0.045", "valve.C=12 L/(min bar)"]
+)
 def test_the_answer_to_a_flow_coefficient_is_taken(given: str) -> None:
     before = load_parameter_set("ppafo2011")
     with pytest.raises(ParameterError, match=r"which is 'valve\.sonic_conductance'") as caught:
@@ -52,3 +54,13 @@ def test_the_answer_to_a_flow_coefficient_is_taken(given: str) -> None:
     after = apply_overrides(before, answers)
     assert after.numbers["valves.proportional.critical_ratio"].value == 0.3
     assert 0.15 < after.numbers["valves.proportional.sonic_conductance"].value < 0.25
+
+
+@pytest.mark.parametrize("given", ["valve.orifice=2 mm", "valve.diameter=0.0787402 in", "valve.bore=3.1416 mm^2"])
+def test_the_answer_to_an_orifice_is_an_area(given: str) -> None:
+    before = load_parameter_set("ppafo2011")
+    with pytest.raises(ParameterError, match=r"which is 'valve\.area', pi/4 of the diameter squared") as caught:
+        apply_overrides(before, [given])
+    [answer] = ast.literal_eval(str(caught.value).partition("overrides=")[2])
+    assert answer == "valve.area=3.142 mm^2"
+    assert apply_overrides(before, [answer]).numbers["valves.proportional.area"].value == 3.142

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from ppafo.errors import ArgumentError
 from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import TIME, ConfidenceInterval, Kind, of_metric, of_path
 from ppafo.report.panels import SHAPES, Mark, Panel
@@ -25,6 +26,8 @@ def test_a_kind_says_a_level_a_difference_and_an_interval_in_the_unit_of_the_fie
     assert pressure.axis == "Supply pressure (psig)"
     assert gas.interval(ConfidenceInterval(0.001, 0.0005, 0.002)) == "1 [0.5, 2]"
     assert Kind("Switchings").text(3.0) == "3"
+    with pytest.raises(ArgumentError, match=r"no quantity '\.4g'; give the format as form="):
+        Kind("Torque", "torque", ".4g")
 
 
 def finding() -> Finding[Numbers]:

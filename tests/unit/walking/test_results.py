@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ppafo
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
@@ -65,6 +66,8 @@ def test_channels_of_a_walk_are_known_with_their_units() -> None:
     assert {name: recording.unit(name) for name in recording.names} == {
         name: CHANNELS[name].unit for name in recording.names
     }
+    joint = ppafo.simulate("torque-task-proportional").recording
+    assert set(joint.names) <= set(recording.names) | {"reference"}, "a walk records what a joint does"
     np.testing.assert_allclose(
         recording["device_power"], recording["external_torque"] * recording["angular_velocity"], rtol=1e-12
     )

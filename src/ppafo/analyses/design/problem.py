@@ -1,20 +1,23 @@
-"""Design file with a torque profile: the profile as a table for a run, and the sizing problem in SI units."""
+"""Design file: a torque profile as a table for a run, and the requirements on a device in SI units."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from fractions import Fraction
+from functools import partial
+from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
+from ppafo.arguments import checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.profiles import KNOTS
-from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts
-from ppafo.documents.toml_text import NAME, beside
+from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.toml_text import NAME, TomlKind, beside, label
 from ppafo.errors import (
     DataError,
     ParameterError,
@@ -29,6 +32,7 @@ from ppafo.errors import (
 from ppafo.gait import load_gait
 from ppafo.loading import reloaded
 from ppafo.parameters.bottles.bottle import Bottle, load_bottle
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
@@ -37,6 +41,7 @@ from ppafo.units import parse_quantity, split_quantity
 from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.wording import known_names
 
+FILE = TomlKind("design", "design", resources.files("ppafo.analyses.design") / "library", StudyError)
 FROM_GAIT = "gait:falisse2019-subject1,mass=72.6 kg,share=0.05"
 """Example of a profile that is a share of the ankle moment of a wearer with a gait."""
 _GAIT = "gait:"
@@ -322,21 +327,34 @@ class SizingProblem:
         return self.repetitions * self.profile.period / _SECONDS_PER_HOUR
 
 
-def sizing_problem(document: SizingFile, file: str, folder: Path, asked_profile: str = "") -> SizingProblem:
-    """Return the sizing problem of a design file with a torque profile.
+@checked
+def load_design(problem: str | Path, *, profile: str | Path | None = None, plugins: Plugins = ()) -> SizingProblem:
+    """Load the sizing problem of a design file with a torque profile, by its name in the package or by its path.
 
-    ``file`` is the name used in error messages; paths are relative to ``folder``, those of ``asked_profile``, which
-    replaces the profile of the file, to the working directory.
+    ``profile`` replaces the profile of the file: a recording, or a share of a wearer's ankle moment such as
+    ``gait:falisse2019-subject1,mass=72.6 kg,share=0.05``. Paths in a design file are relative to its folder.
+    ``plugins`` are modules of your own whose objects files may name, as in ``simulate``.
+
+    Raises StudyError or ParameterError, in one line, for an invalid file.
+
+    >>> import ppafo
+    >>> ppafo.load_design("push-off").name
+    'push-off'
     """
+    name_plugins(plugins)
+    file, folder = label(str(problem)), Path(problem).parent
+    with at_fault("problem"):
+        content = FILE.read(problem)
+    document = validate(SizingFile, FILE.parse(content, file), file, StudyError)
     wrong, valves, bottles = list[PpafoError](), list[CandidateValve](), list[Bottle]()
     atmosphere, largest, pressures = STANDARD_ATMOSPHERE, 1.0, []
     with noted_in(wrong):
-        if asked_profile:
+        if profile:
             with at_fault("profile"):
-                profile = read_profile(ProfileSection(recording=asked_profile), Path(), file)
+                required = read_profile(ProfileSection(recording=str(profile)), Path(), file)
         else:
-            profile = read_profile(document.profile, folder, file)
-        largest = profile.largest
+            required = read_profile(document.profile, folder, file)
+        largest = required.largest
     with noted_in(wrong):
         plain = load_scenario(beside(document.scenario, folder), document.overrides)
         atmosphere = plain.device.supply.atmospheric_pressure
@@ -383,8 +401,8 @@ def sizing_problem(document: SizingFile, file: str, folder: Path, asked_profile:
     )
     least = math.lcm(a.numerator * b.denominator, b.numerator * a.denominator)
     grain = Fraction(least, a.denominator * b.denominator)
-    count = math.ceil(Fraction(document.simulated * profile.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
-    scenario = reloaded(plain, (*profile.overrides(), f"run.duration={float(count * grain)!r} s"))
+    count = math.ceil(Fraction(document.simulated * required.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
+    scenario = reloaded(plain, (*required.overrides(), f"run.duration={float(count * grain)!r} s"))
     # The settings that multiply a torque error.
     quantities = CONTROLLERS[scenario.controller.kind].quantities
     gains = tuple(f"controller.{quantity.name}" for quantity in quantities if "(N m" in quantity.unit)
@@ -393,9 +411,9 @@ def sizing_problem(document: SizingFile, file: str, folder: Path, asked_profile:
         description=document.description,
         file=file,
         scenario=scenario,
-        profile=profile,
+        profile=required,
         simulated=document.simulated,
-        repetitions=float(use.repetitions or _SECONDS_PER_HOUR * float(use.hours or 0.0) / profile.period),
+        repetitions=float(use.repetitions or _SECONDS_PER_HOUR * float(use.hours or 0.0) / required.period),
         reserve=use.reserve,
         largest_error=largest_error,
         valves=tuple(valves),
@@ -404,5 +422,9 @@ def sizing_problem(document: SizingFile, file: str, folder: Path, asked_profile:
         highest_pressure=pressures[1],
         gains=gains,
         gain_factors=tuple(sorted(set(document.gain_factors))) if gains else (1.0,),
-        asked_profile=asked_profile,
+        asked_profile=str(profile or ""),
     )
+
+
+json_schema = partial(make_schema, SizingFile, "ppafo design")
+"""JSON Schema of a design file."""

@@ -1,12 +1,13 @@
-"""Search for the feasible supply pressures of a valve, their gas demand, and the limiting quantity.
+"""Search for the lowest supply pressure and the smallest bottle of each valve, with its gas use and what limits it.
 
 Each pressure is tried in one batch with many gains, and with some openings, of one valve. The error is not assumed to
 be monotonic in the pressure.
 """
 
+import time
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Literal, final
 
@@ -14,18 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.analyses.design.problem import CandidateValve, SizingProblem
+from ppafo.analyses.endurance.discharge import TIME_IS_UP, discharge
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.torque_loop import PROPORTIONAL_GAIN
-from ppafo.errors import StudyError
+from ppafo.documents.json_text import fields_of
+from ppafo.errors import ParameterError, StudyError
+from ppafo.model.catalog import VALVES
+from ppafo.parameters.bottles.bottle import Bottle
+from ppafo.progress import Progress, Report
+from ppafo.report.kind import Kind
+from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.law_signals import IN_SCENARIO
-from ppafo.simulation.numbers import NOISE_SEED, number_at
+from ppafo.simulation.numbers import NOISE_SEED, number_at, with_numbers
+from ppafo.simulation.simulate import simulate
 from ppafo.simulation.tracking import REVERSALS
 from ppafo.studies.draws import seeds_of_noise
 from ppafo.study.runs import oscillating
+from ppafo.units.shown import in_units, written_text
+from ppafo.version import __version__
+from ppafo.walking.bottle.coupling import Schedule
 
 Limit = Literal["torque", "flow", "control", "pressure"]
 LIMITS: dict[Limit, str] = {
@@ -35,6 +47,8 @@ LIMITS: dict[Limit, str] = {
     "pressure": "pressure.lowest: no lower pressure was tried",
 }
 """Quantities that limit a valve, each with its description in words."""
+PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
+TORQUE = Kind("Torque", "N m", "torque", ".3g")
 ERROR, GAS = "rms_error", "gas_supplied"
 OSCILLATES = "the torque loop oscillates"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
@@ -64,8 +78,8 @@ MORE_PRESSURE = 1.1
 """Factor on the gauge pressure for the flow margin [-]."""
 OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
 """Fractions of a valve's opening tried in turn for the flow margin."""
-
-
+_LONG_PERIOD = 5.0
+"""Period of a controller that is named among the delays of a loop that does not follow [ms]."""
 Trial = NDArray[np.void]
 """Structured array of trials, with the fields of ``TRIAL``."""
 TRIAL = np.dtype([("pressure", np.float64), ("error", np.float64), ("gas", np.float64), ("gains", np.intp)])
@@ -73,6 +87,86 @@ TRIAL = np.dtype([("pressure", np.float64), ("error", np.float64), ("gas", np.fl
 
 Error and gas are nan if a run failed or oscillated.
 """
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SizedValve:
+    """Sizing result of a valve in SI, at the supply pressure that keeps the error limit with the smallest bottle.
+
+    ``works``: False if no pressure keeps the error limit
+    ``pressure``: chosen supply pressure [Pa absolute]; if none works, the pressure with the smallest error
+    ``lowest_pressure``: lowest pressure that works [Pa absolute]
+    ``gains``: gains of the controller by path
+    ``error``: RMS torque error [N m]
+    ``gas``, ``gas_in_all``: gas per repetition and total gas with the reserve [kg]
+    ``bottle``: smallest bottle that lasts; None if none does
+    ``margins``: reserves to the limits [-], empty if none works: ``error``, of the RMS error to its limit; ``torque``,
+        of the largest possible torque over the peak of the profile, below 0 if the peak is cut off; ``flow``, possible
+        reduction of the opening at a gauge pressure one tenth higher; ``gas``, of the gas in the bottle over the gas
+        used, None without a bottle
+    ``limit``: quantity that limits the lowest pressure
+    ``remark``: note for the reader; empty if there is none
+    ``curve``: pressures [Pa absolute], errors [N m] and gas per repetition [kg], with the best gains at each pressure
+    """
+
+    valve: CandidateValve
+    works: bool
+    pressure: float
+    lowest_pressure: float | None
+    gains: Mapping[str, float]
+    error: float
+    gas: float
+    gas_in_all: float
+    bottle: Bottle | None
+    margins: Mapping[str, float | None]
+    limit: Limit
+    remark: str
+    curve: tuple[Floats, Floats, Floats]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sizing:
+    """Result of a sizing study: every valve, and the suggested one, which has the smallest bottle.
+
+    ``choice``, ``recording``: suggested valve, and its run on the profile; None without a suggestion
+    ``failures``: number of failed runs by reason
+    ``streams``: number of noise streams of every trial, whose error is the largest over the streams; 0 without noise
+    ``summary``: suggestion with its reason in a sentence, or why there is none
+    """
+
+    problem: SizingProblem
+    valves: tuple[SizedValve, ...]
+    choice: SizedValve | None
+    recording: Recording | None
+    runs: int
+    failures: Mapping[str, int]
+    streams: int = 0
+    summary: str = ""
+
+    def json_document(self) -> dict[str, Any]:
+        """Return the sized valves and the suggestion as plain data in SI."""
+        problem = self.problem
+        found = ("works", "pressure", "lowest_pressure", "error", "gas", "gas_in_all", "gains", "limit", "remark")
+        return {
+            "format": "ppafo sizing",
+            "schema_version": 2,
+            **fields_of(problem, "name", "description", "file", "repetitions", "hours", "reserve", "largest_error"),
+            "units": "SI; pressures absolute, errors in N m, gas and mass in kg, margins as fractions",
+            "scenario": problem.scenario.name,
+            "profile": {
+                **fields_of(problem.profile, "kind", "period", "largest", "table_error"),
+                "times": problem.profile.knot_times.tolist(),
+                "torques": problem.profile.knot_values.tolist(),
+            },
+            "suggested": None if self.choice is None else self.choice.valve.name,
+            "valves": [
+                {"valve": sized.valve.name, **fields_of(sized, *found), "margins": sized.margins or None}
+                | {"bottle": None if sized.bottle is None else sized.bottle.name}
+                for sized in self.valves
+            ],
+            **fields_of(self, "summary", "streams", "runs", "failures"),
+            "ppafo": __version__,
+        }
 
 
 @final
@@ -169,6 +263,129 @@ class Trials:
             PROPORTIONAL_GAIN
         ]
         return term.number(lambda path: columns[path] if path in columns else number_at(scenario, path))
+
+
+def size_for_profile(problem: SizingProblem, threads: int | None, report: Report) -> Sizing:
+    """Return the lowest pressure and smallest bottle of each valve for a torque profile.
+
+    Raises StudyError if all runs fail.
+    """
+    started = time.perf_counter()
+    trials = Trials(problem, threads)
+    sized = []
+    for count, valve in enumerate(problem.valves):
+        elapsed = time.perf_counter() - started
+        report(Progress(f"trying {valve.name}", count, len(problem.valves), 0, 0, elapsed, "valves"))
+        sized.append(_size_valve(trials, valve))
+    working = [(each.bottle.mass, each.gas, row) for row, each in enumerate(sized) if each.works and each.bottle]
+    # Of valves with the same bottle the one that uses least gas.
+    choice, recording = (sized[min(working)[2]] if working else None), None
+    if choice is not None:
+        columns = trials.columns(choice.valve, np.array([choice.pressure]), np.array([0]), np.ones(1))
+        numbers = {path: float(values[0]) for path, values in columns.items()} | dict(choice.gains)
+        recording = simulate(with_numbers(problem.scenario, numbers)).recording
+    return Sizing(problem, tuple(sized), choice, recording, trials.runs, dict(trials.failures), trials.seeds.size)
+
+
+@in_units(lambda trials, _valve: trials.problem.scenario.device.shown)
+def _size_valve(trials: Trials, valve: CandidateValve) -> SizedValve:
+    """Return a valve sized at the pressure with the smallest bottle, or at the smallest error if no pressure works."""
+    problem, tried = trials.problem, try_pressures(trials, valve)
+    works = works_in(problem, tried)
+    lowest, limit = first_of(works), limit_of(trials, valve, tried)
+    in_all = tried["gas"] * problem.repetitions * (1.0 + problem.reserve)
+    bottles = [smallest_bottle(problem.bottles, gas) for gas in in_all.tolist()]
+    if lowest is None:
+        # The smallest error; argmin would take a failed run, whose error is nan.
+        chosen = int(np.argmin(np.where(np.isnan(tried["error"]), np.inf, tried["error"])))
+    else:
+        # The smallest bottle at the lowest pressure; without any bottle, the lowest pressure that works.
+        masses = np.where(works, [np.inf if bottle is None else bottle.mass for bottle in bottles], np.inf)
+        chosen = int(np.argmin(masses)) if np.isfinite(masses).any() else lowest
+    pressure, error, gas, gains = tried[chosen].tolist()
+    gas_in_all, bottle, remarks, margins = float(in_all[chosen]), None, list[str](), dict[str, float | None]()
+    if lowest is not None:
+        bottle, is_cold = lasting_bottle(problem, gas, gas_in_all, pressure)
+        if (failing := np.flatnonzero(~works[lowest:])).size:
+            text = PRESSURE.text(float(tried["pressure"][lowest + failing[0]]))
+            remarks.append(f"at {text} the error limit is exceeded again")
+        if is_cold:
+            smaller = " smaller" * (bottle is not None)
+            remarks.append(f"a{smaller} bottle has enough gas, but gets too cold before the end")
+        if bottles[chosen] is None:
+            largest, share = problem.bottles[-1].name, problem.bottles[-1].mass / gas_in_all
+            duration = f"{100.0 * share:.0f} % of the use, {share * problem.repetitions:.0f} repetitions"
+            remarks.append(f"no bottle is large enough: {largest} lasts for {duration}")
+        used = gas * problem.repetitions
+        margins = {
+            "error": 1.0 - error / problem.largest_error,
+            "torque": ceiling(problem, pressure) / problem.profile.largest - 1.0,
+            "flow": flow_margin(trials, valve, pressure, gains),
+            "gas": None if bottle is None or used <= 0.0 else bottle.mass / used - 1.0,
+        }
+    elif limit == "control":
+        remarks.append(_why_slow(problem, valve, error))
+    columns = trials.columns(valve, np.array([pressure]), np.array([gains]), np.ones(1))
+    return SizedValve(
+        valve=valve,
+        works=lowest is not None,
+        pressure=pressure,
+        lowest_pressure=None if lowest is None else float(tried["pressure"][lowest]),
+        gains={path: float(columns[path][0]) for path in problem.gains},
+        error=error,
+        gas=gas,
+        gas_in_all=gas_in_all,
+        bottle=bottle,
+        margins=margins,
+        limit=limit,
+        remark="; ".join(remarks),
+        curve=(tried["pressure"], tried["error"], tried["gas"]),
+    )
+
+
+def _why_slow(problem: SizingProblem, valve: CandidateValve, error: float) -> str:
+    """Return a sentence on a valve whose loop does not follow, with the delays of valve and controller."""
+    quantities = {f"valve.{item.name}": item for item in VALVES[problem.scenario.device.valve.kind].quantities}
+    lags = [
+        f"{quantities[path].name.replace('_', ' ')} {written_text(number, quantities[path].unit)}"
+        for path, number in valve.numbers.items()
+        if path in LAGS and number > 0.0
+    ]
+    period = 1.0e3 * problem.scenario.controller.period
+    slow = [f"the valve has {', '.join(lags)}"] if lags else []
+    slow += [f"the controller decides every {period:.3g} ms (controller.rate)"] if period > _LONG_PERIOD else []
+    slowed = f"; {' and '.join(slow)}" if slow else ""
+    said = "no gains were found with which the torque loop follows" if problem.gains else "the loop does not follow"
+    return f"{said}: RMS error {TORQUE.text(error)} at best, limit {TORQUE.text(problem.largest_error)}{slowed}"
+
+
+def smallest_bottle(bottles: Sequence[Bottle], gas: float) -> Bottle | None:
+    """Return the smallest bottle that contains a mass of gas [kg]; None if there is none."""
+    return min((bottle for bottle in bottles if bottle.mass >= gas), key=lambda bottle: bottle.mass, default=None)
+
+
+def lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure: float) -> tuple[Bottle | None, bool]:
+    """Return the smallest bottle that lasts, and whether a smaller bottle with enough gas gets too cold.
+
+    The profile is repeated without a pause and takes ``gas`` [kg] per repetition, ``in_all`` [kg] in total with the
+    reserve, downstream of a regulator set to ``pressure`` [Pa absolute].
+    """
+    if gas <= 0.0:
+        return smallest_bottle(problem.bottles, in_all), False
+    enough = [bottle for bottle in problem.bottles if bottle.mass >= in_all]
+    period = problem.profile.period
+    # A second more than the use, so that a bottle that lasts is one whose time is up.
+    schedule = Schedule(problem.repetitions * period + 1.0, 0.0, max(problem.repetitions * period, 1.0))
+    for number, bottle in enumerate(enough):
+        full = replace(bottle, regulator=bottle.regulator._replace(set_pressure=pressure))
+        try:
+            ended = discharge(full, gas, period, gas / period, schedule).ending
+        except ParameterError:
+            # Its regulator does not pass the flow even when it is full.
+            continue
+        if ended == TIME_IS_UP:
+            return bottle, number > 0
+    return None, bool(enough)
 
 
 def try_pressures(trials: Trials, valve: CandidateValve) -> Trial:

@@ -46,7 +46,7 @@ _SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 FOLLOWS = "follows"
 """Text of the condition that the run follows its reference, by the verdict of ``simulate``, within the reach."""
-_CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
+_CONDITION = re.compile(r"\s*([\w.:]+)\s*(<=|>=)\s*(.+?)\s*")
 
 
 def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:

@@ -1,39 +1,42 @@
-"""Report of the reproduction: tables of claims with verdicts, of one study or of several, and figures."""
+"""Report of the reproduction: tables of claims with verdicts, of one study or of several, figures, and the page."""
 
-from collections.abc import Callable, Sequence
+import shlex
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ppafo.analyses.reproduce.bench import SyntheticEvidence
-from ppafo.analyses.reproduce.claim import MEANINGS, VERDICTS, count_sentence
+from ppafo.analyses.reproduce.claim import MEANINGS, VERDICTS, Claim, Verdict, count_sentence, verdict_counts
 from ppafo.analyses.reproduce.drawing import device_figure
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
-from ppafo.analyses.reproduce.meaning_of_u import WITHIN_REACH
-from ppafo.analyses.reproduce.page import (
-    DEVICE_FIGURE,
-    IDENTIFICATION_FIGURE,
-    STEP_FIGURE,
-    TORQUE_FIGURE,
-    reproduction_page,
-)
-from ppafo.analyses.reproduce.publication import SEED
-from ppafo.analyses.reproduce.result import (
-    NOTHING_CONFIRMED,
+from ppafo.analyses.reproduce.publication import SEED, Studies
+from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED, load_reported
+from ppafo.analyses.reproduce.solve import (
+    BENCH_PRESET,
+    EXPERIMENTS,
+    PROPORTIONAL,
+    RIG_SEED,
+    SOLENOID,
+    TASK_PRESET,
+    AssumedValue,
     Reproduction,
-    Studies,
-    holding_torque,
-    reading_rows,
-    result_on_u,
+    SyntheticEvidence,
 )
 from ppafo.analyses.reproduce.step_response import SupplyLevels
+from ppafo.analyses.reproduce.torque_task import WITHIN_REACH, holding_torque, reading_rows, result_on_u
+from ppafo.documents.json_text import fields_of
 from ppafo.identification.bench.result import figure_3
+from ppafo.parameters import load_parameter_set
+from ppafo.parameters.publications.publication import paper_entries
+from ppafo.report.display_units import metric_level
 from ppafo.report.finding import Cell, Finding, Section, columns_of
+from ppafo.report.writing import inline_figure, quantity, render_page, sentence
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.wording import override_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
+NOTHING_CONFIRMED = "No experimental result is confirmed independently of fitted settings."
 _HEAD = ("claim", "paper", "ours", "verdict")
 _PAPER = "'ppafo reproduce' without --study writes the page of these claims, with sources, figures and assumptions."
 _STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
@@ -43,6 +46,39 @@ _RULE = (
     + " ".join(f"{VERDICTS[verdict].capitalize()}: {meaning}." for verdict, meaning in MEANINGS.items())
     + " Nothing here was measured."
 )
+TEMPLATE = "reproduction.html.jinja"
+DEVICE_FIGURE = "device"
+IDENTIFICATION_FIGURE = "figure-3-identification"
+STEP_FIGURE = "figure-7-step-response"
+TORQUE_FIGURE = "figure-8-torque-task"
+NOT_READ = (
+    "Sources not consulted that are likely to settle the open points: the dissertations of K. A. Shorter (2011) and "
+    "Y. Li (2013), the journal article of 2012 in Mechatronics, the volume table of the vane's manufacturer."
+)
+_EXPERIMENTS = dict(
+    zip(EXPERIMENTS, ("step response", "torque task, solenoid", "torque task, proportional"), strict=True)
+)
+_SYMBOLS: dict[Verdict, str] = {
+    "consistent": "✓",
+    "inconsistent_as_reported": "✗",
+    "met_by_fitted_settings": "≈",
+    "plausible": "~",
+    "undetermined": "?",
+    "not_testable": "○",
+}
+_TASK_METRICS = (
+    "rms_error",
+    "rms_error_ramp",
+    "rms_error_hold",
+    "peak_error",
+    "gas_supplied",
+    "gas_vented",
+    "gas_leaked",
+    "switchings",
+    "oscillations_ramp",
+    "oscillations_hold",
+    "mechanical_work",
+)
 
 
 def finding_of_studies(solved: Studies) -> Finding[Studies]:
@@ -51,10 +87,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     A claim of another publication that is not met counts as a result, not as a failure.
     """
     reproduction = solved.reproduction
-    of_paper = () if reproduction is None else reproduction.claims
-    rows: list[Sequence[Cell]] = [
-        (SEED, claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in of_paper
-    ]
+    rows: list[Sequence[Cell]] = [(SEED, *_row(claim)) for claim in solved.of_paper]
     details = [] if reproduction is None else [Section(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
     for publication, claims in solved.studies:
         stated_claims: list[Sequence[Cell]] = []
@@ -90,6 +123,11 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     )
 
 
+def _row(claim: Claim) -> tuple[str, str, str, str]:
+    """Return the row of a claim of the paper in the table of claims."""
+    return claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]
+
+
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
     """Format the range of values that agrees with a claim as text."""
     if low is not None and high is not None:
@@ -115,9 +153,8 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         for claim in missed
         if claim.window is not None
     ]
-    rows_of_claims = [(claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in reproduction.claims]
     claims = Section(
-        columns=columns_of(_HEAD, rows_of_claims),
+        columns=columns_of(_HEAD, map(_row, reproduction.claims)),
         remarks=("", count_sentence([claim.verdict for claim in reproduction.claims]), *remarks),
         left=len(_HEAD),
     )
@@ -163,3 +200,90 @@ def _figures(reproduction: Reproduction) -> list[Section]:
     if isinstance(synthetic, SyntheticEvidence):
         drawn[IDENTIFICATION_FIGURE] = partial(figure_3, synthetic.torque, synthetic.decay)
     return [Section(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]
+
+
+def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes:
+    """Return the page of a reproduction as HTML.
+
+    ``drawn`` are the figures as SVG by file name; they become part of the page.
+    """
+    changed = [word for override in reproduction.overrides for word in ("--set", override)]
+    solenoid, proportional = reproduction.solenoid, reproduction.proportional
+    runs = (solenoid, proportional, reproduction.step)
+    steps = sorted({1e3 * float(run.engine["step"]) for run in runs})
+    counts, readings = verdict_counts(reproduction.claims).items(), reproduction.readings_of_u
+    values = {
+        "paper": load_parameter_set(reproduction.printed_set).citation,
+        "nothing_confirmed": NOTHING_CONFIRMED,
+        **fields_of(reproduction, "overrides", "claims", "step_observations", "torque_observations"),
+        "count_sentence": count_sentence([claim.verdict for claim in reproduction.claims]),
+        "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
+        "words": VERDICTS,
+        "symbols": _SYMBOLS,
+        "not_published": [(entry.statement, entry.where) for entry in map(paper_entries().get, NOT_PUBLISHED) if entry],
+        "not_read": NOT_READ,
+        **_set_values(reproduction),
+        **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
+        "readings_of_u": reading_rows(readings),
+        "result_on_u": result_on_u(readings) if readings else (),
+        "within_reach": f"{WITHIN_REACH:g}",
+        "task_rows": [
+            (
+                solenoid.metrics[name].summary,
+                *(
+                    quantity(*metric_level(run.metrics[name].value, run.metrics[name].unit), 3)
+                    for run in (solenoid, proportional)
+                ),
+            )
+            for name in _TASK_METRICS
+            if name in solenoid.metrics and name in proportional.metrics
+        ],
+        "ceiling": f"{holding_torque(solenoid):.1f}",
+        "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
+        "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
+        "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
+        "step_figure": inline_figure(drawn[STEP_FIGURE]),
+        "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
+        "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
+    }
+    return render_page(TEMPLATE, values, "ppafo.analyses.reproduce").encode()
+
+
+def _set_values(reproduction: Reproduction) -> dict[str, Any]:
+    """Return template values on both parameter sets: findings of the printed set, remaining findings of the other."""
+    severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
+    groups: dict[tuple[str, ...], list[AssumedValue]] = {}
+    for value in reproduction.assumed:
+        groups.setdefault(value.used_by, []).append(value)
+    headings = {
+        users: sentence(" and ".join(_EXPERIMENTS.get(name, name) for name in users)).rstrip(".") for users in groups
+    } | {tuple(_EXPERIMENTS): "All experiments", (SOLENOID, PROPORTIONAL): "Torque task, both valves"}
+    ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
+    return {
+        **fields_of(reproduction, "printed_set", "completed_set"),
+        **{
+            name: [finding for finding in reproduction.printed_findings if finding.severity == severity]
+            for severity, name in severities.items()
+        },
+        "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
+        "assumed_groups": [(headings[users], values) for users, values in ordered],
+    }
+
+
+def _synthetic(evidence: SyntheticEvidence | str, figure: bytes | None) -> dict[str, Any]:
+    """Return template values on the synthetic measurements, or the reason why there are none."""
+    if isinstance(evidence, str):
+        return {"synthetic": None, "no_synthetic": evidence}
+    reported = load_reported()
+    slope = -evidence.decay["friction.viscous_damping"].value / reported.in_si("foot_plate.inertia")
+    return {
+        "no_synthetic": "",
+        "synthetic": {
+            "figure": None if figure is None else inline_figure(figure),
+            "preset": BENCH_PRESET,
+            "task_preset": TASK_PRESET,
+            "seed": RIG_SEED,
+            "slope": f"{slope:.1f}",
+            "reported_slope": f"{reported.entry('reported.velocity_over_acceleration').value:g}",
+        },
+    }

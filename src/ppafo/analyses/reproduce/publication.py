@@ -5,11 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.reproduce.claim import Verdict
+from ppafo.analyses.reproduce.claim import VERDICTS, Claim, Verdict
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import fields_of
 from ppafo.documents.toml_text import label
@@ -19,11 +19,15 @@ from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, r
 from ppafo.progress import Progress, Report
 from ppafo.report.writing import format_reported_quantity, quantity
 from ppafo.units import from_si, parse_quantity
+from ppafo.version import __version__
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import healthy_metrics, walk
 from ppafo.wording import argument_text, known_names, nearest_name, said_missing
+
+if TYPE_CHECKING:
+    from ppafo.analyses.reproduce.solve import Reproduction
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5
@@ -220,6 +224,37 @@ class JudgedClaim:
             "arguments": dict(entry.arguments),
             "assumptions": list(entry.assumed),
             "source": self.claim.source,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Studies:
+    """Publications with their judged claims, and the reproduction of the paper if it is included."""
+
+    studies: tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]
+    reproduction: "Reproduction | None" = None
+
+    @property
+    def of_paper(self) -> tuple[Claim, ...]:
+        """Claims of the paper, if it is included."""
+        return () if self.reproduction is None else self.reproduction.claims
+
+    @property
+    def verdicts(self) -> list[Verdict]:
+        """Verdicts of all claims, starting with the paper's."""
+        studied = (claim.verdict for _, claims in self.studies for claim in claims)
+        return [*(claim.verdict for claim in self.of_paper), *studied]
+
+    def json_document(self) -> dict[str, Any]:
+        """Return claims with verdicts, and the number of claims for each verdict, as plain data in SI."""
+        return {
+            "study": self.studies[0][0].name if self.reproduction is None else ALL,
+            "counts": {verdict: self.verdicts.count(verdict) for verdict in VERDICTS},
+            "claims": [
+                *({"study": SEED, **claim.document()} for claim in self.of_paper),
+                *(claim.document(publication.name) for publication, claims in self.studies for claim in claims),
+            ],
+            "versions": {"ppafo": __version__},
         }
 
 

@@ -10,7 +10,8 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
-    from ppafo.analyses.reproduce.result import Reproduction, Studies
+    from ppafo.analyses.reproduce.publication import Studies
+    from ppafo.analyses.reproduce.solve import Reproduction
     from ppafo.report.finding import Finding
 
 PublicationName = Annotated[str | Path, Word("NAME", option="--study")]
@@ -49,8 +50,7 @@ def reproduce(
     # Loading takes a second or two.
     report(Progress("loading the experiments"))
     from ppafo.analyses.reproduce.answer import finding_of, finding_of_studies
-    from ppafo.analyses.reproduce.publication import ALL, SEED, check_study, run_studies
-    from ppafo.analyses.reproduce.result import Studies
+    from ppafo.analyses.reproduce.publication import ALL, SEED, Studies, check_study, run_studies
     from ppafo.analyses.reproduce.solve import reproduce_paper
 
     study = str(study)

@@ -13,12 +13,18 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.design import search
-from ppafo.analyses.design.answer import Sizing, finding_of, suggestion_sentence
-from ppafo.analyses.design.loading import json_schema, load_design
-from ppafo.analyses.design.problem import choose_knots
-from ppafo.analyses.design.question import design
-from ppafo.analyses.design.search import OSCILLATES, Trials, ceiling, ceiling_pressure, cut_error
-from ppafo.analyses.design.solve import _lasting_bottle, smallest_bottle
+from ppafo.analyses.design.problem import choose_knots, json_schema, load_design
+from ppafo.analyses.design.question import design, finding_of, suggestion_sentence
+from ppafo.analyses.design.search import (
+    OSCILLATES,
+    Sizing,
+    Trials,
+    ceiling,
+    ceiling_pressure,
+    cut_error,
+    lasting_bottle,
+    smallest_bottle,
+)
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.gait import load_gait
@@ -111,14 +117,13 @@ def test_gas_bottle_and_margins_belong_together(sizing: Sizing) -> None:
     choice = sizing.choice
     assert choice is not None
     assert choice.bottle is not None
-    assert choice.margins is not None
     assert sizing.recording is not None
     assert choice.gas == pytest.approx(sizing.recording["supplied_mass"][-1], rel=1e-9)
     assert choice.gas_in_all == pytest.approx(110.0 * choice.gas)
     assert choice.bottle.name == "co2-88g"
-    assert choice.margins.gas == pytest.approx(0.088 / (100.0 * choice.gas) - 1.0)
-    assert choice.margins.torque == pytest.approx(TORQUE_CONSTANT * (choice.pressure - ATMOSPHERE) / 4.0 - 1.0)
-    assert 0.0 < choice.margins.flow < 1.0
+    assert choice.margins["gas"] == pytest.approx(0.088 / (100.0 * choice.gas) - 1.0)
+    assert choice.margins["torque"] == pytest.approx(TORQUE_CONSTANT * (choice.pressure - ATMOSPHERE) / 4.0 - 1.0)
+    assert 0.0 < choice.margins["flow"] < 1.0
 
 
 def with_valve(folder: Path, name: str, *values: str) -> Path:
@@ -156,8 +161,7 @@ def test_a_slow_valve_that_follows_by_hand_is_found_with_gains_of_another_size(f
     item = design(with_valve(folder, "slewing", SMALL, 'slew_limit = "100 1/s"')).found.valves[0]
     assert (item.works, item.limit) == (True, "torque")
     assert item.pressure < ATMOSPHERE + 45.0 * 6894.757
-    assert item.margins is not None
-    assert item.margins.flow > 0.0
+    assert item.margins["flow"] > 0.0
 
 
 def test_smaller_gains_are_tried_where_a_valve_follows_with_none_of_the_file_s(folder: Path) -> None:
@@ -397,8 +401,7 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
     )
     sizing = design(tmp_path / "brief.toml").found
     assert sizing.choice is not None
-    assert sizing.choice.margins is not None
-    assert sizing.choice.margins.torque >= -0.3
+    assert sizing.choice.margins["torque"] >= -0.3
     # Equation (2): the peak of 5 N m needs 5 N m / 14.51 cm^3 = 344.6 kPa, 50 psi above the atmosphere.
     most = TORQUE_CONSTANT * (sizing.choice.pressure - ATMOSPHERE)
     said = suggestion_sentence(sizing)
@@ -469,6 +472,6 @@ def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
     gas, pressure = 0.45e-3, 101325.0 + 50.0 * 6894.757
     in_all = gas * problem.repetitions * (1.0 + problem.reserve)
     assert smallest_bottle(bottles, in_all) is bottles[0], "its gas alone would do"
-    assert _lasting_bottle(problem, gas, in_all, pressure) == (big, True)
+    assert lasting_bottle(problem, gas, in_all, pressure) == (big, True)
     alone = dataclasses.replace(problem, bottles=bottles[:1])
-    assert _lasting_bottle(alone, gas, in_all, pressure) == (None, True)
+    assert lasting_bottle(alone, gas, in_all, pressure) == (None, True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.linearise.plant import one_sided_slopes
+from ppafo.analyses.linearise.model import one_sided_slopes
 from ppafo.engine.lanes import Floats
 from ppafo.engine.scheme.pneumatics import GAMMA, linearise, sloped_flows
 from ppafo.model.orifice import fitted_flow_function, orifice_flow

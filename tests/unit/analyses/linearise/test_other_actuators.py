@@ -6,9 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.linearise.plant import plant_of, valve_states
-from ppafo.analyses.linearise.point import point_at
-from ppafo.analyses.linearise.solve import linear_model, model_at
+from ppafo.analyses.linearise.model import linear_model, model_at, plant_of, point_at, valve_states
 from ppafo.loading import load_scenario
 from ppafo.running import simulate
 from ppafo.simulation.plan import plan_run
