@@ -68,7 +68,9 @@ def words_of(path: str, quantity: Quantity, value: float, draw: random.Random, a
     if path in LISTED:
         return draw.choice(LISTED[path])
     size = value if value else draw.choice((0.0, 1.0)) * TYPICAL.get(quantity.unit, 0.1)
-    number = min(max(size * draw.uniform(0.8, 1.25), quantity.minimum), quantity.maximum)
+    # A few are far off, so that they contradict others.
+    share = draw.uniform(0.1, 4.0) if draw.random() < 0.2 else draw.uniform(0.8, 1.25)
+    number = min(max(size * share, quantity.minimum), quantity.maximum)
     unit = draw.choice(UNITS.get(quantity.unit, (quantity.unit,)))
     shown = from_si(number, unit, quantity.unit, atmosphere)
     text = repr(shown) if draw.random() < 0.3 else f"{shown:.{draw.randint(2, 8)}g}"

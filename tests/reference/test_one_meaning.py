@@ -1,13 +1,17 @@
 """A setting means the same at every door: words of a user, drawn, against the single run with them."""
 
+import ctypes
 import shutil
+from pathlib import Path
 
 import pytest
 
+from ppafo.loading import load_scenario
 from ppafo.simulation import numbers
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
-from scripts.one_meaning import at_library, at_study
+from scripts.one_meaning import BuiltLibrary, at_library, at_study
+from scripts.typed_words import single
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 
@@ -20,11 +24,36 @@ def test_columns_of_a_study_are_single_runs_with_the_same_words(name: str) -> No
 
 
 @needs_gcc
-@pytest.mark.parametrize("name", ["torque-task-slow-valve", "proportional-regulators"])
-def test_settings_of_a_library_are_single_runs_with_the_same_words(name: str) -> None:
+@pytest.mark.parametrize("name", ["torque-task-slow-valve", "proportional-regulators", "swing-foot-angle"])
+def test_settings_of_a_library_are_single_runs_with_the_same_words_or_refused_by_both(name: str) -> None:
     found = at_library(name, 24, seed=13)
     assert found.differing == []
     assert found.same > 8
+    assert found.refused > 0
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("name", "number", "text", "named"),
+    [
+        ("pressure-loop", ("reference.start_level", 87983.2), "[reference] leaves the range", "reference_level"),
+        ("torque-task-moving-ankle", ("motion.profile.level", 0.0), "leaves the stops", "motion_profile_level"),
+        ("swing-foot-angle", ("reference.value_20", 20.0), "[reference] leaves the stops", "reference_level"),
+        ("swing-foot-angle", ("reference.time_14", 0.7), "time_15 = 0.2771 s: must be later", "reference_time_15"),
+        ("proportional", ("controller.first_stride_time", 0.39), "half and twice", "controller_first_stride_time"),
+        ("solenoid", ("actuator.angle_max", 1.7), "the gait needs", "actuator_angle_max"),
+    ],
+)
+def test_a_rule_on_profiles_and_gait_holds_in_a_library_as_in_a_file(
+    tmp_path: Path, name: str, number: tuple[str, float], text: str, named: str
+) -> None:
+    built, (path, value) = BuiltLibrary(load_scenario(name), tmp_path), number
+    (unit,) = (setting.quantity.unit for setting in built.library.settings if setting.path == path)
+    refusal = single(name, {path: f"{value!r} {unit}"})
+    assert isinstance(refusal, str)
+    assert text in refusal
+    settings = built.changed({path: value})
+    assert built.wrong_setting(settings.ctypes.data_as(ctypes.c_void_p)) == named.encode()
 
 
 def test_a_door_at_which_nothing_follows_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:

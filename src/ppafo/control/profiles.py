@@ -167,6 +167,17 @@ def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, f
     return profile.level + segment.first + rate * (place - segment.start), rate, 0.0
 
 
+def disordered_knot(profile: TabulatedProfile) -> float:
+    """Return the number of the first used knot, from 2, that is not later than the one before; 0 if there is none."""
+    found, number, before = 0.0, 1.0, 0.0
+    for knot in profile.knots:
+        number = number + 1.0
+        is_first = found == 0.0 and knot.time < profile.period and knot.time <= before
+        found = number if is_first else found
+        before = knot.time
+    return found
+
+
 def table_period(profile: TabulatedProfile) -> float:
     """Return the time [s] after which a table repeats."""
     return profile.period

@@ -194,11 +194,8 @@ def _unparsed(body: list[ast.stmt]) -> list[str]:
     return ast.unparse(ast.fix_missing_locations(ast.Module(body, []))).split("\n")
 
 
-def lane_loop(step: StepText, head: str, name: str, arguments: str, lanes: int = 0) -> str:
-    """Text of the function ``name`` that advances a block of ``lanes`` runs, or of as many as fit if ``lanes`` is 0.
-
-    ``head`` is the decorator line; ``arguments`` are the parameters, which include ``ARGUMENTS``.
-    """
+def _lane_loop(step: StepText, lanes: int) -> str:
+    """Text of the function ``advance`` that advances a block of ``lanes`` runs, or of as many as fit if that is 0."""
     rows = RowsOfLanes(step, lanes)
     states, parameters = len(rows.state_at), len(rows.parameter_at)
     lines = [
@@ -210,7 +207,7 @@ def lane_loop(step: StepText, head: str, name: str, arguments: str, lanes: int =
         *_unparsed(LoopText({rows: step}, loop.advance).lines()),
         *over_rows(states, "states[row, lane] = x[row, lane]"),
     ]
-    return "\n".join([head, f"def {name}({arguments}):", *indent(lines)])
+    return "\n".join([COMPILED, f"def advance({ARGUMENTS}):", *indent(lines)])
 
 
 LOOP_ARRAYS = {"signal_history": 3, "command_history": 2}
@@ -251,5 +248,5 @@ def run_loop(step: StepText, outputs: str, in_parts: StepText | None) -> str:
 
 def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) -> str:
     """Source text of a program for ``lanes`` runs, 0 for as many as fit; ``collector`` then has all its inputs."""
-    advance = lane_loop(StepText(program, collector), COMPILED, "advance", ARGUMENTS, lanes)
+    advance = _lane_loop(StepText(program, collector), lanes)
     return f"{HEADER}\n\n{collector.text()}\n\n\n{advance}\n"

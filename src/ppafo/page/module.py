@@ -5,11 +5,14 @@ import importlib.util
 import shutil
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.errors import ProgramError
 from ppafo.exports import filled, template
+from ppafo.exports.c_library.entries import with_reach
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import Library
 from ppafo.storage.files import temporary_folder
@@ -25,10 +28,11 @@ _REMEDY = "a page needs a compiler for WebAssembly: pip install 'ppafo[workbench
 
 def module_of(library: Library) -> bytes:
     """Return the WebAssembly module of a library; raises ProgramError without a compiler for it."""
-    words = {"name": library.name, "NAME": library.name.upper()}
-    written = library_files(library)
+    has_reach = "reference" in library.program.outputs
+    words = {"name": library.name, "NAME": library.name.upper(), "REACH": str(int(has_reach))}
+    written = library_files(replace(library, further=partial(with_reach, library)) if has_reach else library)
     sources = {f"{library.name}{end}": written[f"{library.name}{end}"] for end in (".c", ".h")}
-    sources |= {name: template("ppafo.page", name).encode() for name in ("math.h", "string.h")}
+    sources |= dict.fromkeys(("math.h", "string.h"), template("ppafo.page", "standard.h").encode())
     sources["module.c"] = filled(template("ppafo.page", "module.c"), words).encode()
     digests = [hashlib.sha256(text).hexdigest() for _, text in sorted(sources.items())]
     return kept_bytes("wasm", "\n".join([*compiler(), *_FLAGS, *digests]), lambda: built(sources))
@@ -49,5 +53,5 @@ def built(sources: Mapping[str, bytes]) -> bytes:
     with temporary_folder("ppafo", sources) as folder:
         done, made = asked(line, _REMEDY, folder, Path(folder)), Path(folder) / "module.wasm"
         if done.returncode != 0 or not made.is_file():
-            raise ProgramError(f"the WebAssembly module could not be built: {complaint(done)}; {_REMEDY}")
+            raise ProgramError(f"the WebAssembly module could not be built: {complaint(done)}")
         return made.read_bytes()

@@ -5,6 +5,7 @@ C library that ``ppafo export c`` writes.
 """
 
 import base64
+import functools
 import hashlib
 import json
 import math
@@ -12,7 +13,6 @@ import shlex
 import zlib
 from collections.abc import Callable, Collection, Sequence
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from ppafo.exports.c_library.library import ExportParameter, Library
 from ppafo.loading import load_scenario
 from ppafo.model.controlled import CONTROLLED
 from ppafo.page.module import module_of
+from ppafo.parameters.declaration import limits_text
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.display_units import metric_quantity, metric_words
@@ -47,13 +48,13 @@ _HIDDEN = ("run.step", "run.output_interval", "run.tolerance", "sensors.seed")
 _LONGER = 4.0
 """Longest run on a page, as a multiple of its duration as written: a browser waits for a run."""
 _PANELS = (
-    *(("Torque", ("torque", "reference")), ("Angle", ("angle", "reference_angle"))),
+    *(("Torque", ("torque", "reference", "within_reach")), ("Angle", ("angle", "reference_angle"))),
     ("Pressures, chamber 2 dashed", ("pressure_1", "pressure_2", "reference_pressure_1", "reference_pressure_2")),
     *(("Command to the valve", ("command",)), ("Gas taken from the supply", ("supplied_mass",))),
 )
 """Panels: title and channels, of which all but the first are dashed."""
-_HEADLINES = ("rms_error", "gas_supplied", "gas", "positive_push_off_work")
-"""Metrics that are said after each change."""
+_HEADLINES = ("gas_supplied", "positive_push_off_work")
+"""Metrics that are said after each change, beside the first one."""
 _WORDS = {"_g": " gauge", "_a": " abs", "_d": "", "^2": "²", "^3": "³"}
 
 
@@ -97,11 +98,12 @@ def workbench(
         missing = ", ".join(sorted({*sliders} - found)) or "no scenario"
         raise ScenarioError(f"{missing}: a page needs scenarios, and settings that one of them has and may change")
     content = json.dumps({"simulations": simulations}, ensure_ascii=False, separators=(",", ":"))
-    script = _own("page.js")
+    script = template("ppafo.page", "page.js")
     words = {
+        "engine": template("ppafo.page", "engine.js"),
         "title": escape(", ".join(names)),
         "digest": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        "style": _own("page.css"),
+        "style": template("ppafo.page", "page.css"),
         "content": content.replace("<", "\\u003c"),
         "script": script,
         "version": __version__,
@@ -109,15 +111,17 @@ def workbench(
     return filled(template("ppafo.page", "page.html"), words).encode()
 
 
-def _own(name: str) -> str:
-    return files("ppafo.page").joinpath(name).read_text(encoding="utf-8")
-
-
 def _simulation(name: str, overrides: Sequence[str], sliders: Sequence[str]) -> dict[str, Any]:
     """Return all that the page needs of a scenario, as plain data for JSON."""
     scenario = load_scenario(name, overrides)
     library, recording = library_of(scenario), simulate(scenario).recording
-    outputs = library.program.outputs
+    outputs, metrics = library.program.outputs, library.program.metrics
+    compared = [output for output in outputs if output in recording.names]
+    drawn = {name: OUTPUTS[name] for name in outputs}
+    if "reference" in outputs:
+        drawn["within_reach"] = "N m", "reference torque as far as the actuator reaches it"
+    found = [(title, [name for name in channels if name in drawn]) for title, channels in _PANELS]
+    panels = [{"title": title, "channels": channels} for title, channels in found if channels]
     with shown_in(scenario.device.shown):
         return {
             "name": scenario.name,
@@ -126,15 +130,12 @@ def _simulation(name: str, overrides: Sequence[str], sliders: Sequence[str]) -> 
                 ["ppafo", "simulate", name, *(word for text in overrides for word in ("--set", text))]
             ),
             "settings": _settings(scenario, library, sliders or FIRST),
+            "outputs": outputs,
             "channels": [
-                {"name": output, "label": _sentence(OUTPUTS[output][1], library), **_shown(OUTPUTS[output][0])}
-                for output in outputs
+                {"name": one, "label": _sentence(meaning, library), **_shown(unit)}
+                for one, (unit, meaning) in drawn.items()
             ],
-            "panels": [
-                {"title": title, "channels": [channel for channel in channels if channel in outputs]}
-                for title, channels in _PANELS
-                if not set(outputs).isdisjoint(channels)
-            ],
+            "panels": sorted(panels, key=lambda panel: not any("reference" in name for name in panel["channels"])),
             "metrics": [
                 {
                     "name": kind.name,
@@ -142,23 +143,22 @@ def _simulation(name: str, overrides: Sequence[str], sliders: Sequence[str]) -> 
                     "label": _sentence(kind.summary, library),
                     **_shown(kind.unit),
                 }
-                for kind in library.program.metrics
+                for kind in metrics
             ],
-            "headlines": [kind.name for kind in library.program.metrics if kind.name in _HEADLINES],
-            "compared": [output for output in outputs if output in recording.names],
+            "headlines": [metrics[0].name, *(kind.name for kind in metrics[1:] if kind.name in _HEADLINES)],
+            "compared": compared,
             "samples": len(recording),
-            "checksum": _checksum(recording, outputs),
+            "checksum": _checksum(recording, compared),
             "wasm": base64.b64encode(module_of(library)).decode(),
         }
 
 
 def _checksum(recording: Recording, channels: Sequence[str]) -> int:
-    """Return the CRC-32 of all samples of the channels that a recording has."""
+    """Return the CRC-32 of all samples of some channels of a recording."""
     check = 0
     for name in channels:
-        if name in recording.names:
-            # A sum with 0 has no negative zero.
-            check = zlib.crc32((recording[name] + 0.0).astype("<f8").tobytes(), check)
+        # A sum with 0 has no negative zero.
+        check = zlib.crc32((recording[name] + 0.0).astype("<f8").tobytes(), check)
     return check
 
 
@@ -171,6 +171,9 @@ def _settings(scenario: Scenario, library: Library, first: Sequence[str]) -> lis
     return [
         {
             "path": setting.path,
+            "name": setting.name,
+            "limits": _typeset(limits_text(setting.quantity)),
+            "rules": _rules(setting, library, words),
             "label": library.worded(label_of(setting.path, words)),
             "summary": library.worded(setting.quantity.summary or setting.quantity.name),
             "si": "" if setting.quantity.unit == "1" else setting.quantity.unit,
@@ -180,6 +183,15 @@ def _settings(scenario: Scenario, library: Library, first: Sequence[str]) -> lis
         }
         for setting in library.settings
     ]
+
+
+def _rules(setting: ExportParameter, library: Library, words: str) -> str:
+    """Return what a setting has to be beside others, in words; empty for what only its program knows."""
+    paths = {other.name: other.path for other in library.settings}
+    rules = [
+        f"{one.relation} {label_of(paths[one.other], words)}" for one in library.relations if one.name == setting.name
+    ]
+    return f"it must be {' and '.join(rules)}" if rules else ""
 
 
 def _slider(setting: ExportParameter, atmosphere: float, absent: Collection[str]) -> dict[str, Any]:
@@ -198,15 +210,8 @@ def _slider(setting: ExportParameter, atmosphere: float, absent: Collection[str]
     step = _round_up((end - start) / 250.0)
     if not quantity.minimum_allowed and start <= low:
         start = low + step
-    is_hidden = setting.path in _HIDDEN or setting.name in absent
-    return {
-        **shown,
-        "from": start,
-        "to": end,
-        "step": step,
-        "hidden": is_hidden,
-        "longest": setting.path == "run.duration",
-    }
+    is_hidden, is_length = setting.path in _HIDDEN or setting.name in absent, setting.path == "run.duration"
+    return {**shown, "from": start, "to": end, "step": step, "hidden": is_hidden, "longest": is_length}
 
 
 def _round_up(value: float) -> float:
@@ -227,10 +232,12 @@ def _shown(
     unit = unit_of(quantity) if quantity == "gas mass" else shown_unit(si)
     unit = f"{unit[:-2]}_a" if is_absolute else unit
     scale, offset, is_gauge = conversion(unit, "" if si == "1" else si)
-    for ending, word in _WORDS.items():
-        unit = unit.replace(ending, word)
     zero = QUANTITIES[quantity].zero if quantity else 0.0
-    return {"unit": unit, "scale": str(scale), "offset": str(offset), "gauge": is_gauge, "zero": zero}
+    return {"unit": _typeset(unit), "scale": str(scale), "offset": str(offset), "gauge": is_gauge, "zero": zero}
+
+
+def _typeset(text: str) -> str:
+    return functools.reduce(lambda before, word: before.replace(*word), _WORDS.items(), text)
 
 
 def _sentence(summary: str, library: Library) -> str:

@@ -60,10 +60,6 @@ EXPERIMENT = DrawingStyle(GREY, marker=".")
 ACTUAL = DrawingStyle(BLUE)
 """Style of a device regardless of its valve."""
 _VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID})
-PAGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
-"""Colours of curves on the interactive page, which is white: colours 1 to 4 of its style sheet."""
-PAGE_LOOKS = MappingProxyType({kind: PAGE_COLOURS.index(look.colour) + 1 for kind, look in _VALVES.items()})
-"""Number of the curve colour on the interactive page (from 1), by kind of valve."""
 
 
 def look_of_valve(kind: str) -> DrawingStyle:

@@ -1,18 +1,18 @@
 """Profiles of a scenario (functions of time): reading from a file, engine parameters, values and bounds."""
 
-from functools import reduce
-from itertools import pairwise
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import PROFILES
+from ppafo.control.profiles import disordered_knot
 from ppafo.engine.in_python import over_samples
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import VALVES
-from ppafo.model.columns import Problem, at, over_runs
+from ppafo.model.columns import Problem, at, larger, over_runs
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import kind_at
@@ -22,7 +22,7 @@ from ppafo.simulation.document import DocumentReader
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 from ppafo.units.shown import in_units, shown_text
 
-MAXIMUM_CHECKED_TIMES = 20_000
+MAXIMUM_CHECKED_TIMES = 20_000.0
 TOLERANCE = 1.0e-9
 """Tolerance of an angle beyond a stop [rad]: rounding of a stop given in degrees."""
 
@@ -62,19 +62,20 @@ def read_profile(
 
 def disordered_knots(choice: ProfileChoice, section: str) -> Problem:
     """Problem of a table with a knot in use that is not later than the one before; of no other profile."""
-    times = {f"{section}.{name}": number for name, number in choice.settings.items() if name.startswith("time_")}
-    knots = [("the first knot", 0.0), *times.items()]
-    pairs = [
-        (earlier, later, np.logical_and(later[1] < choice.settings["period"], later[1] <= earlier[1]))
-        for earlier, later in pairwise(knots)
-    ]
+    if "time_02" not in choice.settings:
+        return False, lambda _run: ""
+    kind = PROFILES[choice.kind]
+    numbers = [choice.settings[quantity.name] for quantity in kind.quantities]
+    disordered = over_runs(lambda *values: disordered_knot(rebuilt(kind.parameters, values)), *numbers)
 
     def line(run: int) -> str:
-        earlier, later, _ = next(pair for pair in pairs if at(pair[-1], run))
-        before, time = (shown_text(at(knot[1], run), "s", ".9g") for knot in (earlier, later))
-        return f"{later[0]} = {time}: must be later than {earlier[0]}, {before}"
+        number = round(at(disordered, run))
+        earlier, later = (f"time_{place:02}" for place in (number - 1, number))
+        before, time = (shown_text(at(choice.settings.get(name, 0.0), run), "s", ".9g") for name in (earlier, later))
+        named = f"{section}.{earlier}" if earlier in choice.settings else "the first knot"
+        return f"{section}.{later} = {time}: must be later than {named}, {before}"
 
-    return reduce(np.logical_or, (is_bad for _, _, is_bad in pairs), False), line
+    return disordered > 0.0, line
 
 
 def profiles_of(scenario: Scenario) -> dict[str, ProfileChoice]:
@@ -102,12 +103,17 @@ class Limits(NamedTuple):
     @property
     def allowed(self) -> tuple[Any, Any]:
         """Lowest and highest accepted value: the limits with a margin for rounding in unit conversion."""
-        margin = TOLERANCE * np.maximum(1.0, np.maximum(np.abs(self.lowest), np.abs(self.highest)))
-        return self.lowest - margin, self.highest + margin
+        return widened(self.lowest, self.highest)
 
     def text(self, value: float) -> str:
         """Value in its display unit."""
         return shown_text(value, self.unit, atmosphere=self.room)
+
+
+def widened(lowest: Any, highest: Any) -> tuple[Any, Any]:
+    """Return limits with a margin for rounding in unit conversion; elementwise for columns."""
+    margin = TOLERANCE * larger(1.0, larger(abs(lowest), abs(highest)))
+    return lowest - margin, highest + margin
 
 
 def stops_of(device: Device) -> Limits:
@@ -134,25 +140,44 @@ def profile_problem(
     limits: Limits, profile: ProfileChoice, duration: float, step: float, section: str = "motion.profile"
 ) -> str:
     """Return a sentence on the time at which a section's profile leaves its limits; "" if it stays within."""
-    kind, parameters = PROFILES[profile.kind], profile_parameters(profile)
-    # The times that the engine asks for, as far as they can be gone through one by one.
-    lowest, highest = limits.allowed
-    count = max(1, min(MAXIMUM_CHECKED_TIMES, round(duration / step)))
-    for number in range(count + 1):
+    course = Course(PROFILES[profile.kind].value)
+    moment, reached = excursion(profile_parameters(profile), *limits.allowed, duration, step, parts=course)
+    if moment < 0.0:
+        return ""
+    return (
+        f"[{section}] leaves {limits.words}, {limits.text(limits.lowest)} to {limits.text(limits.highest)}: "
+        f"{limits.text(reached)} at {moment:.6g} s"
+    )
+
+
+class Course(NamedTuple):
+    """Function that returns value, rate and second derivative of a profile at a time [s]."""
+
+    value: Callable[[Any, float], tuple[float, float, float]]
+
+
+def excursion(
+    profile: Any, lowest: float, highest: float, duration: float, step: float, *, parts: Course
+) -> tuple[float, float]:
+    """Return the first time [s] at which a profile leaves a range, and its value there; time -1 if it stays inside.
+
+    The times are those of the engine as far as they can be gone through one by one, and crests between two of them.
+    """
+    count = max(1.0, min(MAXIMUM_CHECKED_TIMES, float(int(duration / step + 0.5))))
+    number, moment, found = 0.0, -1.0, 0.0
+    while number <= count and moment < 0.0:
         time = duration * number / count
-        angle, rate, acceleration = kind.value(parameters, time)
-        places = [(time, angle)]
-        # Where a parabola through this time turns: a crest between two times must not escape the check.
-        away = -rate / acceleration if acceleration else 0.0
-        if 0.0 < away < min(duration / count, duration - time):
-            places.append((time + away, angle + 0.5 * rate * away))
-        for moment, reached in places:
-            if not lowest <= reached <= highest:
-                return (
-                    f"[{section}] leaves {limits.words}, {limits.text(limits.lowest)} to "
-                    f"{limits.text(limits.highest)}: {limits.text(reached)} at {moment:.6g} s"
-                )
-    return ""
+        value, rate, acceleration = parts.value(profile, time)
+        # Where a parabola through this time turns.
+        away = -rate / acceleration if acceleration != 0.0 else 0.0
+        turned = value + 0.5 * rate * away
+        is_crest = away > 0.0 and away < min(duration / count, duration - time)
+        is_outside = not (value >= lowest and value <= highest)
+        is_crest_outside = is_crest and not (turned >= lowest and turned <= highest)
+        moment = time if is_outside else (time + away if is_crest_outside else -1.0)
+        found = value if is_outside else turned
+        number = number + 1.0
+    return moment, found
 
 
 @in_units(lambda scenario: scenario.device.shown)

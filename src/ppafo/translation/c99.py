@@ -10,7 +10,7 @@ import inspect
 import itertools
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 
@@ -81,15 +81,13 @@ def c_source(
     module: Module,
     documents: Mapping[str, str],
     title: str,
-    places: Mapping[str, Sequence[str]] | None = None,
     prelude: str = "prelude.h",
     reading: ReadableUnit | None = None,
 ) -> str:
     """Return the C translation unit of a module; with ``reading``, in short human-readable form.
 
-    ``documents`` has the docstrings of rows and functions. ``places`` has names for the first indices of some arrays,
-    which the surrounding file defines; the key ``x`` applies to all functions, ``advance.x`` to one. ``prelude`` is the
-    name of the file that precedes all functions.
+    ``documents`` has the docstrings of rows and functions. ``prelude`` is the name of the file that precedes all
+    functions.
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
     functions = [function for function in module if function.returns is None or not is_empty(function.returns)]
@@ -100,9 +98,7 @@ def c_source(
             names[function.name] = (
                 f"{reading.names.get(function.source, function.source)}{function.name.removeprefix(function.source)}"
             )
-    writer = _Writer(
-        documents, {names.get(function.name, function.name) for function in functions}, places or {}, names, reading
-    )
+    writer = _Writer(documents, {names.get(function.name, function.name) for function in functions}, names, reading)
     before = files("ppafo.translation").joinpath(prelude).read_text(encoding="utf-8")
     bodies = [writer.function(function) for function in functions]
     # Now all structs have their names, which no local name may hide: what has one is written again.
@@ -152,7 +148,6 @@ class _Writer:
 
     documents: Mapping[str, str]
     outer: set[str]
-    places: Mapping[str, Sequence[str]]
     functions: Mapping[str, str]
     reading: ReadableUnit | None = None
     structs: list[Items | Row] = field(default_factory=list)
@@ -261,9 +256,7 @@ class _Body:
 
     def __init__(self, writer: _Writer, function: Function, scopes: Scopes) -> None:
         self.writer = writer
-        of_all, own = writer.places, f"{function.source}."
-        of_one = {key.removeprefix(own): names for key, names in of_all.items() if key.startswith(own)}
-        self.terms = CTerms(writer.type_name, self.name, {**of_all, **of_one}, writer.functions, writer.constructed.add)
+        self.terms = CTerms(writer.type_name, self.name, writer.functions, writer.constructed.add)
         self.scopes = scopes
         self.kinds: dict[str, Type] = dict(function.parameters) | scopes.types
         self.written: dict[str, str] = {}

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 from ppafo.engine.compilers import LIBRARY
@@ -94,14 +94,12 @@ def member_name(kind: Row, name: str) -> str:
 class CTerms:
     """Writer of typed terms as C expressions.
 
-    ``type_name`` returns the C name of a type, ``name`` the C name of a local variable. ``index_names`` has names for
-    the first indices of some arrays, ``functions`` replacement names of functions. ``note_constructed`` is called with
-    the type of each row that an expression constructs.
+    ``type_name`` returns the C name of a type, ``name`` the C name of a local variable. ``functions`` has replacement
+    names of functions. ``note_constructed`` is called with the type of each row that an expression constructs.
     """
 
     type_name: Callable[[Type], str]
     name: Callable[[str], str]
-    index_names: Mapping[str, Sequence[str]]
     functions: Mapping[str, str]
     note_constructed: Callable[[Type], None]
 
@@ -156,13 +154,13 @@ class CTerms:
         return text
 
     def element(self, term: Term) -> str:
-        """Return the C expression of an array element, whose first index may have a name."""
+        """Return the C expression of an array element."""
         owner, first, *further = term.parts
         assert isinstance(owner.type, Array)
-        name, names = self.name(owner.detail), self.index_names.get(owner.detail, ())
+        name = self.name(owner.detail)
         is_local = bool(owner.type.shape)
         least = 9 if further and not is_local else 0
-        index = names[first.detail] if names and first.kind == "number" else self.term(first, least)
+        index = self.term(first, least)
         if is_local:
             return f"{name}[{index}]{''.join(f'[{self.term(index)}]' for index in further)}"
         for number, coordinate in enumerate(further, 1):

@@ -67,8 +67,10 @@ _IS_BAD = {"below": operator.ge, "above": operator.le, "at most": operator.gt, "
 _OF_DEVICE = ("actuator.angle_max", "actuator.angle_min")
 """End stops of the device, which cannot be set by a key of a walk file."""
 _PHASES = np.linspace(0.0, 1.0, 200, endpoint=False)
-_BEYOND_STOP = math.radians(5.0)
+BEYOND_STOP = math.radians(5.0)
 """Angle [rad] by which a gait may exceed an end stop: the accuracy of the angle zero in most known recordings."""
+SHORTEST_FIRST, LONGEST_FIRST = 0.5, 2.0
+"""Limits of the expected time of the first stride, in strides of the gait."""
 
 
 class _Contradiction(NamedTuple):
@@ -172,21 +174,25 @@ def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:
         )
 
 
+def angles_of_gait(scenario: Scenario) -> tuple[float, float]:
+    """Return the lowest and highest ankle angle [rad] of the gait of a walk."""
+    angles = walk_of(scenario).gait.ankle_angle.values_at(_PHASES)
+    return float(np.min(angles)), float(np.max(angles))
+
+
 def _of_stops(scenario: Scenario) -> Iterator[_Contradiction]:
     """Yield the checks of the gait's ankle angles against the end stops of the device."""
-    gait, actuator = walk_of(scenario).gait, scenario.device.actuator
-    angles = gait.ankle_angle.values_at(_PHASES)
-    low, high = float(np.min(angles)), float(np.max(angles))
+    actuator, (low, high) = scenario.device.actuator, angles_of_gait(scenario)
     needed = f"the gait needs {math.degrees(low):.0f} to {math.degrees(high):.0f} deg"
     highest, lowest = _OF_DEVICE
     yield _Contradiction(
         highest,
-        actuator.angle_max < high - _BEYOND_STOP,
+        actuator.angle_max < high - BEYOND_STOP,
         lambda run: f"{needed}, but the upper stop is at {_text(actuator.angle_max, run, 'rad')}",
     )
     yield _Contradiction(
         lowest,
-        actuator.angle_min > low + _BEYOND_STOP,
+        actuator.angle_min > low + BEYOND_STOP,
         lambda run: f"{needed}, but the lower stop is at {_text(actuator.angle_min, run, 'rad')}",
     )
 
@@ -197,7 +203,7 @@ def _of_times(scenario: Scenario) -> Iterator[_Contradiction]:
     stride, first_stride = walk_of(scenario).gait.stride_time, settings["first_stride_time"]
     yield _Contradiction(
         "controller.first_stride_time",
-        np.logical_or(first_stride <= 0.5 * stride, first_stride >= 2.0 * stride),
+        np.logical_or(first_stride <= SHORTEST_FIRST * stride, first_stride >= LONGEST_FIRST * stride),
         lambda run: f"must be between half and twice the stride time of the gait, {_text(round(stride, 4), run, 's')}",
     )
 

@@ -8,7 +8,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.conditions import RULES_OF_TIMES, choosing
-from ppafo.exports.c_library.entries import follow_entry, prepare_entry
+from ppafo.exports.c_library.entries import check_entry, follow_entry, prepare_entry
 from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import library_files
@@ -68,6 +68,9 @@ def scenario_library(scenario: Scenario) -> Library:
             if effect.section == "sensors"
         ),
     ]
+    preparation = Preparation(
+        scenario, program.program, {setting.path: float(place) for place, setting in enumerate(settings, 1)}
+    )
     # Another program where samples lie between steps and did not, or the other way round.
     interval = "prepared->counts.interval"
     was_inside = "true" if program.program.samples_inside else "false"
@@ -80,8 +83,10 @@ def scenario_library(scenario: Scenario) -> Library:
         switches=_switches(scenario.device, of_sensors),
         other_program=((f"({interval} != (double)(int64_t){interval}) != {was_inside}", "run_output_interval"),),
         words=words_of(scenario, links),
-        further=partial(prepare_entry, Preparation(scenario, program.program), VANE_PREPARATION, settings),
+        further=partial(prepare_entry, preparation, VANE_PREPARATION, settings),
         following=partial(follow_entry, settings, links, absent) if links else None,
+        checking=partial(check_entry, preparation, settings) if preparation.has_rules else None,
+        defaults=frozenset(setting.name for setting in settings if setting.path in links and setting.quantity.follows),
         links=links,
         rules=RULES_OF_TIMES,
     )
@@ -94,6 +99,7 @@ def walk_library(configuration: Scenario) -> Library:
         check_can_be_exported,
         links_of_walk,
         relations_of_walk,
+        rules_of_walk,
         settings_of_walk,
     )
     from ppafo.walking.planning import plan_walk
@@ -117,6 +123,7 @@ def walk_library(configuration: Scenario) -> Library:
         following=partial(follow_entry, settings, links, absent) if links else None,
         links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
+        rules=rules_of_walk(configuration),
     )
 
 

@@ -25,16 +25,6 @@ def conditions_of_program(library: Library) -> list[tuple[str, str]]:
     return [*conditions, *library.other_program]
 
 
-def conditions_of(library: Library) -> list[tuple[str, str]]:
-    """C conditions on single settings, each with the name of the setting to report on failure; NaN fails."""
-    ranges = []
-    for setting in library.settings:
-        value, sign = f"settings->{setting.name}", ">=" if setting.quantity.minimum_allowed else ">"
-        low, high = limits_in_c(setting.quantity)
-        ranges.append((f"{value} {sign} {low!r} && {value} <= {high!r}", setting.name))
-    return [*ranges, *relations_of_library(library)]
-
-
 RULES_OF_TIMES: tuple[Rule, ...] = (
     ("run_output_interval", "is_whole({} / {})", ("run_duration", "run_output_interval")),
     ("run_duration", "{} / {} <= 1.0e8", ("run_duration", "run_step")),

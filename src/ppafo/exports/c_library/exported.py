@@ -1,13 +1,10 @@
 """Exported part of a program: time-stepping loops, metrics and outputs, with their C names."""
 
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths
 from ppafo.engine.source_text import SourceCollector
-from ppafo.exports.c_library.boundary import Boundary
 from ppafo.metrics import METRICS, has_channels, missing_channels
 from ppafo.metrics.metric import MetricKind
 from ppafo.model.controlled import CONTROLLED
@@ -18,13 +15,11 @@ COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_dela
 
 The last number is 1 for error control of the parts of a step, else 0.
 """
-Further = Callable[[SourceCollector, Boundary], str]
+Further = Callable[[SourceCollector], str]
 """Function that returns the source of a further composed function, after collecting the functions it calls."""
 
 WHOLE, IN_PARTS = "advance", "advance_in_parts"
 """C names of the time-stepping loops: with whole steps (or the only loop), and with steps in parts."""
-TOGETHER = "_together"
-"""Suffix to the name of a time-stepping loop for several runs at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +57,3 @@ def exported(program: Program) -> ExportedProgram:
     meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
     outputs = tuple(name for name in program.traces if name not in missing)
     return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
-
-
-def places_of(groups: Mapping[str, type]) -> dict[str, str]:
-    """Return the C constant for the array index of each number in some groups, by path such as ``state.angle``."""
-    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    return {path: f"AT_{re.sub(r'[^A-Za-z0-9]+', '_', path).strip('_').upper()}" for path in paths}

@@ -10,6 +10,7 @@ from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.conditions import conditions_of_program, limits_in_c, relations_of_library
 from ppafo.exports.c_library.library import Library
+from ppafo.exports.c_library.program import c_text_of_run
 from ppafo.signals import CHANNELS
 from ppafo.version import __version__
 
@@ -28,6 +29,14 @@ SAME_METRIC = 1.0e-12
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
 _FILES = {"Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt", "check.c": "check.c"}
 """Templates of the files in every library, with their names in the library."""
+_CHECKED = """\
+    {
+        run_fault fault;
+        check_profiles(settings, &fault);
+        if (fault.place > 0.0) {
+            return SETTING[(int)fault.place - 1].name;
+        }
+    }"""
 _IS_WHOLE = """
 /* True for a whole number, within rounding. */
 static bool is_whole(double count)
@@ -39,8 +48,6 @@ static bool is_whole(double count)
 
 def library_files(library: Library) -> dict[str, bytes]:
     """All files of a library by name."""
-    from ppafo.exports.c_library.program import c_text_of_run  # a page needs to know of what, not the text
-
     name, program = library.name, library.program
     words = _words(library, name)
     api = library.api
@@ -49,7 +56,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     texts["LICENSE"] = template(_FOLDER, "LICENSE")
     head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
     title = f"{library.title}: functions of a run in ppafo {__version__}. Generated: do not edit."
-    further = [add for add in (library.further, library.following) if add is not None]
+    further = [add for add in (library.further, library.following, library.checking) if add is not None]
     settings = [setting.name for setting in library.settings]
     # The interface is written around the functions, whose names must not hide its own.
     interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", api.source))
@@ -112,6 +119,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "table": "\n".join(table),
         "relations": _returning((f"!({condition})", setting) for condition, setting in relations),
         "is_whole": _IS_WHOLE if any("is_whole(" in condition for condition, _ in relations) else "",
+        "profiles": "" if library.checking is None else _CHECKED,
         "needs_other": _returning(conditions_of_program(library)),
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),

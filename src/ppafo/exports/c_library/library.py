@@ -86,9 +86,10 @@ class Library:
     ``further`` adds the function that computes the numbers of a run from the settings. ``switches`` are settings that
     select the program. ``other_program`` has further C conditions under which another program would be needed, each
     with the setting to report. ``rules`` are conditions between times, as in a file. ``following`` adds the function by
-    which settings follow others; None if none does. ``defaults`` names the settings whose default follows others; these
-    have no range. ``links`` maps followers to their sources. ``words`` are template variables of the README. ``api`` is
-    the interface of the library. ``joint`` and ``actuator`` are the names of the joint and of the kind of actuator.
+    which settings follow others, ``checking`` that which checks the profiles; None if there is nothing to do.
+    ``defaults`` names the settings whose default follows others; these have no range. ``links`` maps followers to their
+    sources. ``words`` are template variables of the README. ``api`` is the interface of the library. ``joint`` and
+    ``actuator`` are the names of the joint and of the kind of actuator.
     """
 
     title: str
@@ -101,6 +102,7 @@ class Library:
     words: Mapping[str, str]
     further: Further | None = None
     following: Further | None = None
+    checking: Further | None = None
     defaults: frozenset[str] = frozenset()
     links: Graph = field(default_factory=dict)
     api: LibraryApi = LOOP

@@ -112,7 +112,7 @@ def plant_of(scenario: Scenario) -> _PlantAlone:
     beginnings = (*_REPLACED, _PATH) if is_turned else _REPLACED
     replaced = {setting.path for setting in library.settings if setting.path.startswith(beginnings)}
     return _PlantAlone(
-        library=replace(library, program=ExportedProgram(program, ()), rules=()),
+        library=replace(library, program=ExportedProgram(program, ()), rules=(), checking=None),
         drive=drive,
         hidden=frozenset(replaced.union(_WITHOUT_EFFECT)),
         step=plant.controller.period,

@@ -100,7 +100,7 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 
 def put_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
-    """Add a foot on a prescribed shank to the plant; for a gait, only start time and toe lever can be set."""
+    """Add a foot on a prescribed shank to the plant."""
     if parts.leg is not None:
         lane.load = foot_load(
             lane.plant.inertia,
@@ -108,6 +108,11 @@ def put_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
             *(getattr(settings, name) for name in parts.setting_names("motion", FOOT_SETTINGS)),
         )
         lane.plant = with_load(lane.plant, lane.load)
+
+
+def set_shank(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
+    """Set the motion of the shank that carries a foot; of a gait, only start time and toe lever can be set."""
+    if parts.leg is not None:
         if parts.leg.curves is None:
             shank = parts.program.shank
             assert shank is not None, "a leg has a shank"
@@ -282,7 +287,7 @@ def counted(parts: Preparation, lane: PreparedLane, settings: Any) -> tuple[floa
 
 
 VANE_PREPARATION = (
-    *(set_plant, put_leg_on, count_steps, set_timing, choose_parts),
+    *(set_plant, put_leg_on, set_shank, count_steps, set_timing, choose_parts),
     *(set_laws, set_gas, fill_chambers, start, counted),
 )
 """Functions that prepare the run of a scenario, in order of calling; the last one returns the step counts."""

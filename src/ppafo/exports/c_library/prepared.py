@@ -4,8 +4,8 @@
 """
 
 from collections import namedtuple
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.engine.program import Program
@@ -13,6 +13,7 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.step.lane import Lane
 from ppafo.exports.c_library.library import c_identifier
 from ppafo.model.catalog import VALVES
+from ppafo.model.controlled import CONTROLLED, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
 from ppafo.model.gait import ShankSeries
@@ -21,6 +22,7 @@ from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES
 from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.plan import StepCounts
+from ppafo.simulation.profiles import Course
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 
 VANE_ONLY_FIELDS = ("torque_constant", "displacement_per_radian")
@@ -36,16 +38,21 @@ class PreparedLane(Lane):
     step: float  # length of a step [s]
     signal_steps: float  # whole steps in the delay of the sensors [-]
     command_steps: float  # whole steps in the dead time of the valve [-]
+    fault: float  # place of the setting that breaks a rule on profiles, counted from 1; 0 for none [-]
     gas: Any
     device: Any
 
 
 @dataclass(frozen=True, slots=True)
 class Preparation:
-    """Scenario and program of a library: all data that does not depend on the settings."""
+    """Scenario and program of a library: all data that does not depend on the settings.
+
+    ``places`` has the place of each setting in the library, counted from 1, by path.
+    """
 
     scenario: Scenario
     program: Program
+    places: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def device(self) -> Device:
@@ -82,6 +89,36 @@ class Preparation:
     def locked_angle_setting(self) -> str:
         """Name of the setting for the angle of a locked joint."""
         return c_identifier(path_of_locked_angle(self.scenario) or LOCKED_ANGLE)
+
+    @property
+    def reach(self) -> Callable[[Ends], tuple[float, float]] | None:
+        """Function that returns the range of the reference; None for a reference that nothing limits."""
+        return CONTROLLED[self.scenario.controlled].reach if self.scenario.follows_reference else None
+
+    @property
+    def moves_on_path(self) -> bool:
+        """True for a joint that a profile moves."""
+        return self.program.angle is not None and path_of_locked_angle(self.scenario) is None
+
+    @property
+    def has_rules(self) -> bool:
+        """True if there are rules on the profiles: of knots, or of what they may reach."""
+        return self.reach is not None or self.moves_on_path or any(path.endswith("time_02") for path in self.places)
+
+    @property
+    def course_of_reference(self) -> Course:
+        """Reference over time."""
+        return Course(self.program.reference.value)
+
+    @property
+    def course_of_angle(self) -> Course:
+        """Prescribed angle over time."""
+        assert self.program.angle is not None, "a joint on a path"
+        return Course(self.program.angle.value)
+
+    def place_of(self, path: str) -> float:
+        """Return the place of a setting in the library, counted from 1."""
+        return self.places[path]
 
     @property
     def line_fields(self) -> list[str]:

@@ -7,19 +7,18 @@ name becomes a field, every number is a scalar, and a function over runs is call
 import ast
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import Any
 
-from ppafo.engine.entries import HEADER, INLINE, indent, without_origins
+from ppafo.engine.entries import HEADER, INLINE, indent
 from ppafo.engine.generator import StepText
-from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
 from ppafo.engine.linking import link_program
-from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, lane_loop, run_loop
+from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, run_loop
 from ppafo.engine.source_text import Replacements, SourceCollector, composed_lines
-from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
-from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, Further, places_of
+from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further
+from ppafo.exports.c_library.structs import struct_of, struct_of_numbers, taken
 from ppafo.metrics.metric import ReadAt, Readings
 from ppafo.model.columns import over_runs
 from ppafo.model.one_run import FOR_ONE_RUN
@@ -69,7 +68,6 @@ LOOP_TYPES: tuple[Type, ...] = (
     *(FLOAT if kind == "float64" else INT for kind in LOOP_NUMBERS.values()),
 )
 """Types of the arguments of a run's loop, except states and parameters."""
-_STEPS = {WHOLE: "AT_STEP", IN_PARTS: "AT_PARTED"}
 _ENDINGS = {WHOLE: "", IN_PARTS: "_in_parts"}
 
 
@@ -92,10 +90,10 @@ def c_text_of_run(
     from ppafo.translation.walk import walk_module
 
     collector = _collector()
-    program, structs = exported.program, Structs()
+    program = exported.program
     link_program(program, collector.replacements)
-    entries = [metrics_entry(exported, collector, structs)] if exported.metrics else []
-    entries += [add(collector, structs) for add in further]
+    entries = [metrics_entry(exported, collector)] if exported.metrics else []
+    entries += [add(collector) for add in further]
     steps = _steps_of(exported, collector)
     loop = run_loop(steps[WHOLE], f"{name}_outputs", steps.get(IN_PARTS))
     composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
@@ -110,6 +108,8 @@ def c_text_of_run(
         "metrics": (states, INT, metrics_row),
         "prepare": (settings_row, parameters, states, struct_of_numbers("run_counts", COUNTS)),
         "follow": (settings_row, settings_row),
+        "reach": (parameters, FLOAT, struct_of_numbers("run_reach", ["low", "high"])),
+        "check_profiles": (settings_row, struct_of_numbers("run_fault", ["place"])),
     }
     documents = {name: worded(text) for name, text in (documents_of(collector) | _DOCUMENTS).items()}
     # A short name is taken only where it is unambiguous and C leaves it free; all others keep their module's path.
@@ -139,6 +139,10 @@ _DOCUMENTS = {
     "run_samples": "The last two samples.",
     "metrics": "Metrics of a run, from its final state.",
     "prepare": "Parameters of a run from settings in SI units.",
+    "run_fault": "Place of a setting, counted from 1; 0 for none.",
+    "run_reach": "Range of a quantity.",
+    "reach": "Lowest and highest torque of the actuator at an angle.",
+    "check_profiles": "Setting that breaks a rule on profiles.",
     "follow": "Update settings at their default that depend on other settings.",
 }
 
@@ -159,90 +163,10 @@ def _names_around() -> frozenset[str]:
         if any("@name@" in text for text in of_folder)
         for text in of_folder
     )
-    return frozenset(("advance", "metrics", "prepare", "follow")).union(*found)
+    return frozenset(("advance", "metrics", "prepare", "follow", "check_profiles", "reach")).union(*found)
 
 
 _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)
-
-
-class ComposedLibrary(NamedTuple):
-    """Composed functions of an exported program, before their translation to C."""
-
-    text: str
-    documents: Mapping[str, str]
-    """Docstrings by the names of functions and classes in the text."""
-
-
-def composed_library(exported: ExportedProgram, further: Further | None, together: int) -> ComposedLibrary:
-    """Compose all functions of an exported program; ``further`` may add one that takes settings.
-
-    Each time-stepping loop is written twice: for one run, and for ``together`` runs with the suffix ``TOGETHER``.
-    """
-    from ppafo.translation.c99 import documents_of
-
-    collector = _collector()
-    link_program(exported.program, collector.replacements)
-    arrays = Arrays()
-    entries = [metrics_entry(exported, collector, arrays), *([] if further is None else [further(collector, arrays)])]
-    steps = _steps_of(exported, collector)
-    loops = [lane_loop(step, COMPILED, name, ARGUMENTS, lanes=1) for name, step in steps.items()]
-    loops += [lane_loop(step, COMPILED, name + TOGETHER, ARGUMENTS, together) for name, step in steps.items()]
-    text = "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
-    return ComposedLibrary(text, documents_of(collector) | {"Readings": Readings.__doc__ or ""})
-
-
-def c_text(exported: ExportedProgram, composed: ComposedLibrary, title: str, settings: Sequence[str]) -> str:
-    """Return the functions of an exported program in C, after the constants for the array indices of its numbers."""
-    from ppafo.translation.c99 import c_source
-    from ppafo.translation.walk import walk_module
-
-    state = list(places_of(exported.program.state_rows()).values())
-    parameter = list(places_of(exported.program.parameter_rows()).values())
-    alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
-    # Values passed from step to step, and, of a loop whose lanes wait for others, values saved meanwhile.
-    steps = {}
-    for loop, program in exported.loops.items():
-        passed = {path: name.removeprefix("AT_") for path, name in places_of(program.step_rows()).items()}
-        saved = [name.removeprefix("AT_") for name in places_of(program.state_rows()).values()]
-        saved += ["REMAINING", *(name for path, name in passed.items() if path.startswith(HANDED))]
-        aside = [f"ASIDE_{name}" for name in saved] if program.parts_are_rare else []
-        steps[loop] = [f"{_STEPS[loop]}_{name}" for name in (*passed.values(), *aside)]
-    places = {
-        **{
-            f"{name}{ending}.x": [*state, *parameter, *stepping]
-            for name, stepping in steps.items()
-            for ending in ("", TOGETHER)
-        },
-        "states": state,
-        "parameters": alone,
-        "counts": [f"COUNT_{name.upper()}" for name in COUNTS],
-        "settings": [f"SETTING_{name.upper()}" for name in settings],
-        "followed": [f"SETTING_{name.upper()}" for name in settings],
-        "found": [f"METRIC_{kind.name.upper()}" for kind in exported.metrics],
-    }
-    counted = [
-        _enumeration("Indices of all numbers of a run: states, then parameters.", [*state, *parameter]),
-        *(
-            _enumeration(
-                f"Indices of the values that a step of {name} passes to the next.",
-                stepping,
-                len(state) + len(parameter),
-            )
-            for name, stepping in steps.items()
-        ),
-        _enumeration("Indices of the parameters.", alone),
-        _enumeration("Indices of the step counts.", places["counts"]),
-        _enumeration("Indices of the settings.", places["settings"]),
-        _enumeration("Indices of the metrics.", places["found"]),
-    ]
-    return "\n".join([*counted, c_source(walk_module(composed.text), composed.documents, title, places)])
-
-
-def outline_of(exported: ExportedProgram, composed: ComposedLibrary, settings: Sequence[str]) -> str:
-    """Return the complete input of ``c_text`` except title and source positions: equal outlines give equal code."""
-    places = [places_of(exported.program.state_rows()), places_of(exported.program.parameter_rows())]
-    names = [*places, [kind.name for kind in exported.metrics], list(settings)]
-    return f"{names!r}\n{without_origins(composed.text)}"
 
 
 def _steps_of(exported: ExportedProgram, collector: SourceCollector) -> dict[str, StepText]:
@@ -250,35 +174,24 @@ def _steps_of(exported: ExportedProgram, collector: SourceCollector) -> dict[str
     return {name: StepText(program, collector, _ENDINGS[name]) for name, program in exported.loops.items()}
 
 
-def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
-    begin = f" = {first}" if first else ""
-    lines = ",\n".join([f"    {names[0]}{begin}", *(f"    {name}" for name in names[1:])])
-    return f"/* {said} */\nenum {{\n{lines}\n}};\n"
-
-
-def metrics_entry(exported: ExportedProgram, collector: SourceCollector, boundary: Boundary) -> str:
+def metrics_entry(exported: ExportedProgram, collector: SourceCollector) -> str:
     """Return the source of the entry ``metrics``: metrics of a run from its final states."""
-    program, groups, add = exported.program, exported.program.state_rows(), collector.add
+    program, groups = exported.program, exported.program.state_rows()
     names = [kind.name for kind in program.meters]
     meters = ", ".join(
-        f"{name}={boundary.taken('states', group, groups, add)}"
-        for name, group in zip(names, program.meter_groups, strict=True)
+        f"{name}={taken('states', group, groups)}" for name, group in zip(names, program.meter_groups, strict=True)
     )
-    course = boundary.taken("states", "course", groups, add)
+    course = taken("states", "course", groups)
     lines = [f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples)"]
-    for index, metric in enumerate(exported.metrics):
+    for metric in exported.metrics:
         if isinstance(metric.read, ReadAt):
             value = ", ".join(f"readings.{path}" for path in metric.read.places)
-            value = value if metric.read.function is None else f"{add(metric.read.function)}({value})"
+            value = value if metric.read.function is None else f"{collector.add(metric.read.function)}({value})"
         else:
-            value = f"{add(metric.read)}(readings)"
-        lines.append(f"{boundary.cell('found', index, metric.name)} = {value}")
-    numbers = "float64[::1]"
-    parameters_of_metrics = {"states": numbers, "samples": "int64", "found": numbers}
+            value = f"{collector.add(metric.read)}(readings)"
+        lines.append(f"found.{metric.name} = {value}")
     rows = [
         f"Meters = namedtuple('Meters', {names!r})",
         "Readings = namedtuple('Readings', ['meters', 'course', 'samples'])",
     ]
-    return "\n".join(
-        [*rows, boundary.head("metrics", parameters_of_metrics), *indent(composed_lines(lines, collector.needs))]
-    )
+    return "\n".join([*rows, "def metrics(states, samples, found):", *indent(composed_lines(lines, collector.needs))])

@@ -23,9 +23,7 @@ _FOLLOWS = """\
 - As in ppafo, these settings depend on others while they equal their default, even if it is given: {followers}."""
 _TRAPS_OF_WALK = """\
 - `sensors_angle_bandwidth` and `sensors_pressure_bandwidth` 0 are sensors without lag.
-- `run_duration` is what `ppafo walk` calls `--minutes`, here in seconds and up to 10^6.
-- `..._bad_setting` checks ranges and conflicts between two settings. A walk file is also refused if a setting
-  conflicts with the gait or with several others at once."""
+- `run_duration` is what `ppafo walk` calls `--minutes`, here in seconds and up to 10^6."""
 
 
 def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:

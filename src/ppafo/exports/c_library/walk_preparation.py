@@ -8,7 +8,7 @@ from typing import Any
 
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
-from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
+from ppafo.exports.c_library.library import ExportParameter, Relation, Rule, c_identifier
 from ppafo.exports.c_library.preparation import counted, set_gas, set_plant, set_timing, start
 from ppafo.exports.c_library.prepared import Preparation, PreparedLane, names_of
 from ppafo.exports.c_library.settings import declared_settings, export_parameters, numbers_of_second_chamber
@@ -21,7 +21,7 @@ from ppafo.simulation.declaration import RUN, SUPPLY_LINE, SUPPLY_LINES
 from ppafo.simulation.numbers import device_numbers
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.contradictions import PAIRS
+from ppafo.walking.contradictions import BEYOND_STOP, LONGEST_FIRST, PAIRS, SHORTEST_FIRST, angles_of_gait
 from ppafo.walking.declaration import STEP
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import record_interval, walk_of
@@ -47,7 +47,7 @@ _RELATIONS = (
     ("controller.swing_angle", "above", "actuator.angle_min"),
     ("controller.swing_angle", "below", "actuator.angle_max"),
 )
-"""Relations between two numbers of a walk file; relations with a third number or the gait are left to the caller."""
+"""Relations between two numbers of a walk file."""
 
 
 def check_can_be_exported(configuration: Scenario) -> None:
@@ -109,6 +109,21 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
         for path, relation, other in rules
         if path in known and other in known
     )
+
+
+def rules_of_walk(configuration: Scenario) -> tuple[Rule, ...]:
+    """Return the rules of a walk file with the gait, and of three numbers (``walking/contradictions.py``)."""
+    stride, (low, high) = walk_of(configuration).gait.stride_time, angles_of_gait(configuration)
+    first, peak = "controller_first_stride_time", "controller_peak_time"
+    rules: tuple[Rule, ...] = (
+        ("actuator_angle_max", f"{{}} >= {high - BEYOND_STOP!r}", ("actuator_angle_max",)),
+        ("actuator_angle_min", f"{{}} <= {low + BEYOND_STOP!r}", ("actuator_angle_min",)),
+        (first, f"{{}} > {SHORTEST_FIRST * stride!r}", (first,)),
+        (first, f"{{}} < {LONGEST_FIRST * stride!r}", (first,)),
+        (peak, "{} + {} <= 1.0", (peak, "controller_fall_time")),
+    )
+    known = {setting.name for setting in settings_of_walk(configuration)}
+    return tuple(rule for rule in rules if known.issuperset(rule[2]))
 
 
 def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:

@@ -9,10 +9,15 @@ extern unsigned char __heap_base;
 static @name@_settings chosen_of_page;
 static @name@_settings used_of_page;
 static @name@_metrics found_of_page;
-static @name@_outputs *rows_of_page;
-static int32_t taken_of_page;
+/* Number of samples, and addresses of samples and metrics. */
+static int32_t run_of_page[3];
 
-/* The settings as written, to be changed in place. */
+static @name@_run *memory_of_run(void)
+{
+    return (@name@_run *)(((size_t)&__heap_base + 15) & ~(size_t)15);
+}
+
+/* The settings of the next run, as written, to be changed in place. */
 @name@_settings *SHOWN(defaults)(void)
 {
     @name@_defaults(&chosen_of_page);
@@ -32,6 +37,15 @@ const char *SHOWN(bad)(void)
     return @name@_bad_setting(&chosen_of_page);
 }
 
+/* Why: 1 it is out of range, 2 it contradicts another setting, 3 it belongs to another program; 0 where a run begins. */
+int32_t SHOWN(cause)(void)
+{
+    if (out_of_range(&chosen_of_page, page_used()) != NULL) {
+        return 1;
+    }
+    return wrong_setting(&chosen_of_page) != NULL ? 2 : @name@_bad_setting(&chosen_of_page) != NULL ? 3 : 0;
+}
+
 /* Make sure that the memory reaches up to an address; false where there is no more. */
 static bool page_reaches(size_t end)
 {
@@ -43,35 +57,37 @@ static bool page_reaches(size_t end)
 @name@_status SHOWN(run)(void)
 {
     const size_t bytes = @name@_size(&chosen_of_page);
-    @name@_run *run = (@name@_run *)(((size_t)&__heap_base + 15) & ~(size_t)15);
+    @name@_run *run = memory_of_run();
+    @name@_outputs *rows = (@name@_outputs *)((size_t)run + ((bytes + 15) & ~(size_t)15));
     @name@_status status = @NAME@_BAD_SETTING;
-    rows_of_page = (@name@_outputs *)((size_t)run + ((bytes + 15) & ~(size_t)15));
-    taken_of_page = 0;
-    if (bytes == 0 || !page_reaches((size_t)rows_of_page)) {
-        return status;
-    }
-    status = @name@_initialise(run, &chosen_of_page);
-    while (status == @NAME@_GOING_ON && page_reaches((size_t)(rows_of_page + taken_of_page + 1))) {
-        status = @name@_step(run);
-        if (status == @NAME@_GOING_ON) {
-            @name@_read_outputs(run, &rows_of_page[taken_of_page++]);
+    int32_t taken = 0;
+    if (bytes != 0 && page_reaches((size_t)rows)) {
+        status = @name@_initialise(run, &chosen_of_page);
+        while (status == @NAME@_GOING_ON && page_reaches((size_t)(rows + taken + 1))) {
+            status = @name@_step(run);
+            if (status == @NAME@_GOING_ON) {
+                @name@_read_outputs(run, &rows[taken++]);
+            }
         }
+        @name@_read_metrics(run, &found_of_page);
     }
-    @name@_read_metrics(run, &found_of_page);
+    run_of_page[0] = taken;
+    run_of_page[1] = (int32_t)rows;
+    run_of_page[2] = (int32_t)&found_of_page;
     return status;
 }
 
-int32_t SHOWN(taken)(void)
+const int32_t *SHOWN(found)(void)
 {
-    return taken_of_page;
+    return run_of_page;
 }
+#if @REACH@
 
-const @name@_outputs *SHOWN(rows)(void)
+/* The torque nearest to a required one that the actuator of the run reaches at an angle. */
+double SHOWN(reached)(double angle, double torque)
 {
-    return rows_of_page;
+    run_reach ends;
+    reach(&memory_of_run()->parameters, angle, &ends);
+    return torque < ends.low ? ends.low : torque > ends.high ? ends.high : torque;
 }
-
-const @name@_metrics *SHOWN(metrics)(void)
-{
-    return &found_of_page;
-}
+#endif

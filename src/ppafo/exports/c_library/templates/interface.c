@@ -112,11 +112,9 @@ void @name@_defaults(@name@_settings *settings)
     }
 }
 
-/* The first setting that is out of range or contradicts another, NULL where there is none. */
-static const char *wrong_setting(const @name@_settings *chosen)
+/* The first setting that is out of range, NULL where there is none. */
+static const char *out_of_range(const @name@_settings *chosen, const @name@_settings *settings)
 {
-    const @name@_settings all = with_followers(chosen);
-    const @name@_settings *settings = &all;
     int place;
     for (place = 0; place < SETTINGS; ++place) {
         const double value = ((const double *)(SETTING[place].as_chosen ? chosen : settings))[place];
@@ -125,7 +123,20 @@ static const char *wrong_setting(const @name@_settings *chosen)
             return SETTING[place].name;
         }
     }
+    return NULL;
+}
+
+/* The first setting that is out of range or contradicts another, NULL where there is none. */
+static const char *wrong_setting(const @name@_settings *chosen)
+{
+    const @name@_settings all = with_followers(chosen);
+    const @name@_settings *settings = &all;
+    const char *outside = out_of_range(chosen, settings);
+    if (outside != NULL) {
+        return outside;
+    }
 @relations@
+@profiles@
     return NULL;
 }
 

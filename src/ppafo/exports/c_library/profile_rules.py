@@ -1,0 +1,81 @@
+"""Rules on the profiles of a scenario, as files have them: knots in order, and no course beyond what can be reached.
+
+The functions take what those of ``preparation`` take. A fault is the place of the setting to name, counted from 1.
+"""
+
+from typing import Any
+
+from ppafo.control.profiles import TabulatedProfile, disordered_knot
+from ppafo.exports.c_library.preparation import count_steps, set_laws, set_shank
+from ppafo.exports.c_library.prepared import Preparation, PreparedLane
+from ppafo.model.controlled import Ends
+from ppafo.simulation.profiles import excursion, widened
+
+
+def fault_of_knots(profile: TabulatedProfile, second: float) -> float:
+    """Return the place of the time of a knot that is not in order, from that of the second knot; 0 for none."""
+    number = disordered_knot(profile)
+    # Each knot has a time and a value.
+    return second + 2.0 * (number - 2.0) if number > 0.0 else 0.0
+
+
+def first_fault(found: float, further: float) -> float:
+    """Return a fault, or a further one if there is none."""
+    return found if found > 0.0 else further
+
+
+def check_knots(parts: Preparation, lane: PreparedLane, settings: Any) -> None:  # noqa: ARG001
+    """Set the fault of the knots of reference, prescribed angle and shank."""
+    lane.fault = 0.0
+    if "reference.time_02" in parts.places:
+        lane.fault = first_fault(lane.fault, fault_of_knots(lane.reference, parts.place_of("reference.time_02")))
+    if "motion.profile.time_02" in parts.places:
+        lane.fault = first_fault(lane.fault, fault_of_knots(lane.path, parts.place_of("motion.profile.time_02")))
+    if "motion.shank.time_02" in parts.places:
+        lane.fault = first_fault(lane.fault, fault_of_knots(lane.shank, parts.place_of("motion.shank.time_02")))
+
+
+def check_courses(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
+    """Set the fault of a prescribed angle beyond the stops, or of a reference out of reach."""
+    if parts.moves_on_path:
+        lane["stops"] = widened(settings.actuator_angle_min, settings.actuator_angle_max)
+        lane["outside"] = excursion(
+            lane.path,
+            lane["stops"][0],
+            lane["stops"][1],
+            settings.run_duration,
+            lane.counts_of_steps.step,
+            parts=parts.course_of_angle,
+        )
+        lane.fault = first_fault(
+            lane.fault, parts.place_of("motion.profile.level") if lane["outside"][0] >= 0.0 else 0.0
+        )
+    if parts.reach is not None:
+        lane["reach"] = parts.reach(
+            parts.row("Ends", Ends._fields)(
+                settings.actuator_angle_min,
+                settings.actuator_angle_max,
+                settings.supply_pressure,
+                settings.supply_dorsiflexion_pressure,
+                settings.supply_atmospheric_pressure,
+            )
+        )
+        lane["limits"] = widened(lane["reach"][0], lane["reach"][1])
+        lane["beyond"] = excursion(
+            lane.reference,
+            lane["limits"][0],
+            lane["limits"][1],
+            settings.run_duration,
+            lane.counts_of_steps.step,
+            parts=parts.course_of_reference,
+        )
+        lane.fault = first_fault(lane.fault, parts.place_of("reference.level") if lane["beyond"][0] >= 0.0 else 0.0)
+
+
+def faults(parts: Preparation, lane: PreparedLane, settings: Any) -> float:  # noqa: ARG001
+    """Return the fault that was found."""
+    return lane.fault
+
+
+PROFILE_RULES = (set_shank, count_steps, set_laws, check_knots, check_courses, faults)
+"""Functions that check the profiles of a scenario, in order of calling; the last one returns the fault."""
