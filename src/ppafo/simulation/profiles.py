@@ -140,7 +140,7 @@ def profile_problem(
     limits: Limits, profile: ProfileChoice, duration: float, step: float, section: str = "motion.profile"
 ) -> str:
     """Return a sentence on the time at which a section's profile leaves its limits; "" if it stays within."""
-    course = Course(PROFILES[profile.kind].value)
+    course = ProfileCourse(PROFILES[profile.kind].value)
     moment, reached = excursion(profile_parameters(profile), *limits.allowed, duration, step, parts=course)
     if moment < 0.0:
         return ""
@@ -150,14 +150,14 @@ def profile_problem(
     )
 
 
-class Course(NamedTuple):
+class ProfileCourse(NamedTuple):
     """Function that returns value, rate and second derivative of a profile at a time [s]."""
 
     value: Callable[[Any, float], tuple[float, float, float]]
 
 
 def excursion(
-    profile: Any, lowest: float, highest: float, duration: float, step: float, *, parts: Course
+    profile: Any, lowest: float, highest: float, duration: float, step: float, *, parts: ProfileCourse
 ) -> tuple[float, float]:
     """Return the first time [s] at which a profile leaves a range, and its value there; time -1 if it stays inside.
 

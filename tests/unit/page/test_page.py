@@ -21,7 +21,7 @@ CHROMIUM = shutil.which("chromium") or ""
 TASKS = ("torque-task-solenoid", "torque-task-proportional")
 DRAWN = {
     **dict.fromkeys(list_scenarios(), ()),
-    **dict.fromkeys(list_walks(), ("run.duration=3 s",)),
+    **dict.fromkeys(list_walks(), ("run.duration=6 s",)),
 }
 """What random settings are drawn for, with what keeps a walk short."""
 

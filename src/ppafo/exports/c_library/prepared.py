@@ -22,7 +22,7 @@ from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES
 from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.plan import StepCounts
-from ppafo.simulation.profiles import Course
+from ppafo.simulation.profiles import ProfileCourse
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 
 VANE_ONLY_FIELDS = ("torque_constant", "displacement_per_radian")
@@ -106,15 +106,15 @@ class Preparation:
         return self.reach is not None or self.moves_on_path or any(path.endswith("time_02") for path in self.places)
 
     @property
-    def course_of_reference(self) -> Course:
+    def course_of_reference(self) -> ProfileCourse:
         """Reference over time."""
-        return Course(self.program.reference.value)
+        return ProfileCourse(self.program.reference.value)
 
     @property
-    def course_of_angle(self) -> Course:
+    def course_of_angle(self) -> ProfileCourse:
         """Prescribed angle over time."""
         assert self.program.angle is not None, "a joint on a path"
-        return Course(self.program.angle.value)
+        return ProfileCourse(self.program.angle.value)
 
     def place_of(self, path: str) -> float:
         """Return the place of a setting in the library, counted from 1."""

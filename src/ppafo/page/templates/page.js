@@ -330,7 +330,7 @@ function draw() {
     // Those that no run has, or that are 0 in all, say nothing.
     const found = simulation.metrics.filter(({name, zero}) => runs.some((run) => Math.abs(run.metrics[name]) > zero));
     byId("results").replaceChildren(results(found.slice(0, RESULTS), runs));
-    byId("more").replaceChildren(make("summary", {}, `${found.length - RESULTS} more results`), results(found.slice(RESULTS), runs));
+    byId("more").replaceChildren(make("summary", {}, `Results: ${found.length - RESULTS} more`), results(found.slice(RESULTS), runs));
     byId("more").hidden = found.length <= RESULTS;
 }
 
