@@ -57,14 +57,14 @@ class ConfigurationResult:
     @property
     def word(self) -> str:
         """End of the nominal run in words; not recommended if the run does not follow its reference."""
-        if self.tracking is None:
+        if self.tracking is None or not self.status.is_completed:
             return self.status.kind
         return "beyond reach" if self.follows else self.tracking.kind
 
     @property
     def follows(self) -> bool:
-        """True if the nominal run follows its reference, or misses it only as announced by its scenario."""
-        return self.tracking is None or not self.tracking.is_useless
+        """True if the nominal run completes and follows its reference, or misses it only as announced."""
+        return self.status.is_completed and (self.tracking is None or not self.tracking.is_useless)
 
     def value(self, metric: str) -> float:
         """Return a metric [SI] of the nominal run; nan if the run does not have the metric."""

@@ -149,6 +149,18 @@ def test_without_a_reference_there_is_gas_and_no_error() -> None:
     assert comparison.metrics == ("gas_supplied", "mechanical_work", "gas_per_work", *of_valve)
 
 
+def test_a_run_that_ends_early_uses_little_gas_and_is_not_the_best() -> None:
+    light = ["foot_plate.inertia=1e-12 kg m^2"]
+    whole, ends = (ppafo.load_scenario("step-response", ["motion.kind=free", *more]) for more in ([], light))
+    answer = compare({"whole": whole, "ends": ends})
+    (task,) = answer.found.tasks
+    assert [case.word for case in task.cases] == ["completed", "diverged"]
+    assert task.cases[1].value("gas_supplied") < task.cases[0].value("gas_supplied")
+    assert "ends" not in task.pareto_front
+    assert "best:" not in str(answer)
+    assert not answer.passed
+
+
 def test_the_error_of_what_is_controlled_ranks_and_outputs_of_a_study_are_shown(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(
         'schema_version = 1\nname = "s"\noutputs.metrics = ["gas_leaked", "final_pressure_1_error"]\n'
