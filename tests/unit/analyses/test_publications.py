@@ -64,7 +64,7 @@ def test_every_computation_is_used_by_a_shipped_claim() -> None:
 
 
 def test_the_torque_at_rest_is_the_measured_slope_times_the_pressure(tmp_path: Path) -> None:
-    _, (claim,) = studied(tmp_path, TEXT).studies[0]
+    (claim,) = studied(tmp_path, TEXT).studies[0].claims
     assert claim.value == pytest.approx(1.451e-5 * 90.0 * 6894.757, rel=1e-6)
     assert claim.verdict == "consistent"
 
@@ -91,7 +91,7 @@ def test_a_claim_is_judged_by_the_range_that_its_file_gives(
     text = TEXT
     for old, new in zip(change[::2], change[1::2], strict=True):
         text = text.replace(old, new)
-    assert studied(tmp_path, text).studies[0][1][0].verdict == verdict
+    assert studied(tmp_path, text).studies[0].claims[0].verdict == verdict
 
 
 def test_the_ankle_moment_that_the_torque_is_a_share_of_is_that_of_the_gait() -> None:

@@ -89,20 +89,20 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     reproduction = solved.reproduction
     rows: list[Sequence[Cell]] = [(SEED, *_row(claim)) for claim in solved.of_paper]
     details = [] if reproduction is None else [Section(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
-    for publication, claims in solved.studies:
+    for publication in solved.studies:
         stated_claims: list[Sequence[Cell]] = []
-        for claim in claims:
-            entry = claim.claim.entry
+        for claim in publication.claims:
+            entry = claim.entry
             # A number that only own arithmetic on published ones gives.
             published = claim.published or (f"{entry.own} (own sum)" if entry.own else None)
             rows.append((publication.name, entry.id, published, claim.ours, VERDICTS[claim.verdict]))
-            stated = f"{entry.statement} ({claim.claim.source})"
+            stated = f"{entry.statement} ({claim.source})"
             agrees = _agrees(entry.at_least, entry.at_most, entry.unit)
             stated_claims.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, claim.note or None))
         heading, sentences = f"{publication.name}: {publication.title}", (publication.citation,)
         columns = columns_of(_DETAILS_HEAD, stated_claims)
         details.append(Section(heading, columns, sentences, left=len(_DETAILS_HEAD), is_detail=True))
-    name = solved.studies[0][0].name
+    name = solved.studies[0].name
     return Finding(
         name="claims",
         kicker="Reproduction",
@@ -130,11 +130,10 @@ def _row(claim: Claim) -> tuple[str, str, str, str]:
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
     """Format the range of values that agrees with a claim as text."""
-    if low is not None and high is not None:
-        return f"{low:g} to {high:g} {unit}".rstrip()
-    if low is not None:
-        return f"at least {low:g} {unit}".rstrip()
-    return None if high is None else f"at most {high:g} {unit}".rstrip()
+    if low is None and high is None:
+        return None
+    text = f"at most {high:g}" if low is None else f"at least {low:g}" if high is None else f"{low:g} to {high:g}"
+    return f"{text} {unit}".rstrip()
 
 
 def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
@@ -220,9 +219,15 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
         "words": VERDICTS,
         "symbols": _SYMBOLS,
-        "not_published": [(entry.statement, entry.where) for entry in map(paper_entries().get, NOT_PUBLISHED) if entry],
+        "not_published": [(paper_entries()[name].statement, paper_entries()[name].where) for name in NOT_PUBLISHED],
         "not_read": NOT_READ,
-        **_set_values(reproduction),
+        **fields_of(reproduction, "printed_set", "completed_set"),
+        **{
+            name: [finding for finding in reproduction.printed_findings if finding.severity == severity]
+            for severity, name in (("error", "contradictions"), ("warning", "remarks"), ("note", "notes"))
+        },
+        "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
+        "assumed_groups": _assumed_groups(reproduction.assumed),
         **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
         "readings_of_u": reading_rows(readings),
         "result_on_u": result_on_u(readings) if readings else (),
@@ -249,25 +254,16 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
     return render_page(TEMPLATE, values, "ppafo.analyses.reproduce").encode()
 
 
-def _set_values(reproduction: Reproduction) -> dict[str, Any]:
-    """Return template values on both parameter sets: findings of the printed set, remaining findings of the other."""
-    severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
+def _assumed_groups(assumed: Sequence[AssumedValue]) -> list[tuple[str, list[AssumedValue]]]:
+    """Return the assumed values by the experiments that use them, under a heading; those of most experiments first."""
     groups: dict[tuple[str, ...], list[AssumedValue]] = {}
-    for value in reproduction.assumed:
+    for value in assumed:
         groups.setdefault(value.used_by, []).append(value)
-    headings = {
-        users: sentence(" and ".join(_EXPERIMENTS.get(name, name) for name in users)).rstrip(".") for users in groups
-    } | {tuple(_EXPERIMENTS): "All experiments", (SOLENOID, PROPORTIONAL): "Torque task, both valves"}
-    ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
-    return {
-        **fields_of(reproduction, "printed_set", "completed_set"),
-        **{
-            name: [finding for finding in reproduction.printed_findings if finding.severity == severity]
-            for severity, name in severities.items()
-        },
-        "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
-        "assumed_groups": [(headings[users], values) for users, values in ordered],
-    }
+    own = {EXPERIMENTS: "All experiments", (SOLENOID, PROPORTIONAL): "Torque task, both valves"}
+    return [
+        (own.get(users) or sentence(" and ".join(_EXPERIMENTS[name] for name in users)).rstrip("."), values)
+        for users, values in sorted(groups.items(), key=lambda group: -len(group[0]))
+    ]
 
 
 def _synthetic(evidence: SyntheticEvidence | str, figure: bytes | None) -> dict[str, Any]:

@@ -100,24 +100,22 @@ def stated_claim(
     verdict: Verdict,
     note: str,
     assumptions: tuple[str, ...] = (),
-    window: tuple[float, float] | None = None,
-    found: str = "",
+    **more: Any,
 ) -> Claim:
-    """Build the claim of an entry of the paper's file, with the computed value and the verdict."""
+    """Build the claim of an entry of the paper's file from the computed value, the verdict and further fields."""
     entry = paper_entries()[identifier]
     return Claim(
         id=identifier,
         statement=entry.statement,
-        paper=entry.published,
-        value=value,
-        unit=entry.unit or "-",
         verdict=verdict,
         source=entry.where,
         note=note,
+        paper=entry.published,
+        value=value,
+        unit=entry.unit or "-",
         assumptions=assumptions,
-        window=window,
         words=entry.words,
-        found=found,
+        **more,
     )
 
 

@@ -1,7 +1,6 @@
 """Figures 7 and 8 of the paper: simulated step response and torque task, with synthetic measurements."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from operator import methodcaller
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -51,29 +50,22 @@ _THIN: dict[str, Any] = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}
 _SMALL_WORDS: dict[str, Any] = {"fontsize": 7.5, "va": "center"}
 
 
-class _Curve(NamedTuple):
-    """Curve of figure 7 with its panel.
-
-    - ``title``: title of the panel, with the letter of the paper
-    - ``axis``: kind of the values
-    - ``colour``: colour of the model
-    - ``inset``: frame of the inset with the first milliseconds: x, y, width and height, as fractions of the panel
-    """
-
-    title: str
-    axis: Kind
-    colour: str
-    inset: tuple[float, float, float, float]
-
-
-_DIFFERENCE, _PRESSURE = Kind("Difference", "psi"), Kind("Pressure", "psig")
-_STEP_CURVES = (
-    _Curve("$\\bf{A}$   Vane angle", Kind("Angle", "deg"), ACTUAL.colour, inset=(0.66, 0.36, 0.31, 0.34)),
-    _Curve("$\\bf{B}$   Pressure difference, $P_1 - P_2$", _DIFFERENCE, ACTUAL.colour, inset=(0.69, 0.14, 0.29, 0.34)),
-    _Curve("$\\bf{C}$   Chamber 1 (plantarflexion), $P_1$", _PRESSURE, CHAMBER_1.colour, inset=(0.22, 0.12, 0.3, 0.34)),
-    _Curve("$\\bf{D}$   Chamber 2 (dorsiflexion), $P_2$", _PRESSURE, CHAMBER_2.colour, inset=(0.69, 0.3, 0.29, 0.4)),
+_PRESSURE = Kind("Pressure", "psig")
+_STEP_PANELS = (
+    ("$\\bf{A}$   Vane angle", Kind("Angle", "deg"), ACTUAL.colour, (0.66, 0.36, 0.31, 0.34)),
+    (
+        "$\\bf{B}$   Pressure difference, $P_1 - P_2$",
+        Kind("Difference", "psi"),
+        ACTUAL.colour,
+        (0.69, 0.14, 0.29, 0.34),
+    ),
+    ("$\\bf{C}$   Chamber 1 (plantarflexion), $P_1$", _PRESSURE, CHAMBER_1.colour, (0.22, 0.12, 0.3, 0.34)),
+    ("$\\bf{D}$   Chamber 2 (dorsiflexion), $P_2$", _PRESSURE, CHAMBER_2.colour, (0.69, 0.3, 0.29, 0.4)),
 )
-"""Curves of figure 7, in the order of its panels."""
+"""Panels of figure 7: title with the letter of the paper, kind, colour of the model, and frame of the inset.
+
+The inset with the first milliseconds has x, y, width and height as fractions of the panel.
+"""
 
 
 def step_response_figure(
@@ -90,32 +82,43 @@ def step_response_figure(
     limits = -_SHOWN_BEFORE_STEP * end, end
     event_times = () if events is None else (events.breakaway_time, events.stop_time)
     event_lines = [Mark("at", x=_MILLISECONDS * time, colour=GREY, style=_EVENT) for time in event_times]
-    models = _curves(recording, levels)
-    marks = [
-        [Mark("line", _MILLISECONDS * recording.time, model, label="model", colour=curve.colour, style={"zorder": 3})]
-        for curve, model in zip(_STEP_CURVES, models, strict=True)
+    # The first panel has the names of the events, at angles [deg] where nothing else is drawn at their time.
+    event_names = [
+        Mark("text", _MILLISECONDS * time + 0.01 * end, angle, label=name, colour=GREY, style=_SMALL_WORDS)
+        for time, angle, name in zip(event_times, (120.0, 25.0), ("breaks away", "at rest"), strict=False)
     ]
-    errors: list[Panel] = []
-    if synthetic is not None:
-        time = _MILLISECONDS * synthetic.time
-        for curve, model, readings, own in zip(_STEP_CURVES, models, _curves(synthetic, levels), marks, strict=True):
-            own.extend(_measured_marks(time, readings))
-            error = readings - np.interp(synthetic.time, recording.time, model)
-            errors.append(_error_panel(curve, time, error, event_lines, limits))
-    panel = partial(Panel, _AFTER_STEP, legend="", tall=2.3, shares_x=True)
-    signals = [
-        panel(curve.axis, [*own, *event_lines], curve.title, then=partial(_enlarge, curve.inset, limits))
-        for curve, own in zip(_STEP_CURVES, marks, strict=True)
-    ]
-    # The first panel has the names of the events, and the legend of all panels.
-    names = [] if events is None else _event_names(events, end)
-    signals[0] = replace(signals[0], marks=[*signals[0].marks, *names], legend="figure")
+    signals, errors = list[Panel](), list[Panel]()
+    readings = [None] * len(_STEP_PANELS) if synthetic is None else _curves(synthetic, levels)
+    for (title, axis, colour, inset), model, measured in zip(
+        _STEP_PANELS, _curves(recording, levels), readings, strict=True
+    ):
+        line = Mark("line", _MILLISECONDS * recording.time, model, label="model", colour=colour, style={"zorder": 3})
+        marks = [line]
+        if synthetic is not None and measured is not None:
+            time = _MILLISECONDS * synthetic.time
+            marks += _measured_marks(time, measured)
+            error = measured - np.interp(synthetic.time, recording.time, model)
+            beside = [
+                Mark("line", time, error, colour=EXPERIMENT.colour, style={"linewidth": 0.9}),
+                Mark("level", y=0.0, colour=colour, style={"linewidth": 1.0}),
+                *event_lines,
+            ]
+            # The difference of two gauge pressures is no gauge pressure.
+            kind = Kind("Error", "psi" if axis == _PRESSURE else axis.unit)
+            until = methodcaller("set_xlim", *limits)
+            errors.append(
+                Panel(_AFTER_STEP, kind, beside, "Measurement less model", then=until, tall=0.85, shares_x=True)
+            )
+        # The first panel has the legend of all panels.
+        marks += event_lines if signals else [*event_lines, *event_names]
+        legend, enlarged = "" if signals else "figure", partial(_enlarge, inset, limits)
+        signals.append(Panel(_AFTER_STEP, axis, marks, title, None, legend, enlarged, tall=2.3, shares_x=True))
     panels = [*signals[:2], *errors[:2], *signals[2:], *errors[2:]]
     return draw_panels(panels, 2, (3.15, 1.0), kind=(synthetic or recording).kind)
 
 
 def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
-    """Return the values (samples,) of the panels of figure 7, in the order and units of ``_STEP_CURVES``."""
+    """Return the values (samples,) of the panels of figure 7, in the order and units of ``_STEP_PANELS``."""
     first, second = recording["pressure_1"], recording["pressure_2"]
     gauge = ((pressure - levels.atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
     return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)
@@ -129,31 +132,6 @@ def _measured_marks(time: Floats, readings: Floats) -> list[Mark]:
     return [
         Mark("line", time, readings, (), "synthetic measurement", EXPERIMENT.colour, _THIN),
         Mark("band", time[starts] + 0.5 * _BIN, band, colour=EXPERIMENT.colour, style=pale),
-    ]
-
-
-def _error_panel(
-    curve: _Curve, time: Floats, error: Floats, event_lines: Sequence[Mark], limits: tuple[float, float]
-) -> Panel:
-    """Return the panel of the measurement less the model over time [ms], below the panel of the ``curve``."""
-    marks = [
-        Mark("line", time, error, colour=EXPERIMENT.colour, style={"linewidth": 0.9}),
-        Mark("level", y=0.0, colour=curve.colour, style={"linewidth": 1.0}),
-        *event_lines,
-    ]
-    # The difference of two gauge pressures is no gauge pressure.
-    kind = Kind("Error", "psi" if curve.axis == _PRESSURE else curve.axis.unit)
-    set_limits = methodcaller("set_xlim", *limits)
-    return Panel(_AFTER_STEP, kind, marks, "Measurement less model", then=set_limits, tall=0.85, shares_x=True)
-
-
-def _event_names(events: StepEvents, end: float) -> list[Mark]:
-    """Return the names of the events for the angle panel, whose time axis ends at ``end`` [ms]."""
-    # At these angles [deg] nothing else is drawn at the time of the event.
-    named = ((events.breakaway_time, 120.0, "breaks away"), (events.stop_time, 25.0, "at rest"))
-    return [
-        Mark("text", _MILLISECONDS * time + 0.01 * end, angle, label=name, colour=GREY, style=_SMALL_WORDS)
-        for time, angle, name in named
     ]
 
 
@@ -178,14 +156,7 @@ def _enlarge(frame: tuple[float, float, float, float], ends: tuple[float, float]
 
 
 class _TaskRun(NamedTuple):
-    """Torque task with one kind of valve.
-
-    - ``valve``: name of the valve
-    - ``style``: colour and line of the valve
-    - ``recording``: simulated run
-    - ``experiment``: recording of the same task on the simulated bench, None without one
-    - ``gas_in_paper``: gas that the paper states [g]
-    """
+    """Torque task with a valve: its name and style, simulated run, run on the bench if any, gas in the paper [g]."""
 
     valve: str
     style: DrawingStyle
@@ -209,8 +180,8 @@ def torque_task_figure(
     """
     experiments = synthetic or (None, None)
     runs = [
-        _TaskRun("solenoid", SOLENOID, solenoid, experiment=experiments[0], gas_in_paper=gas_in_paper[0]),
-        _TaskRun("proportional", PROPORTIONAL, proportional, experiment=experiments[1], gas_in_paper=gas_in_paper[1]),
+        _TaskRun("solenoid", SOLENOID, solenoid, experiments[0], gas_in_paper[0]),
+        _TaskRun("proportional", PROPORTIONAL, proportional, experiments[1], gas_in_paper[1]),
     ]
     torques = [_torque_marks(run, ceiling) for run in runs]
     opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)

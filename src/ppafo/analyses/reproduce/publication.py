@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -96,19 +96,53 @@ COMPUTATIONS: dict[str, _Computation] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _PublishedClaim:
-    """Claim of a publication with its computation, None if it cannot be tested; ``arguments`` in SI.
+SEED, ALL = PAPER, "all"
+"""Name of the study of the paper behind this package, and name for all studies together."""
 
-    The claim holds for values from ``low`` to ``high``, in its unit.
+
+@dataclass(frozen=True, slots=True)
+class PublishedClaim:
+    """Claim of a publication with its arguments in SI, and, once judged, our value in its unit and the verdict.
+
+    ``value`` is None if the claim cannot be computed.
     """
 
     entry: ClaimEntry
-    computation: _Computation | None
-    arguments: Mapping[str, float]
     source: str
-    low: float = -math.inf
-    high: float = math.inf
+    arguments: Mapping[str, float]
+    value: float | None = None
+    verdict: Verdict = "not_testable"
+
+    @property
+    def published(self) -> str:
+        """Published value as displayed text with its direction; empty for a computation of our own."""
+        entry = self.entry
+        number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
+        return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
+
+    @property
+    def ours(self) -> str:
+        """Our value as displayed text."""
+        return quantity(self.value, self.entry.unit or "-", 3)
+
+    @property
+    def note(self) -> str:
+        """Reason for the verdict, or reason why the claim cannot be tested."""
+        return self.entry.note or self.entry.not_testable
+
+    def document(self, study: str) -> dict[str, Any]:
+        """Return the claim as plain data for ``claims.json``."""
+        return {
+            "study": study,
+            **fields_of(self.entry, "id", "statement", "direction", "own", "unit", "computation"),
+            **fields_of(self, "published", "value", "verdict", "note"),
+            "paper": self.entry.published,
+            "agrees_from": self.entry.at_least,
+            "agrees_to": self.entry.at_most,
+            "arguments": dict(self.entry.arguments),
+            "assumptions": list(self.entry.assumed),
+            "source": self.source,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,120 +152,14 @@ class Publication:
     name: str
     title: str
     citation: str
-    claims: tuple[_PublishedClaim, ...]
-
-
-def load_publication(name_or_path: str | Path) -> Publication:
-    """Return a publication by its name in the package or by its file.
-
-    Raises ScenarioError for an invalid file.
-    """
-    document, file = read_publication(name_or_path)
-    claims = tuple(_checked(entry, document.citation, file) for entry in document.claims)
-    return Publication(document.name, document.title, document.citation, claims)
-
-
-def _checked(entry: ClaimEntry, citation: str, file: str) -> _PublishedClaim:
-    where = f"{file}: claims.{entry.id}"
-    source = f"{entry.source or citation}, {entry.where}"
-    if bool(entry.computation) == bool(entry.not_testable):
-        raise ScenarioError(f"{where}: give either computation, or not_testable with the reason")
-    if entry.not_testable:
-        return _PublishedClaim(entry, None, {}, source)
-    if entry.computation not in COMPUTATIONS:
-        hint = nearest_name(entry.computation, COMPUTATIONS)
-        known = ", ".join(COMPUTATIONS)
-        raise ScenarioError(f"{where}.computation: '{entry.computation}' is unknown{hint}; available: {known}")
-    if entry.at_least is None and entry.at_most is None:
-        raise ScenarioError(f"{where}: give at_least, at_most or both, the range in which the claim holds")
-    # A side that the file leaves open.
-    low = -math.inf if entry.at_least is None else entry.at_least
-    high = math.inf if entry.at_most is None else entry.at_most
-    if low > high:
-        raise ScenarioError(f"{where}: at_least = {low:g} must not exceed at_most = {high:g}")
-    # What is published has to agree with itself: else the range was typed wrongly.
-    if entry.published is not None and not low <= entry.published <= high:
-        name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
-        raise ScenarioError(f"{where}: published = {entry.published:g} is outside {name} = {limit:g}; widen the range")
-    computation = COMPUTATIONS[entry.computation]
-    with refused_as(ScenarioError, f"{where}.unit", UnitError):
-        # Only for what it raises: here the place in the file is known.
-        from_si(1.0, entry.unit, computation.unit)
-    return _PublishedClaim(entry, computation, _arguments(entry, computation, where), source, low, high)
-
-
-def _arguments(entry: ClaimEntry, computation: _Computation, where: str) -> dict[str, float]:
-    """Return the arguments of a claim in SI, checked against the arguments of its computation."""
-    known = ", ".join(computation.arguments)
-    for name in entry.arguments:
-        if name not in computation.arguments:
-            hint = nearest_name(name, computation.arguments)
-            raise ScenarioError(
-                f"{where}.arguments: '{name}' is unknown{hint}; arguments of {entry.computation}: {known}"
-            )
-    values: dict[str, float] = {}
-    if missing := [name for name in computation.arguments if name not in entry.arguments]:
-        raise ScenarioError(f"{where}.arguments: {said_missing(missing)}; arguments of {entry.computation}: {known}")
-    for name, unit in computation.arguments.items():
-        key, text = f"{where}.arguments.{name}", entry.arguments[name]
-        with refused_as(ScenarioError, key, UnitError):
-            value = values[name] = parse_quantity(text, unit)
-        # An absolute pressure does not lie below 0.
-        if not 0.0 <= value < math.inf:
-            raise ScenarioError(f"{key} = '{text}': must be finite and at least 0 {unit}")
-    return values
-
-
-SEED, ALL = PAPER, "all"
-"""Name of the study of the paper behind this package, and name for all studies together."""
-
-
-@dataclass(frozen=True, slots=True)
-class JudgedClaim:
-    """Claim of a publication with the verdict and the computed value in its unit, None if it cannot be computed."""
-
-    claim: _PublishedClaim
-    value: float | None
-    verdict: Verdict
-
-    @property
-    def published(self) -> str:
-        """Published value as displayed text with its direction; empty for a computation of our own."""
-        entry = self.claim.entry
-        number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
-        return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
-
-    @property
-    def ours(self) -> str:
-        """Our value as displayed text."""
-        return quantity(self.value, self.claim.entry.unit or "-", 3)
-
-    @property
-    def note(self) -> str:
-        """Reason for the verdict, or reason why the claim cannot be tested."""
-        return self.claim.entry.note or self.claim.entry.not_testable
-
-    def document(self, study: str) -> dict[str, Any]:
-        """Return the claim as plain data for ``claims.json``."""
-        entry = self.claim.entry
-        return {
-            "study": study,
-            **fields_of(entry, "id", "statement", "direction", "own", "unit", "computation"),
-            **fields_of(self, "published", "value", "verdict", "note"),
-            "paper": entry.published,
-            "agrees_from": entry.at_least,
-            "agrees_to": entry.at_most,
-            "arguments": dict(entry.arguments),
-            "assumptions": list(entry.assumed),
-            "source": self.claim.source,
-        }
+    claims: tuple[PublishedClaim, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Studies:
     """Publications with their judged claims, and the reproduction of the paper if it is included."""
 
-    studies: tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]
+    studies: tuple[Publication, ...]
     reproduction: "Reproduction | None" = None
 
     @property
@@ -242,20 +170,75 @@ class Studies:
     @property
     def verdicts(self) -> list[Verdict]:
         """Verdicts of all claims, starting with the paper's."""
-        studied = (claim.verdict for _, claims in self.studies for claim in claims)
+        studied = (claim.verdict for study in self.studies for claim in study.claims)
         return [*(claim.verdict for claim in self.of_paper), *studied]
 
     def json_document(self) -> dict[str, Any]:
         """Return claims with verdicts, and the number of claims for each verdict, as plain data in SI."""
         return {
-            "study": self.studies[0][0].name if self.reproduction is None else ALL,
+            "study": self.studies[0].name if self.reproduction is None else ALL,
             "counts": {verdict: self.verdicts.count(verdict) for verdict in VERDICTS},
             "claims": [
                 *({"study": SEED, **claim.document()} for claim in self.of_paper),
-                *(claim.document(publication.name) for publication, claims in self.studies for claim in claims),
+                *(claim.document(study.name) for study in self.studies for claim in study.claims),
             ],
             "versions": {"ppafo": __version__},
         }
+
+
+def load_publication(name_or_path: str | Path) -> Publication:
+    """Return a publication by its name in the package or by its file.
+
+    Raises ScenarioError for an invalid file.
+    """
+    document, file = read_publication(name_or_path)
+    claims = tuple(_checked(entry, document.citation, f"{file}: claims.{entry.id}") for entry in document.claims)
+    return Publication(document.name, document.title, document.citation, claims)
+
+
+def _checked(entry: ClaimEntry, citation: str, where: str) -> PublishedClaim:
+    """Return a claim whose computation, range, unit and arguments fit each other; ``where`` is its place."""
+    source = f"{entry.source or citation}, {entry.where}"
+    if bool(entry.computation) == bool(entry.not_testable):
+        raise ScenarioError(f"{where}: give either computation, or not_testable with the reason")
+    if entry.not_testable:
+        return PublishedClaim(entry, source, {})
+    if entry.computation not in COMPUTATIONS:
+        known = known_names(entry.computation, COMPUTATIONS)
+        raise ScenarioError(f"{where}.computation: '{entry.computation}' is unknown{known}")
+    if entry.at_least is None and entry.at_most is None:
+        raise ScenarioError(f"{where}: give at_least, at_most or both, the range in which the claim holds")
+    low, high = _range(entry)
+    if low > high:
+        raise ScenarioError(f"{where}: at_least = {low:g} must not exceed at_most = {high:g}")
+    # What is published has to agree with itself: else the range was typed wrongly.
+    if entry.published is not None and not low <= entry.published <= high:
+        limit = f"at_least = {low:g}" if entry.published < low else f"at_most = {high:g}"
+        raise ScenarioError(f"{where}: published = {entry.published:g} is outside {limit}; widen the range")
+    computation, values = COMPUTATIONS[entry.computation], dict[str, float]()
+    with refused_as(ScenarioError, f"{where}.unit", UnitError):
+        # Only for what it raises: here the place in the file is known.
+        from_si(1.0, entry.unit, computation.unit)
+    takes = f"arguments of {entry.computation}: {', '.join(computation.arguments)}"
+    if unknown := [name for name in entry.arguments if name not in computation.arguments]:
+        hint = nearest_name(unknown[0], computation.arguments)
+        raise ScenarioError(f"{where}.arguments: '{unknown[0]}' is unknown{hint}; {takes}")
+    if missing := [name for name in computation.arguments if name not in entry.arguments]:
+        raise ScenarioError(f"{where}.arguments: {said_missing(missing)}; {takes}")
+    for name, unit in computation.arguments.items():
+        key, text = f"{where}.arguments.{name}", entry.arguments[name]
+        with refused_as(ScenarioError, key, UnitError):
+            values[name] = parse_quantity(text, unit)
+        # An absolute pressure does not lie below 0.
+        if not 0.0 <= values[name] < math.inf:
+            raise ScenarioError(f"{key} = '{text}': must be finite and at least 0 {unit}")
+    return PublishedClaim(entry, source, values)
+
+
+def _range(entry: ClaimEntry) -> tuple[float, float]:
+    """Return the range in which a claim holds, in its unit; a side that the file leaves open is infinite."""
+    low, high = entry.at_least, entry.at_most
+    return -math.inf if low is None else low, math.inf if high is None else high
 
 
 def study_names() -> tuple[str, ...]:
@@ -280,7 +263,7 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
         raise ScenarioError(f"{option} {overrides[0]}: applies to the study '{SEED}' only; omit {option} or {name}")
 
 
-def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]:
+def run_studies(study: str, report: Report) -> tuple[Publication, ...]:
     """Run one study, or all studies but the paper's; returns each publication with its judged claims.
 
     Raises ScenarioError for an invalid study, SimulationError if a walk fails.
@@ -292,17 +275,18 @@ def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[Ju
             progress = Progress(f"{publication.name}: {claim.entry.id}", number, len(publication.claims), noun="claims")
             report(progress)
             claims.append(judge(claim))
-        studies.append((publication, tuple(claims)))
+        studies.append(replace(publication, claims=tuple(claims)))
     return tuple(studies)
 
 
-def judge(claim: _PublishedClaim) -> JudgedClaim:
+def judge(claim: PublishedClaim) -> PublishedClaim:
     """Compute our value for a claim and judge it; SimulationError if a walk fails."""
-    entry, computation = claim.entry, claim.computation
+    entry, computation = claim.entry, COMPUTATIONS.get(claim.entry.computation)
     if computation is None:
-        return JudgedClaim(claim, None, "not_testable")
+        return claim
     value = from_si(computation.compute(**claim.arguments), entry.unit, computation.unit)
+    low, high = _range(entry)
     # A model with assumptions that does not agree is no evidence against what was measured.
     agrees: Verdict = "plausible" if entry.assumed else "consistent"
     disagrees: Verdict = "undetermined" if entry.assumed else "inconsistent_as_reported"
-    return JudgedClaim(claim, value, agrees if claim.low <= value <= claim.high else disagrees)
+    return replace(claim, value=value, verdict=agrees if low <= value <= high else disagrees)

@@ -163,11 +163,11 @@ def _claim_over_phases(identifier: str, values: Floats, decimals: int, note: str
     assert entry.at_most is not None, f"{identifier} has a window"
     window = entry.at_least, entry.at_most
     if not np.isfinite(values).all():
-        return stated_claim(identifier, None, "undetermined", note, rests_on, window)
+        return stated_claim(identifier, None, "undetermined", note, rests_on, window=window)
     median, ends, text = _median_and_range(values, decimals, entry.unit)
     verdict: Verdict = "met_by_fitted_settings" if window[0] <= median <= window[1] else "undetermined"
     note = f"{note} Accepted from {window[0]:g} to {window[1]:g} {entry.unit}."
-    return replace(stated_claim(identifier, median, verdict, note, rests_on, window, text), range=ends)
+    return stated_claim(identifier, median, verdict, note, rests_on, window=window, found=text, range=ends)
 
 
 def _median_and_range(values: Floats, decimals: int, words: str) -> tuple[float, tuple[float, float], str]:
@@ -245,8 +245,7 @@ def control_claims(solenoid: Result, proportional: Result, pair_errors: Floats) 
     else:
         less = 100.0 * (1.0 - faster_error / pair_errors)
         median, ends, found = _median_and_range(less, 0, "% less error at 100 Hz")
-        faster = stated_claim(limited.id, median, "undetermined", limited.note, _RESTS_ON, None, found)
-        faster = replace(faster, range=ends)
+        faster = stated_claim(limited.id, median, "undetermined", limited.note, _RESTS_ON, found=found, range=ends)
     return [
         faster,
         _undetermined("gains_minimise_error", proportional, TUNED),
@@ -274,7 +273,7 @@ def _undetermined(identifier: str, run: Result, overrides: tuple[str, ...]) -> C
     change = 100.0 * (changed_error / error - 1.0)
     sentence = f"{abs(change):.0f} % {'more' if change > 0.0 else 'less'} error"
     note = f"{entry.note} In this task {changed_error:.3f} instead of {error:.3f} N m."
-    return stated_claim(identifier, change, "undetermined", note, _RESTS_ON, None, sentence)
+    return stated_claim(identifier, change, "undetermined", note, _RESTS_ON, found=sentence)
 
 
 # Interpretations of U in equation (13), the command of the proportional valve, and their effect on the task.
