@@ -19,15 +19,12 @@ import difflib
 import functools
 import math
 import re
-from collections.abc import Iterable, Iterator
 from decimal import Decimal
-from itertools import islice
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import UnitError
-from ppafo.units.definitions import DECIMALS, ParsedUnit, UnknownUnitError, names
 from ppafo.units.reference import MASS_FLOW, flow_of, is_volume_flow, read_unit, without_condition
-from ppafo.units.spelling import as_product, quote
+from ppafo.units.spelling import DECIMALS, ParsedUnit, UnknownUnitError, as_product, names, quote
 from ppafo.units.spelling import split_pressure_kind as split_pressure_kind
 
 SI = "SI"
@@ -101,14 +98,14 @@ def from_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_
 
 def base_value(value: float, unit: str) -> float:
     """Convert a value in any unit to base units (m, kg, s, K, mol, rad)."""
-    parsed = _read(unit, None)
+    parsed = _read(unit)
     exact = DECIMALS.fma(_decimal(value), parsed.scale, parsed.offset)
     return float(exact) + (STANDARD_ATMOSPHERE if parsed.kind == "g" else 0.0)
 
 
 def dimension(unit: str) -> dict[str, int]:
     """Return the dimension of a unit as powers of base dimensions such as ``[mass]`` and ``[angle]``."""
-    return dict(_read(unit, None).dimensions)
+    return dict(_read(unit).dimensions)
 
 
 def check_unit(unit: str, near: str | None = None) -> None:
@@ -133,11 +130,7 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
         raise UnitError(f"unit '{unit}' does not fit: {needed}")
     given = _read(unit, si_unit)
     if given.dimensions != wanted.dimensions:
-        # KHz, kelvin times hertz, is meant as kHz.
-        words = [] if given.kind else re.findall(r"[A-Za-z]+", unit)
-        meant = [near for name in words for near in _fitting(name, _in_other_case(name), unit, si_unit)]
-        said = f"unit '{unit}'" if unit else "a number without a unit"
-        raise UnitError(f"{said} does not fit{_asked(meant)}: {needed}")
+        raise UnitError(f"{f'unit {unit!r}' if unit else 'a number without a unit'} does not fit: {needed}")
     if si_unit in (LEVEL, DIFFERENCE):
         if not given.kind:
             ways = f"{unit}_g for gauge or {unit}_a for absolute" if si_unit == LEVEL else f"{unit}_d for a difference"
@@ -148,40 +141,26 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     return DECIMALS.divide(given.scale, wanted.scale), offset, given.kind == "g" and si_unit == LEVEL
 
 
-def _read(unit: str, si_unit: str | None) -> ParsedUnit:
-    """Parse a unit. UnitError for an unknown one suggests units compatible with ``si_unit``.
-
-    Without ``si_unit`` only units that differ in upper and lower case are suggested.
-    """
+def _read(unit: str, si_unit: str | None = None) -> ParsedUnit:
+    """Parse a unit. UnitError for an unknown one proposes near ones, with ``si_unit`` those that fit it."""
     try:
         return read_unit(unit)
     except UnknownUnitError as error:
-        name = error.name
-        # nm for N m: a force has a capital letter.
-        same = [*_in_other_case(name), as_product(name.capitalize()), f"deg{name}" if si_unit is not None else ""]
-        near = difflib.get_close_matches(name, sorted(names()), 12) if si_unit is not None else []
-        meant = [*_fitting(name, same, unit, si_unit)] or [*islice(_fitting(name, near, unit, si_unit), 1)]
-        raise UnknownUnitError(name, _asked(meant)) from error
+        name, known = error.name, sorted(names())
+        near = [each for each in known if each.lower() == name.lower()]
+        if si_unit is not None:
+            # nm for N m: a force has a capital letter.
+            near += [as_product(name.capitalize()), f"deg{name}", *difflib.get_close_matches(name, known, 12)]
+        written = [re.sub(rf"(?<![A-Za-z]){re.escape(name)}(?![A-Za-z])", other, unit) for other in near if other]
+        meant = next((f", did you mean '{other}'?" for other in written if _fits(other, si_unit)), "")
+        raise UnknownUnitError(name, meant) from error
 
 
-def _in_other_case(name: str) -> list[str]:
-    return sorted(known for known in names() if known.lower() == name.lower() and known != name)
-
-
-def _fitting(name: str, others: Iterable[str], unit: str, si_unit: str | None) -> Iterator[str]:
-    """Yield ``unit`` with ``name`` replaced by each other name that makes it a unit of ``si_unit``, if given."""
-    for other in dict.fromkeys(filter(None, others)):
-        meant = re.sub(rf"(?<![A-Za-z]){re.escape(name)}(?![A-Za-z])", other, unit)
-        with contextlib.suppress(UnitError):
-            parsed = read_unit(meant)
-            if si_unit is None or parsed.dimensions == read_unit(si_unit).dimensions:
-                kinds = {LEVEL: "ga", DIFFERENCE: "d", None: "gad"}.get(si_unit, "")
-                is_open = parsed.is_pressure and not parsed.kind
-                yield " or ".join(f"'{meant}_{kind}'" for kind in kinds if is_open) or f"'{meant}'"
-
-
-def _asked(meant: list[str]) -> str:
-    return f", did you mean {' or '.join(meant)}?" if meant else ""
+def _fits(unit: str, si_unit: str | None) -> bool:
+    try:
+        return read_unit(unit).dimensions == read_unit(unit if si_unit is None else si_unit).dimensions
+    except UnitError:
+        return False
 
 
 def _decimal(value: float) -> Decimal:

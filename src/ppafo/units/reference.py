@@ -18,8 +18,7 @@ from ppafo.constants import (
     STANDARD_REFERENCE_TEMPERATURE,
 )
 from ppafo.errors import UnitError
-from ppafo.units.definitions import DECIMALS, ParsedUnit
-from ppafo.units.spelling import KIND_WORD, parse_unit
+from ppafo.units.spelling import DECIMALS, KIND_WORD, ParsedUnit, parse_unit
 from ppafo.wording import nearest_name
 
 MASS_FLOW, VOLUME_FLOW = {"[mass]": 1, "[time]": -1}, {"[length]": 3, "[time]": -1}
@@ -150,13 +149,12 @@ def without_condition(unit: str, gas: str = "") -> str:
 
     ``gas`` is the gas of the bench by name or molar mass, empty if unknown.
     """
-    named, normal, own = (with_condition(unit, at, "air") for at in ("ANR", "DIN 1343", _EXAMPLE))
-    bench = f"where the gas is {gas}" if gas else "with another gas"
-    too = "" if gas and _is_air(_molar_mass(gas)) else f"; in a [[procedure]] {bench}, give gas = 'air' too"
+    named, own = (with_condition(unit, at, "air") for at in ("ANR", _EXAMPLE))
+    too = "" if gas and _is_air(_molar_mass(gas)) else f"; where the bench has {gas or 'another'}, give gas = 'air' too"
     return (
         f"'{unit}' is a volume flow, which is a mass flow only with a reference condition and a gas: write '{named}' "
-        f"(20 degC, 1 bar), '{normal}' (0 degC, 1.01325 bar) or '{own}', as in the data sheet of the meter; in a "
-        f"column map give at = 'ANR' and gas = 'air'{too}"
+        f"(20 degC, 1 bar) or '{own}', as in the data sheet of the meter; in a column map give at = 'ANR' and "
+        f"gas = 'air'{too}"
     )
 
 

@@ -17,8 +17,8 @@ from ppafo.parameters.device import Gas
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.units import from_si
-from ppafo.units.definitions import DECIMALS
 from ppafo.units.shown import shown_in, shown_unit, shown_value
+from ppafo.units.spelling import DECIMALS
 
 Severity = Literal["error", "warning", "note"]
 
