@@ -11,7 +11,7 @@ from ppafo.errors import DataError
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.mapping import load_map
 from ppafo.signals.recording import Floats
-from tests.unit.gait.laboratory import MASS, markers
+from tests.unit.gait.laboratory import MASS, markers, trc
 
 TIME = np.arange(0.0, 5.2, 0.01)
 
@@ -50,29 +50,10 @@ vertical_force = {{ terms = ["{prefix}vertical_force"], unit = "-" }}
         assert np.allclose(found.curve(name).cosines, wanted.curve(name).cosines)
 
 
-def trc(folder: Path, names: dict[str, Floats], file: str = "walk.trc") -> Path:
-    """A file of markers as Cortex or Nexus writes it."""
-    head = "\t".join(f"{name}\t\t" for name in names)
-    axes = "\t".join(f"X{number}\tY{number}\tZ{number}" for number in range(1, len(names) + 1))
-    table = np.vstack([np.arange(1, TIME.size + 1), TIME, *names.values()]).T
-    rows = "\n".join("\t".join(map(repr, row)) for row in table.tolist())
-    path = folder / file
-    path.write_text(
-        "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n"
-        f"100\t100\t{TIME.size}\t{len(names)}\tmm\nFrame#\tTime\t{head}\n\t\t{axes}\n\n{rows}\n"
-    )
-    return path
-
-
-def doubled_trc(folder: Path, name: str, file: str = "walk.trc") -> Path:
-    walk = markers(TIME)
-    path = trc(folder, {**walk, "STRAY": walk["RKNE"] + 100.0}, file)
-    path.write_text(path.read_text().replace("STRAY", name))
-    return path
-
-
 def test_a_doubled_marker_that_is_needed_is_named_by_its_number(tmp_path: Path) -> None:
-    path = doubled_trc(tmp_path, "RKNE")
+    walk = markers(TIME)
+    path = trc(tmp_path / "walk.trc", TIME, {**walk, "STRAY": walk["RKNE"] + 100.0})
+    path.write_text(path.read_text().replace("STRAY", "RKNE"))
     with pytest.raises(
         DataError, match=r"has several different columns 'RKNE'; choose 'RKNE#1' or 'RKNE#2' in a gait map"
     ):

@@ -174,7 +174,8 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
             "not recorded": ~recorded,
             # A marker that is 0 throughout stands at the origin.
             "all coordinates 0": zero & bool((recorded & ~zero).any()),
-            "position unchanged": _held(at, MOST_ACCELERATION * interval**2 if _resolution(at) > _COARSE else 0.0),
+            "position unchanged": ~zero
+            & _held(at, MOST_ACCELERATION * interval**2 if _resolution(at) > _COARSE else 0.0),
         }
         lost = {cause: frames for cause, frames in causes.items() if frames.any()}
         if not lost:
