@@ -103,7 +103,7 @@ def within_resolution(volume: Floats, shares: Floats, pressures: Floats, resolut
     half of the last digit ``resolution`` [m^3] would be needed.
     """
     bends = shares[2:-2]
-    to_coefficients: Floats = np.linalg.inv(_basis(shares, bends)[:, : shares.size])
+    to_coefficients = np.asarray(np.linalg.inv(_basis(shares, bends)[:, : shares.size]), dtype=np.float64)
     spline = _basis(_CHECKED_SHARES, bends)[:, : shares.size] @ to_coefficients
     fitted, torque_error = _likeliest(volume, to_coefficients, bends, spline, pressures, resolution)
     angles, count = volume.shape
