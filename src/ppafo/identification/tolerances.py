@@ -23,6 +23,9 @@ Sensed = Literal["zero", "gain"]
 GAS_TEMPERATURE, GAS_LAW = 15.0, 0.01
 """Default limits of the gas temperature error [K] and of the relative departure from the ideal gas law [-]."""
 
+LAG_OF_PRESSURE = 0.02
+"""Default limit of the time constant of a pressure sensor with its tube and filter [s]."""
+
 HELD = {
     "gas.molar_mass": GAS_LAW,
     "gas.heat_capacity_ratio": 0.02,
@@ -68,6 +71,10 @@ class BenchSection(StrictTable):
     ] = None
     gain: Annotated[
         Text | None, Field(description="tolerance of the gain of each sensor; default 0.5 %, 0 % for the angle sensor")
+    ] = None
+    lag: Annotated[
+        Text | None,
+        Field(description="tolerance of the time constant of each sensor; default 20 ms, 1 ms for the angle sensor"),
     ] = None
     start_of_angle: Annotated[
         Text | None,
@@ -119,6 +126,7 @@ class Tolerances:
     zero_of_angle: float = ANGLE_ERRORS.zero
     zero_of_pressure: float = PRESSURE_ERRORS.zero
     gain: float | None = None
+    lag: float | None = None
     start_of_angle: float | None = None
     start_of_pressure: float | None = None
     gas_temperature: float | None = None
@@ -138,6 +146,11 @@ class Tolerances:
         # Of an angle alone a gain is one of all its numbers, which no fit tells from it.
         usual = 0.0 if channel == "angle" else PRESSURE_ERRORS.gain
         return usual if self.gain is None else self.gain
+
+    def lag_of(self, channel: str) -> float:
+        """Return the limit of the time constant of a sensor and its filter [s]."""
+        usual = ANGLE_ERRORS.delay if channel == "angle" else LAG_OF_PRESSURE
+        return usual if self.lag is None else self.lag
 
     def deviation_of(self, path: str, value: float, half_width: float) -> float:
         """Return the standard deviation of a fixed parameter, given its ``value`` [SI].
@@ -166,6 +179,7 @@ _UNITS = {
     "zero_of_angle": "rad",
     "zero_of_pressure": "Pa_d",
     "gain": "1",
+    "lag": "s",
     "start_of_angle": "rad",
     "start_of_pressure": "Pa_d",
     "gas_temperature": "K",

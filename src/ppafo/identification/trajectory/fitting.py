@@ -12,7 +12,15 @@ from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_h
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.residuals import FitVariable, ResidualBlock
-from ppafo.identification.trajectory.numbers import ZERO_OF, FitNumber, broken_rule, full_path, reach_of, with_numbers
+from ppafo.identification.trajectory.numbers import (
+    LAG_OF,
+    ZERO_OF,
+    FitNumber,
+    broken_rule,
+    full_path,
+    reach_of,
+    with_numbers,
+)
 from ppafo.identification.trajectory.problem import TrajectoryProblem, numbers_of
 from ppafo.identification.trajectory.runs import (
     Floats,
@@ -25,6 +33,7 @@ from ppafo.identification.trajectory.runs import (
 )
 from ppafo.identification.wording import conflict_in_words, in_shown_unit, widened_by
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.signals.faults import correlated_noise_of, noise_of
 from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import count_of, nearest_name
@@ -124,6 +133,50 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     ``report`` receives the progress. Raises IdentificationError if the problem cannot be simulated.
     """
     numbers = numbers_of(problem)
+    # Beside a lag a steep signal says little of other numbers, so it is a tolerance where recordings ask for it, and of
+    # a dead time always, which it resembles so much that small residuals would not show it.
+    steady = tuple(number for number in numbers if not (number.is_tolerance and number.path.startswith(LAG_OF)))
+    if any(not number.is_tolerance and number.path.endswith(_DEAD_TIMES) for number in numbers):
+        return _fit_of(problem, numbers, report)
+    found = _fit_of(problem, steady, report)
+    if len(steady) < len(numbers) and (found.conflict or any(map(_follow_each_other, _residuals_in(found)))):
+        report(Progress("trajectory fit: again, with sensors that lag"))
+        lagging = _fit_of(problem, numbers, report)
+        if lagging.fit.log_likelihood > found.fit.log_likelihood + _LAGS:
+            return lagging
+    return found
+
+
+_DEAD_TIMES = "delay", "time_offset"
+"""Last words of the paths of dead times."""
+_LAGS = 10.0
+"""Least increase of the log-likelihood [-] by which lags of sensors are found."""
+_WINDOWS, _RUN = (3, 6, 12, 24, 48), 6.0
+"""Lengths of runs of residuals [samples], and size of their sum that no white noise has [standard deviations]."""
+_FELT = 1.0e-3
+"""Least residuals that are tested as bursts [ranges of the samples]; smaller ones are the engine's."""
+_BURST = 6.0
+"""Ratio of residuals to the noise that lasts [-] from which they are no noise; slow noise has up to 5.5."""
+
+
+def _residuals_in(found: TrajectoryFit) -> Iterator[Floats]:
+    """Yield the residuals [SI] of each channel of each experiment."""
+    for measured, model in zip(found.measurements, found.models, strict=True):
+        yield from (measured[name] - model[name] for name in measured.names if name in model)
+
+
+def _follow_each_other(residuals: Floats) -> bool:
+    """Return whether the residuals of some part of a recording have one sign, as white noise has not."""
+    noise = max(noise_of(residuals), 1.0e-300)
+    sums = np.cumsum(residuals, dtype=float)
+    return any(
+        float(np.abs(sums[width:] - sums[:-width]).max(initial=0.0)) > _RUN * noise * math.sqrt(width)
+        for width in _WINDOWS
+    )
+
+
+def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: Report) -> TrajectoryFit:
+    """Return the fit of some numbers of a problem; those that are left out stay at their start values."""
     free = [number.free for number in numbers]
     start = np.array([number.start for number in free])
     rows = {(item.path, item.recordings): row for row, item in enumerate(numbers) if not item.is_tolerance}
@@ -173,7 +226,8 @@ def _result(
     is_free = any(number.path == _STATIC and not number.is_tolerance for number in numbers)
     if fitted.conflict is not None and fitted.conflict.group == "angle" and not is_free:
         remedy += f", or {_STATIC} is to be fitted too"
-    conflict = conflict_in_words(fitted, remedy) or _wandering(fitted, numbers)
+    models, measurements, channels = _comparison(problem, numbers, runs, fitted)
+    conflict = conflict_in_words(fitted, remedy) or _wandering(fitted, numbers) or _bursting(measurements, models)
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
     rows = [row for row, number in enumerate(numbers) if not number.is_tolerance]
     estimates = tuple(_estimate(problem, fitted, numbers[row], row, conflict) for row in rows)
@@ -181,7 +235,6 @@ def _result(
     covariance = fitted.covariance[np.ix_(rows, rows)]
     tolerances = ((row, number) for row, number in enumerate(numbers) if number.is_tolerance)
     known = [_known(fitted, number, row, float(errors[row]), estimates) for row, number in tolerances]
-    models, measurements, channels = _comparison(problem, numbers, runs, fitted)
     scenarios = tuple(with_numbers(run.scenario, numbers_in(run.label, numbers, fitted.values)) for run in runs)
     return TrajectoryFit(
         problem=problem,
@@ -296,6 +349,20 @@ def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
                 f"the residual of {channel} drifts by {shown:.2g} {unit}, but the zero of its sensor by at most "
                 f"{most:.2g} {unit}; the model is incomplete"
             )
+    return ""
+
+
+def _bursting(measurements: Sequence[Recording], models: Sequence[Recording]) -> str:
+    """Return a sentence on a channel whose residuals are far above the noise that lasts; empty if there is none."""
+    for measured, model in zip(measurements, models, strict=True):
+        for name in (name for name in measured.names if name in model):
+            residuals = measured[name] - model[name]
+            size, noise = float(np.sqrt(np.mean(np.square(residuals)))), correlated_noise_of(residuals)
+            if size > _BURST * noise and size > _FELT * float(np.ptp(measured[name])):
+                return (
+                    f"the residual of {name} of {measured.label} is {size / max(noise, 1.0e-300):.0f} times the noise "
+                    "that lasts; the model is incomplete"
+                )
     return ""
 
 

@@ -22,8 +22,8 @@ from ppafo.wording import known_names
 TIME_OFFSET = "recording.time_offset"
 """Path of the delay of the samples of a recording with respect to the run; no scenario has this parameter."""
 
-ZERO_OF, GAIN_OF = "recording.zero_of_", "recording.gain_of_"
-"""Prefixes of the parameter paths of zero and gain errors of a sensor; the channel name follows."""
+ZERO_OF, GAIN_OF, LAG_OF = "recording.zero_of_", "recording.gain_of_", "recording.lag_of_"
+"""Prefixes of the parameter paths of zero, gain and first-order lag of a sensor; the channel name follows."""
 
 RECORDING = (
     Quantity("time_offset", "s", "delay of the samples behind the run, such as a late trigger", 0.0, -1.0, 1.0),
@@ -36,6 +36,10 @@ RECORDING = (
     ),
     *(
         Quantity(f"gain_of_{name}", "1", f"gain of the sensor of {name} less 1", 0.0, -0.5, 0.5)
+        for name in FITTED_CHANNELS
+    ),
+    *(
+        Quantity(f"lag_of_{name}", "s", f"time constant of the sensor of {name} or its filter", 0.0, -1.0, 1.0)
         for name in FITTED_CHANNELS
     ),
 )

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.replay import StepInputs, replay
@@ -23,7 +24,7 @@ from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.residuals import ResidualBlock
 from ppafo.identification.trajectory.experiment import FittedExperiment, scenario_of
-from ppafo.identification.trajectory.numbers import GAIN_OF, TIME_OFFSET, ZERO_OF, FitNumber, with_numbers
+from ppafo.identification.trajectory.numbers import GAIN_OF, LAG_OF, TIME_OFFSET, ZERO_OF, FitNumber, with_numbers
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.device import Device
@@ -31,6 +32,7 @@ from ppafo.parameters.effects import switches_of
 from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY
+from ppafo.simulation.recorded.clock import sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_prescribed_angle
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
@@ -297,15 +299,11 @@ def _check_same_program(prepared: PreparedExperiment, device: Device, numbers: M
 def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
     """Return the channels [SI] (samples, runs) of one experiment for ``count`` runs with parameters [SI] by path.
 
-    Runs that differ only in zeros and gains of compared sensors are simulated once. A pressure sensor reads gauge
+    Runs that differ only in zeros, gains and lags of compared sensors are simulated once. A pressure sensor reads gauge
     pressure.
     """
-    compared = [channel.name for channel in prepared.channels]
-    errors = {
-        path: column
-        for path, column in columns.items()
-        if path.removeprefix(ZERO_OF).removeprefix(GAIN_OF) in compared and path.startswith((ZERO_OF, GAIN_OF))
-    }
+    of_sensors = {f"{kind}{channel.name}" for channel in prepared.channels for kind in (ZERO_OF, GAIN_OF, LAG_OF)}
+    errors = {path: column for path, column in columns.items() if path in of_sensors}
     running = {path: column for path, column in columns.items() if path not in errors}
     table = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
     _, first, run_of = np.unique(table, axis=1, return_index=True, return_inverse=True)
@@ -315,8 +313,26 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
     for name, values in signals.items():
         rest = 0.0 if name == ANGLE else atmosphere
         gain, zero = (np.asarray(errors.get(f"{path}{name}", 0.0)) for path in (GAIN_OF, ZERO_OF))
-        signals[name] = rest + (1.0 + gain) * (values[:, run_of.ravel()] - rest) + zero
+        read = values[:, run_of.ravel()]
+        if (lags := errors.get(f"{LAG_OF}{name}")) is not None:
+            read = _lagging(read, np.broadcast_to(lags, (count,)), sample_period(prepared.time))
+        signals[name] = rest + (1.0 + gain) * (read - rest) + zero
     return signals
+
+
+def _lagging(values: Floats, lags: Floats, interval: float) -> Floats:
+    """Return samples (samples, runs) behind first-order lags [s] (runs,): exact for straight lines between samples.
+
+    A lag below 0 adds what the same lag above 0 takes away, so that a search can pass 0.
+    """
+    lagging = values.copy()
+    for lag in np.unique(lags[lags != 0.0]).tolist():
+        runs, left = lags == lag, math.exp(-interval / abs(lag))
+        straight = abs(lag) / interval * (1.0 - left)
+        from_start = values[:, runs] - values[:1, runs]
+        behind = lfilter([1.0 - straight, straight - left], [1.0, -left], from_start, axis=0) - from_start
+        lagging[:, runs] += math.copysign(1.0, lag) * behind
+    return lagging
 
 
 def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from ppafo.identification.new_set import fitting_unit, stated_half_width
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, FittedExperiment, scenario_of
 from ppafo.identification.trajectory.numbers import (
     GAIN_OF,
+    LAG_OF,
     ZERO_OF,
     FreeParameter,
     declared_numbers,
@@ -20,11 +22,15 @@ from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.clock import regular_interval
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 
 _WIDEST = 12.0
 """Largest deviation of a tolerance in the search, in standard deviations of its prior [-]."""
+
+_LONGEST_LAG = 0.1
+"""Longest time constant of a sensor that is tried [s]."""
 
 _EXACT = ("area", "angle_min", "angle_max", "linear_ratio", "critical_ratio", "atmospheric_pressure")
 """Parameters without a default tolerance, because another parameter or a zero error has the same effect."""
@@ -73,12 +79,17 @@ def tolerance_parameters(
                 parameters.append(_parameter(path, start, deviation, (experiment.label,)))
     # What is fitted is moved already; a second number for it could not be told from the first.
     given = {full_path(item.path, experiments[0].scenario) for item in fitted}
-    for kind, prefix, limit_of in (("zero", ZERO_OF, tolerances.zero_of), ("gain", GAIN_OF, tolerances.gain_of)):
+    for kind, prefix, limit_of in (
+        ("zero", ZERO_OF, tolerances.zero_of),
+        ("gain", GAIN_OF, tolerances.gain_of),
+        ("lag", LAG_OF, tolerances.lag_of),
+    ):
         for channel in (*FITTED_CHANNELS, *((SUPPLY, DORSIFLEXION_SUPPLY) if kind == "zero" else ())):
             labels = [
                 item.label
                 for item in experiments
-                if channel in item.channels or (kind == "zero" and channel in item.inputs)
+                if (channel in item.channels and (kind != "lag" or regular_interval(item.recording.time)))
+                or (kind == "zero" and channel in item.inputs)
             ]
             path, limit = f"{prefix}{channel}", limit_of(channel)
             # A number with a prior of no width cannot be moved.
@@ -87,7 +98,10 @@ def tolerance_parameters(
             groups = [(label,) for label in labels] if kind in tolerances.each_recording else [tuple(labels)]
             for group in groups:
                 is_common = len(group) == len(experiments) and kind not in tolerances.each_recording
-                parameters.append(_parameter(path, 0.0, deviation_of_limit(limit), () if is_common else group))
+                parameter = _parameter(path, 0.0, deviation_of_limit(limit), () if is_common else group)
+                parameters.append(
+                    replace(parameter, low=-_LONGEST_LAG, high=_LONGEST_LAG) if kind == "lag" else parameter
+                )
     return (
         *parameters,
         *_of_set(tolerances, experiments, given, stated or {}),

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import IdentificationError
@@ -15,6 +16,7 @@ from ppafo.identification.trajectory import runs as trajectory_runs
 from ppafo.identification.trajectory.numbers import number_at, with_numbers
 from ppafo.identification.trajectory.runs import prepare, signals_at
 from ppafo.identification.trajectory.tolerances import tolerance_parameters
+from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
@@ -188,3 +190,27 @@ def test_errors_of_the_bench_hide_no_number_where_they_are_tolerances(recorded: 
 
 SUPPLIES = ("supply.pressure", "supply.dorsiflexion_pressure")
 ZEROS = {"angle": 0.0, "pressure_1": 800.0, "pressure_2": -600.0}
+
+
+@pytest.mark.parametrize("path", ["valves.proportional.delay", "valves.proportional.discharge_coefficient"])
+@pytest.mark.parametrize(("lag", "noise"), [(0.002, 1500.0), (0.005, 100.0), (0.02, 100.0)])
+def test_the_lag_of_a_filtered_sensor_is_no_dead_time_of_the_valve(path: str, lag: float, noise: float) -> None:
+    common = ("motion.kind=locked", "run.duration=0.3 s")
+    truth = load_scenario("step-response", [*common, "valve.delay=18 ms"])
+    run, time = simulate(truth).recording, np.arange(301) * 1.0e-3
+    fine, left, channels = np.arange(0.0, 0.30001, 1.0e-5), math.exp(-1.0e-5 / lag), {}
+    for seed, name in enumerate(("pressure_1", "pressure_2")):
+        values = np.interp(fine, run.time, run[name])
+        filtered = values[0] + lfilter([1.0 - left], [1.0, -left], values - values[0])
+        sensed = np.interp(time, fine, filtered) + np.random.default_rng(seed).normal(0.0, noise, time.size)
+        channels[name] = Channel(sensed, "Pa")
+    start = truth if "delay" not in path else load_scenario("step-response", [*common, "valve.delay=10 ms"])
+    experiment = FittedExperiment("one", start, Recording("filtered", time, channels), channels=tuple(channels))
+    sought = (FreeParameter(path),)
+    problem = TrajectoryProblem((*sought, *tolerance_parameters(Tolerances(), [experiment], sought)), (experiment,))
+    found = fit(problem)
+    assert found.estimates[0].low <= number_at(truth, path) <= found.estimates[0].high
+    assert found.estimates[0].is_identified
+    if "delay" in path:
+        after = {item.name: item.after for item in found.known}
+        assert after["recording.lag_of_pressure_1"] == pytest.approx(lag, rel=0.1, abs=0.5e-3)
