@@ -41,10 +41,16 @@ def test_settings_of_a_library_are_single_runs_with_the_same_words_or_refused_by
         ("swing-foot-angle", ("reference.value_20", 20.0), "[reference] leaves the stops", "reference_level"),
         ("swing-foot-angle", ("reference.time_14", 0.7), "time_15 = 0.2771 s: must be later", "reference_time_15"),
         ("proportional", ("controller.first_stride_time", 0.39), "half and twice", "controller_first_stride_time"),
+        (
+            "cylinder-servo",
+            ("actuator.lever_offset", -3.0),
+            "the angle between lever and base",
+            "actuator_lever_offset",
+        ),
         ("solenoid", ("actuator.angle_max", 1.7), "the gait needs", "actuator_angle_max"),
     ],
 )
-def test_a_rule_on_profiles_and_gait_holds_in_a_library_as_in_a_file(
+def test_a_rule_on_profiles_gait_and_actuator_holds_in_a_library_as_in_a_file(
     tmp_path: Path, name: str, number: tuple[str, float], text: str, named: str
 ) -> None:
     built, (path, value) = BuiltLibrary(load_scenario(name), tmp_path), number

@@ -12,7 +12,8 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.step.lane import Lane
 from ppafo.exports.c_library.library import c_identifier
-from ppafo.model.catalog import VALVES
+from ppafo.model.actuators.kind import Range
+from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.controlled import CONTROLLED, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
@@ -101,9 +102,24 @@ class Preparation:
         return self.program.angle is not None and path_of_locked_angle(self.scenario) is None
 
     @property
+    def flaw(self) -> Callable[[Any, Range], float] | None:
+        """Function that finds a setting of the actuator at fault; None if declared limits suffice."""
+        return ACTUATORS[self.device.actuator.kind].flaw
+
+    @property
+    def first_of_actuator(self) -> str:
+        """Path of the first setting of an actuator that is no vane."""
+        return f"actuator.{next(iter(self.device.actuator.settings))}"
+
+    @property
     def has_rules(self) -> bool:
-        """True if there are rules on the profiles: of knots, or of what they may reach."""
-        return self.reach is not None or self.moves_on_path or any(path.endswith("time_02") for path in self.places)
+        """True if there are rules on the profiles, of knots or of what they may reach, or on the actuator."""
+        return (
+            self.flaw is not None
+            or self.reach is not None
+            or self.moves_on_path
+            or any(path.endswith("time_02") for path in self.places)
+        )
 
     @property
     def course_of_reference(self) -> ProfileCourse:

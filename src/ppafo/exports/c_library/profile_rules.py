@@ -1,4 +1,4 @@
-"""Rules on the profiles of a scenario, as files have them: knots in order, and no course beyond what can be reached.
+"""Rules of scenario files beside ranges: knots in order, no course beyond what can be reached, a possible actuator.
 
 The functions take what those of ``preparation`` take. A fault is the place of the setting to name, counted from 1.
 """
@@ -6,8 +6,10 @@ The functions take what those of ``preparation`` take. A fault is the place of t
 from typing import Any
 
 from ppafo.control.profiles import TabulatedProfile, disordered_knot
+from ppafo.engine.rows import rebuilt
 from ppafo.exports.c_library.preparation import count_steps, set_laws, set_shank
 from ppafo.exports.c_library.prepared import Preparation, PreparedLane
+from ppafo.model.actuators.kind import Range
 from ppafo.model.controlled import Ends
 from ppafo.simulation.profiles import excursion, widened
 
@@ -72,10 +74,24 @@ def check_courses(parts: Preparation, lane: PreparedLane, settings: Any) -> None
         lane.fault = first_fault(lane.fault, parts.place_of("reference.level") if lane["beyond"][0] >= 0.0 else 0.0)
 
 
+def check_actuator(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
+    """Set the fault of an actuator whose numbers are impossible together."""
+    if parts.flaw is not None:
+        lane["flaw"] = parts.flaw(
+            parts.row("ActuatorSettings", parts.device.actuator.settings)(
+                *(getattr(settings, name) for name in parts.setting_names("actuator", parts.device.actuator.settings))
+            ),
+            rebuilt(Range, (getattr(settings, name) for name in parts.setting_names("actuator", Range._fields))),
+        )
+        lane.fault = first_fault(
+            lane["flaw"] + (parts.place_of(parts.first_of_actuator) - 1.0) if lane["flaw"] > 0.0 else 0.0, lane.fault
+        )
+
+
 def faults(parts: Preparation, lane: PreparedLane, settings: Any) -> float:  # noqa: ARG001
     """Return the fault that was found."""
     return lane.fault
 
 
-PROFILE_RULES = (set_shank, count_steps, set_laws, check_knots, check_courses, faults)
+PROFILE_RULES = (set_shank, count_steps, set_laws, check_knots, check_courses, check_actuator, faults)
 """Functions that check the profiles of a scenario, in order of calling; the last one returns the fault."""

@@ -9,10 +9,12 @@ from typing import Annotated, NamedTuple
 from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range, ShapedPlant
 from ppafo.model.actuators.linear_chambers import LinearChamber, linear_chambers, linear_pressures, linear_torque, rigid
 from ppafo.model.declaration import Number
-from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
+from ppafo.model.elementary import TURN, TURNS_OF_RADIAN, sine_and_cosine_of_turns
 
 LEAST_SINE = 0.05
 """Smallest sine of the angle between lever and base; below it the lever is too close to its dead centre."""
+_ROD, _OFFSET = 2.0, 5.0
+"""Places of settings, from 1."""
 
 
 class Cylinder(NamedTuple):
@@ -103,14 +105,23 @@ def prepare(settings: _CylinderSettings, stops: Range) -> Cylinder:
     )
 
 
+def flaw(settings: _CylinderSettings, stops: Range) -> float:
+    """Return the place of the setting that is impossible, from 1: rod as wide as the bore, lever at its dead centre."""
+    low, high = stops.angle_min + settings.lever_offset, stops.angle_max + settings.lever_offset
+    # Both stops suffice: between them the angle runs from one to the other, and the sine has no minimum inside.
+    first, _ = sine_and_cosine_of_turns(low * TURNS_OF_RADIAN)
+    last, _ = sine_and_cosine_of_turns(high * TURNS_OF_RADIAN)
+    is_dead = low <= 0.0 or high >= 0.5 * TURN or first < LEAST_SINE or last < LEAST_SINE
+    return _ROD if settings.rod_diameter >= settings.bore else (_OFFSET if is_dead else 0.0)
+
+
 def problem(settings: _CylinderSettings, stops: Range) -> str:
     """Describe a rod as wide as the bore, or a lever that reaches its dead centre between the stops; else empty."""
-    if settings.rod_diameter >= settings.bore:
+    place = flaw(settings, stops)
+    if place == _ROD:
         return "rod_diameter must be below bore"
-    # Both stops suffice: between them the angle runs from one to the other, and the sine has no minimum inside.
-    between = [angle + settings.lever_offset for angle in (stops.angle_min, stops.angle_max)]
-    if min(between) <= 0.0 or max(between) >= math.pi or min(math.sin(angle) for angle in between) < LEAST_SINE:
-        low, high = (math.degrees(angle) for angle in between)
+    if place == _OFFSET:
+        low, high = (math.degrees(angle + settings.lever_offset) for angle in (stops.angle_min, stops.angle_max))
         return (
             f"the angle between lever and base is {low:.4g} to {high:.4g} deg and must stay at least "
             f"{math.degrees(math.asin(LEAST_SINE)):.2g} deg from 0 and 180 deg: change lever_offset or the stops"
@@ -124,4 +135,5 @@ KIND = ActuatorKind(
     settings=_CylinderSettings,
     model=ActuatorModel(Cylinder, prepare, chambers, pressures, torque, gives=False),
     problem=problem,
+    flaw=flaw,
 )

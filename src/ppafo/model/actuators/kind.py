@@ -75,7 +75,8 @@ class ActuatorKind:
     ``settings`` is a NamedTuple class that declares the numbers, each an ``Annotated[float, Number(...)]``.
 
     ``problem(settings, range)`` describes an inconsistency between the settings, empty if there is none; None if the
-    declared limits are sufficient. ``has_one_chamber(table)`` returns whether chamber 2 is only its dead volume, in an
+    declared limits are sufficient. ``flaw(settings, range)`` is the same for exports: place of the setting at fault,
+    counted from 1, or 0. ``has_one_chamber(table)`` returns whether chamber 2 is only its dead volume, in an
     actuator with a table (None without one).
     """
 
@@ -84,6 +85,7 @@ class ActuatorKind:
     settings: type
     model: ActuatorModel
     problem: Callable[[Any, Range], str] | None = None
+    flaw: Callable[[Any, Range], float] | None = None
     has_one_chamber: Callable[[Any], bool] = lambda _: False
 
     @property
