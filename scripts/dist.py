@@ -103,7 +103,7 @@ def _install(wheel: Path, folder: Path) -> Path:
     """Install the wheel with what it needs into an empty environment; returns its Python."""
     venv.create(folder, with_pip=True)
     python = folder / "bin" / "python"
-    command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", str(wheel)]
+    command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", f"{wheel}[workbench]"]
     subprocess.run(command, check=True, cwd=folder, stderr=subprocess.PIPE)
     return python
 
