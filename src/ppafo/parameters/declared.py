@@ -385,7 +385,7 @@ def _table_schema(
     else:
         inner = {name: _joined(path, name) for name in layout_of(fields).names.get(path, ())}
         described["properties"] = {
-            name: {"const": chosen}
+            name: _described({"const": chosen}, kind.allowed)
             if name == KIND and isinstance(kind, Words)
             else _schema(fields.get(at, InnerTable()), declare, document, at, definitions)
             for name, at in inner.items()
@@ -406,6 +406,12 @@ def _table_schema(
         name, wanted = (wanted, "") if wanted not in definitions else ("", f"{wanted}'")
     definitions[name] = described
     return {"$ref": f"#/$defs/{name}"}
+
+
+def _described(form: dict[str, Any], kinds: Iterable[Any]) -> dict[str, Any]:
+    """Return the schema of the name of a kind with the meaning of the kind, where a catalogue has it."""
+    summary = getattr(kinds[form["const"]], "summary", "") if isinstance(kinds, Mapping) and form["const"] else ""
+    return form | ({"description": summary} if summary else {})
 
 
 def _with(document: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
@@ -442,7 +448,8 @@ def _schema(
         )
         form = {"type": "array", "items": items, "minItems": field.least}
     elif isinstance(field, Words):
-        texts = {"type": "string"} | ({"pattern": field.pattern} if field.pattern else {})
+        texts: dict[str, Any] = {"type": "string"} | ({"pattern": field.pattern} if field.pattern else {})
+        texts |= {"minLength": 1} if field.required and field.is_filled and not field.pattern else {}
         forms: dict[type, dict[str, Any]] = {
             bool: {"type": "boolean"},
             dict: {"type": "object", "additionalProperties": texts},
