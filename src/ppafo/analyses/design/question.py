@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -225,10 +226,9 @@ def _cut_peak(sizing: Sizing, sized: SizedValve) -> str:
 
 def _colours(sizing: Sizing) -> dict[str, str]:
     """Return the colour of each valve's curves by name."""
-    from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
+    from ppafo.report.style import COLOURS
 
-    palette = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9", BLACK, GREY)
-    return {sized.valve.name: palette[row % len(palette)] for row, sized in enumerate(sizing.valves)}
+    return {sized.valve.name: colour for sized, colour in zip(sizing.valves, cycle(COLOURS), strict=False)}
 
 
 def _pressure_panels(sizing: Sizing) -> list[Panel]:
@@ -238,19 +238,20 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
     from ppafo.report.panels import Mark, Panel
     from ppafo.report.style import BLACK, GREY
 
-    limit, colours, ring = sizing.problem.largest_error, _colours(sizing), "chosen pressure"
+    limit, colours = sizing.problem.largest_error, _colours(sizing)
     dotted = {"marker": ".", "markersize": 4}
     ringed = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
-    errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], []
+    errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], list[Mark]()
+    rings = list[Mark]()
     for sized in sizing.valves:
         (pressure, error, gas), colour = sized.curve, colours[sized.valve.name]
         keeps = error <= limit
         errors.append(Mark("line", pressure, error, (), sized.valve.name, colour, dotted))
         gases.append(Mark("line", pressure[keeps], gas[keeps], colour=colour, style=dotted))
         if sized.works:
-            errors.append(Mark("line", [sized.pressure], [sized.error], (), ring, colour, ringed))
+            label = "" if rings else "chosen pressure"
+            rings.append(Mark("line", [sized.pressure], [sized.error], (), label, colour, ringed))
             gases.append(Mark("line", [sized.pressure], [sized.gas], colour=colour, style=ringed))
-            ring = ""
     error_kind, gas_kind = replace(TORQUE, words="RMS error"), Kind("Gas per repetition", "kg", "gas mass", ".3g")
     highest = float(error_kind.values(_MAXIMUM_OF_LIMIT * limit))
 
@@ -264,7 +265,7 @@ def _pressure_panels(sizing: Sizing) -> list[Panel]:
         axes.set_ylim(0.0, highest)
 
     return [
-        Panel(PRESSURE, error_kind, errors, "RMS error, limit dashed", legend="figure", then=set_error),
+        Panel(PRESSURE, error_kind, errors + rings, "RMS error, limit dashed", legend="figure", then=set_error),
         Panel(PRESSURE, gas_kind, gases, "Gas, within the limit", then=set_gas),
     ]
 

@@ -53,31 +53,25 @@ ERROR, GAS = "rms_error", "gas_supplied"
 OSCILLATES = "the torque loop oscillates"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
-STREAMS = 16
-"""Number of noise streams of each trial if sensors are noisy; the streams are the same for all trials."""
+STREAMS, _SEED = 16, 1
+"""Noise streams of each trial if sensors are noisy, and their seed: the same for all trials and pressures."""
 SCALES = (1.0, 8.0, 64.0, 0.125, 0.015625)
 """Common factors [-] on the combinations of gain factors, tried in turn: a slow valve needs other gains for a task."""
-_SEED = 1
-"""Random seed of the noise streams, the same for every pressure."""
 _AT_ONCE = 16_384
 """Number of runs of a batch: enough to occupy all threads with little memory."""
-GRID = 17
-"""Number of supply pressures that are tried in each round of the search."""
-FINENESS = 0.1 * PASCALS_PER_PSI
-"""Tolerance [Pa] of the lowest feasible supply pressure."""
+GRID, FINENESS = 17, 0.1 * PASCALS_PER_PSI
+"""Supply pressures that are tried in each round of the search, and tolerance [Pa] of the lowest feasible one."""
 WIDER = (2.0, 4.0, 16.0)
 """Factors [-] on the valve opening that show whether the flow is the limit."""
 NEAR_CEILING = 1.2
 """Ratio [-] of lowest gauge pressure to ceiling gauge pressure up to which the torque counts as the limit."""
-_LAGS = ("delay", "spool_frequency", "slew_limit", "opening_delay", "closing_delay", "switching_interval")
-LAGS = {f"valve.{name}" for name in _LAGS}
+_MOVES_LATE = ("delay", "spool_frequency", "slew_limit", "opening_delay", "closing_delay", "switching_interval")
+LAGS = {f"valve.{name}" for name in _MOVES_LATE}
 """Numbers of a valve that moves late or slowly; at 0 it moves at once."""
 LEAST_PEAK = 0.7
 """Required share of the peak torque [-]: the RMS error over a mostly zero stride alone would accept half the peak."""
-MORE_PRESSURE = 1.1
-"""Factor on the gauge pressure for the flow margin [-]."""
-OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
-"""Fractions of a valve's opening tried in turn for the flow margin."""
+MORE_PRESSURE, OPENINGS = 1.1, (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
+"""Factor on the gauge pressure for the flow margin, and fractions of the opening tried in turn [-]."""
 _LONG_PERIOD = 5.0
 """Period of a controller that is named among the delays of a loop that does not follow [ms]."""
 Trial = NDArray[np.void]

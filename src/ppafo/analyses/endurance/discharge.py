@@ -110,11 +110,10 @@ class Endurance:
 
 
 class _Interval(NamedTuple):
-    """Interval of a discharge with a constant gas flow ``draw`` [kg/s], from ``start`` to ``end`` [s].
+    """Interval of a discharge with a constant gas flow ``draw`` [kg/s]; ``stopped_by`` is the reason of an early end.
 
-    ``solution`` is the state as a function of time and ``last`` the state at the end; ``stopped_by`` is the reason of
-    an early end, or None. The state consists of mass [kg] and energy [J] of the content, temperature of the wall [K],
-    and the cumulative gas [kg], enthalpy [J] and heat from the room [J] across the boundary.
+    The state is mass [kg] and energy [J] of the content, temperature of the wall [K], and the cumulative gas [kg],
+    enthalpy [J] and heat from the room [J] across the boundary.
     """
 
     start: float

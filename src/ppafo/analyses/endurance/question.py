@@ -34,12 +34,10 @@ WALK_FILE = "walk.json"
 """Name of the file in a result folder that describes a walk."""
 PEAK_WINDOW = 0.1
 """Averaging window [s] for the largest flow of a recording; lines and regulator smooth shorter peaks."""
-_BETWEEN_RESTS, _STRIDE_TIME = 600.0, 1.1
-"""Default walking time between two rests and stride time [s]."""
-_SHORTEST = 1.0
-"""Shortest walking time and simulated time [s]."""
-MAXIMUM_INTERVALS = 2000
-"""Largest number of walking and resting intervals; each is integrated separately."""
+_BETWEEN_RESTS, _STRIDE_TIME, _SHORTEST = 600.0, 1.1, 1.0
+"""Default walking time between two rests, default stride time, shortest walking and simulated time [s]."""
+MAXIMUM_INTERVALS, _MOST_GAS = 2000, 1.0e3
+"""Largest number of walking and resting intervals, which are integrated one by one, and gas of a stride [kg]."""
 _MOST_RETURNED = 0.1
 """Largest fraction of the gas that may flow back; it stays in the line upstream of the valve for the next stride."""
 
@@ -103,6 +101,7 @@ def bottle(
         example = argument_text("gas_per_stride", "0.3 g")
         raise ParameterError(f"give either a recording or {argument_text('gas_per_stride')}, for example {example}")
     schedule, changes = _schedule(walk, rest, longest), tuple(overrides)
+    chosen = PAPER_BOTTLE if bottle is None else bottle
     for override in read_overrides(changes):
         if "gas" in override.typed.split("."):
             raise ParameterError(f"override '{override}': the gas is that of the bottle; choose another bottle")
@@ -115,7 +114,7 @@ def bottle(
             if peak_flow is not None and peak_flow < mean:
                 least = shown_text(mean, "kg/s", ".4g")
                 raise ParameterError(f"{argument_text('peak_flow')}: must be at least the mean flow, {least}")
-            full = load_bottle(PAPER_BOTTLE if bottle is None else bottle, changes)
+            full = load_bottle(chosen, changes)
             found = discharge(full, gas_per_stride, time, mean if peak_flow is None else peak_flow, schedule)
         return _finding({"": replace(found, shown={**found.shown, **units})})
     if peak_flow is not None:
@@ -132,7 +131,7 @@ def bottle(
             found = _on_walk(*walked, bottle, schedule, changes)
         else:
             name = use.label if isinstance(use, Recording) else str(use)
-            found = _of_recording(use, stride_time, bottle, schedule, changes)
+            found = _of_recording(use, stride_time, chosen, schedule, changes)
         # Walks of one scenario with other overrides have one name.
         alike = sum(other == name or other.startswith(f"{name} (") for other in results)
         results[f"{name} ({alike + 1})" if alike else name] = found
@@ -175,7 +174,7 @@ def gas_of_walk(walk: WalkResult | Path) -> tuple[Scenario, Recording, float]:
     configuration, gas = table_at(file, document, "configuration"), table_at(file, document, "metrics", "gas")
     amount = gas.get("value", 0.0)
     content, overrides, source = configuration.get("content"), configuration.get("overrides"), configuration.get("file")
-    is_stated = isinstance(source, str | None) and isinstance(amount, int | float) and not isinstance(amount, bool)
+    is_stated = isinstance(source, str | None) and isinstance(amount, int | float) and abs(amount) < _MOST_GAS
     if not (is_stated and isinstance(content, dict) and isinstance(overrides, list)):
         raise DataError(f"{file}: does not state the walk and its gas; repeat it with 'ppafo walk'")
     with refused_as(DataError, f"{file}: the walk cannot be repeated", PpafoError):
@@ -246,7 +245,7 @@ def _on_walk(
 def _of_recording(
     use: str | Path | Recording,
     stride_time: float | None,
-    bottle: str | Path | None,
+    bottle: str | Path,
     schedule: Schedule,
     overrides: Sequence[str],
 ) -> Endurance:
@@ -256,7 +255,7 @@ def _of_recording(
     sets it.
     """
     from ppafo.analyses.endurance.discharge import discharge
-    from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
+    from ppafo.parameters.bottles.bottle import load_bottle
     from ppafo.parameters.parameter_set import SOURCE
     from ppafo.report.stored_figure import stated_units, table_at
     from ppafo.signals import Recording
@@ -265,8 +264,7 @@ def _of_recording(
     from ppafo.storage.result_folder import RUN_FILE
     from ppafo.walking.bottle.supply import SET_PRESSURE, is_of_bottle
 
-    chosen = PAPER_BOTTLE if bottle is None else bottle
-    full, units = load_bottle(chosen, overrides), dict[str, str]()
+    full, units = load_bottle(bottle, overrides), dict[str, str]()
     recording = use if isinstance(use, Recording) else read_recording(Path(use))
     run = Path() if isinstance(use, Recording) else Path(use) / RUN_FILE
     if run.is_file():
@@ -279,10 +277,10 @@ def _of_recording(
                 f"{run}: the device uses gas of {GRAMS_PER_KILOGRAM * molar_mass:.4g} g/mol, but bottle '{full.name}' "
                 f"contains {full.fluid.name}; choose another (ppafo bottle --list), or set gas.species of the device"
             )
-        is_own = Path(chosen).suffix == ".toml" or full.entries[SET_PRESSURE].source == SOURCE
+        is_own = Path(bottle).suffix == ".toml" or full.entries[SET_PRESSURE].source == SOURCE
         if isinstance(pressure, float) and not is_own and not math.isclose(pressure, full.regulator.set_pressure):
             with shown_in(units):
-                full = load_bottle(chosen, [*overrides, f"{SET_PRESSURE}={written_text(pressure, 'Pa_a')}"])
+                full = load_bottle(bottle, [*overrides, f"{SET_PRESSURE}={written_text(pressure, 'Pa_a')}"])
     use_of_gas = *gas_of_recording(recording, stride_time), schedule
     found = discharge(full, *use_of_gas, f"recording '{recording.label}', {recording.kind}, repeated")
     counted = "repetition" if stride_time is None else "stride"
