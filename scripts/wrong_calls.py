@@ -1,6 +1,6 @@
 """Calls of the public functions with values that no argument takes: which are accepted, and which errors name it not.
 
-    python scripts/wrong_calls.py                 3,075 calls, drawn with seed 1
+    python scripts/wrong_calls.py                 3,075 of 4,500 calls, drawn with seed 1
     python scripts/wrong_calls.py --calls 300     fewer of them
     python scripts/wrong_calls.py --show          each accepted call, and each error that does not name the argument
 
@@ -18,17 +18,30 @@ import sys
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from datetime import timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pint
+import xarray
 
 import ppafo
+from ppafo.wording import one_line
 
-SEED, CALLS, SECONDS = 1, 3075, 20
+SEED, CALLS, SECONDS, LONGEST = 1, 3075, 20, 2000
 TASK, SET, STUDY, WALK = "torque-task-proportional", "ppafo2011", "torque-task-uncertainty", "solenoid"
+
+
+def _raising(*names: str, base: type = object) -> Any:
+    """Return an object that raises where it is asked for one of these methods."""
+
+    def raising(*_: object, **__: object) -> Any:
+        raise RuntimeError("first line\nsecond \x1b[31mred" + "d" * 3000)
+
+    return type("Raising\n", (base,), {name: raising for name in names})()
+
 
 WRONG: Mapping[str, Callable[[], Any]] = {
     "None": lambda: None,
@@ -68,6 +81,15 @@ WRONG: Mapping[str, Callable[[], Any]] = {
     "class": lambda: int,
     "ellipsis": lambda: ...,
     "time difference": lambda: timedelta(seconds=1),
+    "raises when asked for an attribute": lambda: _raising("__getattr__"),
+    "raises when iterated": lambda: _raising("__iter__", "__len__", "__repr__"),
+    "raises when made an array": lambda: _raising("__array__", "__float__", "__fspath__"),
+    "dictionary that raises": lambda: _raising("__getitem__", "items", "__iter__", "__repr__", base=dict),
+    "300 letters": lambda: "x" * 300,
+    "100,000 letters": lambda: "x" * 100_000,
+    "escape codes": lambda: "a\n\x1b[31mb.c=1",
+    "array with a unit": lambda: xarray.DataArray(1.0, attrs={"units": "furlong"}),
+    "quantity of pint": lambda: pint.UnitRegistry().Quantity(1.0, "kelvin/mole"),
 }
 """Values by what a list calls them; made anew for each call, as a generator can be gone through once."""
 
@@ -85,7 +107,7 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
     "positive": ("one and a half", "huge"),
     "from zero": ("zero", "one and a half", "huge"),
     "function": ("class",),
-    "path": ("no such name", "no such file", "'False'", "'-3'", "'nan'", "wrong unit"),
+    "path": ("no such name", "no such file", "'False'", "'-3'", "'nan'", "wrong unit", "300 letters", "escape codes"),
     "content": (),
 }
 """The values above that are right, by the kind of an argument; None besides where it is the default."""
@@ -190,7 +212,7 @@ ARGUMENTS: Mapping[str, str] = {
         "columns? progress?"
     ),
     "walk": "scenario overrides gait? bottle? minutes? progress",
-    "workbench": "scenarios overrides",
+    "workbench": "scenarios overrides sliders:names",
 }
 """Arguments of every public function that takes some; ``?`` where None is right too, ``:KIND`` for another kind."""
 
@@ -282,8 +304,10 @@ def tried(call: Call, known: Mapping[str, Function]) -> Outcome:
         with _at_most(SECONDS):
             getattr(ppafo, call.function)(**{**function.given, call.argument: value})
     except ppafo.PpafoError as error:
-        is_named = names(str(error), call.argument) or begins(str(error), value)
-        return Outcome("named" if is_named else "unnamed", str(error))
+        message = str(error)
+        is_clear = message.isprintable() and len(message) < LONGEST
+        is_named = is_clear and (names(message, call.argument) or begins(message, value))
+        return Outcome("named" if is_named else "unnamed", message)
     except _TooLongError:
         return Outcome("accepted", "it runs on")
     except Exception as error:  # whatever else comes is what is counted here
@@ -299,8 +323,8 @@ def names(message: str, argument: str) -> bool:
 
 def begins(message: str, value: Any) -> bool:
     """Tell whether a message begins with the path that was given, the first of several, or a file below that folder."""
-    first = value if isinstance(value, str | Path) else next(iter(value), None) if isinstance(value, Iterable) else None
-    return isinstance(first, str | Path) and re.match(rf"{re.escape(str(first))}[:/,]", message) is not None
+    first = next(iter(value), None) if isinstance(value, list) else value
+    return isinstance(first, str | Path) and re.match(rf"{re.escape(one_line(first))}[:/,]", message) is not None
 
 
 class _TooLongError(Exception):

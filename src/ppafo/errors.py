@@ -1,7 +1,11 @@
 """Exceptions raised intentionally by ppafo, in one class tree, with one-line messages."""
 
 import contextlib
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+
+_LONG_WORD = re.compile(r"([^\s/\\]{60})[^\s/\\]{40,}|(\S{200})\S{400,}")
+"""Word longer than any that this package writes: a name or a value of somebody else."""
 
 
 class PpafoError(Exception):
@@ -13,6 +17,12 @@ class PpafoError(Exception):
 
     parts: tuple[str, ...] = ()
     argument: str = ""
+
+    def __str__(self) -> str:
+        """Return the message on one printable line, whatever it quotes; of a very long word its begin."""
+        text = " ".join(super().__str__().split())
+        printable = (each if each.isprintable() else "\N{REPLACEMENT CHARACTER}" for each in text)
+        return _LONG_WORD.sub(r"\1\2...", "".join(printable))
 
 
 class ArgumentError(PpafoError):

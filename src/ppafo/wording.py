@@ -145,22 +145,22 @@ def set_within(variable: ContextVar[Value], value: Value) -> Iterator[None]:
         variable.reset(token)
 
 
-_Reader = Literal["caller", "function", "command line"]
-_reader: ContextVar[_Reader] = ContextVar("_reader", default="caller")
+Reader = Literal["caller", "function", "command line"]
+_reader: ContextVar[Reader] = ContextVar("_reader", default="caller")
 
 
-def read_by(reader: _Reader) -> AbstractContextManager[None]:
+def read_by(new_reader: Reader) -> AbstractContextManager[None]:
     """Set the reader of messages in a ``with`` block: Python caller, package function, or command line.
 
     Messages name arguments for a Python caller and options on the command line, and neither for a function of the
     package, whose arguments the user never gave.
     """
-    return set_within(_reader, reader)
+    return set_within(_reader, new_reader)
 
 
-def read_by_caller() -> bool:
-    """Return whether messages are for a Python caller, who names arguments."""
-    return _reader.get() == "caller"
+def reader() -> Reader:
+    """Return the reader of messages in force."""
+    return _reader.get()
 
 
 def argument_text(name: str, value: str = "", option: str = "") -> str:

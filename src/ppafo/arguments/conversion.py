@@ -11,6 +11,7 @@ from typing import Any
 from ppafo.arguments.reading import ANY, MAXIMUM_DIGITS, NUMBER, NumberRange, NumberWithUnit, point, task
 from ppafo.errors import ArgumentError
 from ppafo.units import SI
+from ppafo.units.carried import carried
 from ppafo.wording import one_line
 
 _MAXIMUM_LEVELS = 60
@@ -30,9 +31,16 @@ def taken_text(value: Any) -> str:
 def _scalar(value: Any) -> Any:
     """Return an array without axes as a Python value, None if masked or a time; any other value unchanged.
 
-    Otherwise a NumPy time would count as a whole number, and a masked value as the hidden number.
+    Otherwise a NumPy time would count as a whole number, and a masked value as the hidden number. A number that carries
+    a unit becomes the text of both, as a person writes it.
     """
-    if type(value) is float or getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
+    if type(value) is float or isinstance(value, NumberWithUnit):
+        return value
+    if (with_unit := carried(value)) is not None:
+        number = _scalar(with_unit.magnitude)
+        is_number = isinstance(number, numbers.Real) and not isinstance(number, bool)
+        return f"{float(number)!r} {with_unit.unit}" if is_number and with_unit.unit != "1" else number
+    if getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
         return value
     is_hidden = bool(getattr(value, "mask", False))
     return None if is_hidden or getattr(value.dtype, "kind", "") in "mM" else value.item()
@@ -66,9 +74,12 @@ def taken_number(allowed: NumberRange = ANY, read: Callable[[str], float] | None
     """Return a converter of finite numbers in a range, also from NumPy, or of texts converted by ``read``."""
 
     def take(value: Any) -> float:
-        if isinstance(value, str) and read is not None and not NUMBER.fullmatch(value.strip()):
-            return read(taken_text(value))
         number = _scalar(value)
+        if isinstance(number, str) and read is not None and not NUMBER.fullmatch(number.strip()):
+            return read(taken_text(number))
+        if read is not None and carried(value) is not None:
+            # What carries no dimension is no number in SI: a share is one, a mass is not.
+            return read(f"{number!r} 1")
         if isinstance(number, bool) or not isinstance(number, numbers.Real) or not math.isfinite(number):
             raise ValueError
         if float(number) not in allowed:

@@ -6,15 +6,17 @@ TypeError, do the same.
 """
 
 import contextlib
+import errno
 import functools
 import inspect
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from ppafo.arguments.values import AcceptedValues, accepted_values, annotated_parameters, shown
 from ppafo.errors import ArgumentError, PpafoError
-from ppafo.wording import nearest_name, read_by, read_by_caller
+from ppafo.wording import nearest_name, read_by, reader
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -46,16 +48,31 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         # NumPy's usual handling of errors, whatever the host program has set: an underflow is 0, and nothing to raise.
         numpy = sys.modules.get("numpy")
         usual = contextlib.nullcontext() if numpy is None else numpy.errstate(all="warn", under="ignore")
-        is_outermost = read_by_caller()
+        is_outermost, is_inner = reader() == "caller", reader() == "function"
         with usual, read_by("function") if is_outermost else contextlib.nullcontext():
             try:
-                return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
+                with contextlib.nullcontext() if is_inner else _names_of_files(values):
+                    return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
             except PpafoError as error:
                 if is_outermost and error.argument in values:
                     error.args = (f"{error.argument}: {error}",)
                 raise
 
     return call
+
+
+@contextlib.contextmanager
+def _names_of_files(values: Mapping[str, Any]) -> Iterator[None]:
+    """Refuse a name that is too long to be asked whether there is such a file, with the argument that gave it."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        refused = ArgumentError(f"{shown(str(error.filename))} is too long for the name of a file or a folder")
+        name = max(Path(str(error.filename)).parts, key=len)
+        refused.argument = next((argument for argument, value in values.items() if name in str(value)), "")
+        raise refused from error
 
 
 def _values(

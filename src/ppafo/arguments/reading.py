@@ -96,8 +96,8 @@ def number(text: str) -> float:
 
 def fraction(text: str) -> float:
     """Return a number from 0 to 1 from a text such as ``0.02`` or ``2%``; ArgumentError for any other text."""
-    with contextlib.suppress(ValueError):
-        value = float(number_text(text.removesuffix("%"))) / (100.0 if text.endswith("%") else 1.0)
+    with contextlib.suppress(UnitError):
+        value = parse_quantity(text, "")
         if 0.0 <= value <= 1.0:
             return value
     raise ArgumentError(f"{text}: must be a number from 0 to 1, or a percentage")

@@ -1,11 +1,13 @@
 """Conversion of Python arguments, by the annotations that also define the arguments of a command."""
 
 import builtins
+import contextlib
 import dataclasses
 import inspect
 import os
 import reprlib
 import sys
+import traceback
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
@@ -14,7 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from ppafo.arguments.conversion import taken_document, taken_flag, taken_number, taken_text, taken_whole
 from ppafo.arguments.words import Word
-from ppafo.errors import ArgumentError
+from ppafo.errors import ArgumentError, PpafoError
 from ppafo.wording import one_line
 
 _LONGEST = 60
@@ -121,20 +123,38 @@ def _type_text(annotation: Any) -> str:
 class AcceptedValues(NamedTuple):
     """Accepted values of a parameter: their description in messages, and their conversion to the function's value.
 
-    ``take`` is called with the name of the value in messages and the value; it raises ArgumentError if unsuitable.
+    ``convert`` is called with the name of the value in messages and the value.
     """
 
     what: str
-    take: Callable[[str, Any], Any]
+    convert: Callable[[str, Any], Any]
     allows_none: bool = False
+
+    def take(self, name: str, value: Any) -> Any:
+        """Return the converted value. Raises ArgumentError for an unsuitable one, and none that the value raises."""
+        try:
+            return self.convert(name, value)
+        except PpafoError:
+            raise
+        except Exception as error:  # what an object of others does when it is asked for its length is anybody's guess
+            raised = shortened(*traceback.format_exception_only(error))
+            raise ArgumentError(
+                f"{name}={shown(value)}: must be {self.what}; asked for it, it raises {raised}"
+            ) from error
 
 
 def shown(value: Any) -> str:
     """Return a value as quoted in a message: short, on one line."""
-    if isinstance(value, str | bytes | int | float | complex | Path | list | tuple | dict | set | None):
-        text = one_line(repr(value) if isinstance(value, str | Path) else reprlib.repr(value))
-        return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
-    return f"<{type(value).__name__}>"
+    with contextlib.suppress(Exception):  # a subclass of str may have a repr that raises
+        if isinstance(value, str | bytes | int | float | complex | Path | list | tuple | dict | set | None):
+            return shortened(repr(value) if isinstance(value, str | Path) else reprlib.repr(value))
+    return f"<{shortened(type(value).__name__)}>"
+
+
+def shortened(*parts: str) -> str:
+    """Return a text of others on one line, of a long one the begin."""
+    text = one_line(" ".join(parts))
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
 _PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {

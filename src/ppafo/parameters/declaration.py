@@ -18,7 +18,7 @@ from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.effects.kind import Effect
 from ppafo.model.effects.restitution import EFFECT as RESTITUTION
 from ppafo.parameters.device import Actuator, Flow, FootPlate, Friction, Gas, Orifice, SonicOrifice, Supply
-from ppafo.units import from_si, split_pressure_kind, to_si
+from ppafo.units import SI, from_si, split_pressure_kind, to_si
 from ppafo.units.shown import shown_unit
 
 SPECIES_PATH = "gas.species"
@@ -158,6 +158,7 @@ def limits_text(quantity: Quantity, given: str = "") -> str:
 
     The limits are in the unit ``given`` by the user if it is known and fits, else in the display unit.
     """
+    given = quantity.unit if given == SI else given
     unit = given if given and fits(given, quantity.unit) else shown_unit(quantity.unit)
     # The limits of a pressure are absolute; in gauge they would move with the atmosphere.
     unit = f"{split_pressure_kind(unit)[0]}_a" if quantity.unit == "Pa_a" else "" if unit == "1" else unit

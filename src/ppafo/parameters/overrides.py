@@ -55,8 +55,8 @@ class Override(NamedTuple):
     text: str
 
     def __str__(self) -> str:
-        """Return the override as quoted in a message."""
-        return f"{self.typed}={self.text}"
+        """Return the override as quoted in a message; a number of a program without the word that it is in SI."""
+        return f"{self.typed}={self.text.removesuffix(f' {SI}')}"
 
 
 def split_override(override: str, error: type[PpafoError] = ParameterError) -> Override:

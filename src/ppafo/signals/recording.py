@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, refused_as
+from ppafo.errors import DataError, PpafoError, UnitError, refused_as
 from ppafo.units import from_si
-from ppafo.wording import count_of, known_names, nearest_name
+from ppafo.units.carried import carried
+from ppafo.wording import count_of, known_names, nearest_name, one_line
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -28,6 +29,10 @@ PLAIN_NUMBER = "-"
 Between = Literal["hold", "linear"]
 """Interpolation of a channel between samples: previous value, or linear."""
 BETWEEN: tuple[Between, ...] = get_args(Between)
+
+
+_SAME_UNIT = {"1": PLAIN_NUMBER, "Pa_a": "Pa"}
+"""Unit as a channel writes it, by another spelling of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +158,7 @@ class Channel:
 
     def __post_init__(self) -> None:
         # Frozen: what is checked once stays true, and a channel can belong to several recordings.
-        object.__setattr__(self, "values", _read_only(self.values))
+        object.__setattr__(self, "values", _read_only(self.values, self.unit))
         if self.between is not None and self.between not in BETWEEN:
             hint = nearest_name(str(self.between), BETWEEN)
             raise DataError(f"between = {self.between!r} must be {' or '.join(map(repr, BETWEEN))}{hint}")
@@ -190,7 +195,9 @@ class Recording:
 
     def __post_init__(self) -> None:
         # Copies: the caller goes on with an array and a dict of its own.
-        object.__setattr__(self, "time", _read_only(self.time))
+        object.__setattr__(self, "time", _read_only(self.time, TIME_UNIT))
+        if not isinstance(self.channels, Mapping):
+            raise DataError(f"{self.label}: channels must be a dictionary of Channel by name")
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
         if not self.label or not self.label.isprintable():
             raise DataError(f"the label of a recording must be one line of text, not {self.label!r}")
@@ -294,7 +301,7 @@ class Recording:
     def with_channel(self, name: str, values: ArrayLike, unit: str) -> "Recording":
         """Return a copy with a channel added or replaced; a replaced channel keeps its interpolation."""
         between = self.channels[name].between if name in self.channels else None
-        channel = Channel(np.asarray(values, dtype=np.float64), unit, between)
+        channel = Channel(_read_only(values, unit), unit, between)
         return replace(self, channels={**self.channels, name: channel})
 
     def between(self, start: float, end: float) -> "Recording":
@@ -308,7 +315,7 @@ class Recording:
 
     def resample(self, times: ArrayLike) -> "Recording":
         """Return a copy at other times [s] within the time span; each channel is held or linear as declared."""
-        wanted = np.asarray(times, dtype=np.float64)
+        wanted = _read_only(times, TIME_UNIT)
         if wanted.size and (wanted.min() < self.time[0] or wanted.max() > self.time[-1]):
             raise DataError(
                 f"{self.label}: cannot be resampled from {wanted.min():g} s to {wanted.max():g} s; {_span(self)}"
@@ -407,21 +414,35 @@ def _check_finite(recording: Recording, name: str, values: Floats) -> None:
         raise DataError(f"{recording.label}: {name} is {values[index]} at sample {index + 1}, not a finite number")
 
 
-def _read_only(values: ArrayLike) -> Floats:
+def _read_only(values: ArrayLike, unit: str) -> Floats:
+    """Return a copy of numbers in a unit. Raises DataError for others, and for numbers that carry another unit."""
+    try:
+        copy = _numbers(values, unit)
+    except PpafoError:
+        raise
+    except Exception as error:  # what an object of others does when it is asked for an array is anybody's guess
+        raise DataError(f"the values of a channel must be numbers: {one_line(error)}") from error
+    if copy.ndim != 1:
+        raise DataError(f"the values of a channel must be one-dimensional, not an array of {copy.ndim} dimensions")
+    copy.setflags(write=False)
+    return copy
+
+
+def _numbers(values: Any, unit: str) -> Floats:
+    if (with_unit := carried(values)) is not None:
+        if _SAME_UNIT.get(with_unit.unit, with_unit.unit) != _SAME_UNIT.get(unit, unit):
+            raise DataError(
+                f"the values of a channel in '{unit}' carry the unit '{with_unit.unit}': convert them before"
+            )
+        values = with_unit.magnitude
     given = np.ma.asanyarray(values) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
     # NumPy makes numbers of times and texts, and of complex ones their real part.
     if given.dtype.kind not in "biufO":
         raise DataError(f"the values of a channel must be numbers, not {given.dtype}")
-    try:
-        copy = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise DataError(f"the values of a channel must be numbers: {error}") from error
+    copy = np.array(given, dtype=np.float64)
     if isinstance(given, np.ma.MaskedArray):
         # A masked value is none, whatever number stands behind the mask.
         copy[np.ma.getmaskarray(given)] = np.nan
-    if copy.ndim != 1:
-        raise DataError(f"the values of a channel must be one-dimensional, not an array of {copy.ndim} dimensions")
-    copy.setflags(write=False)
     return copy
 
 

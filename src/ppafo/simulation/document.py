@@ -13,6 +13,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.declared import line_of, number_in, value_at
 from ppafo.parameters.overrides import Override
+from ppafo.units import SI
 from ppafo.wording import one_line
 
 REFERENCE_OF = "reference.of"
@@ -56,7 +57,7 @@ class DocumentReader:
         """Return file, key and value as given."""
         value = value_at(self.document, path)
         if path in self.overridden:
-            return f"{self.file}: override {path}={one_line(value)}"
+            return f"{self.file}: override {path}={one_line(value).removesuffix(f' {SI}')}"
         return f"{self.file}: {line_of(self.text, path)}{path} = {quote(value)}"
 
     def refusal(self, path: str, reason: str) -> ScenarioError:

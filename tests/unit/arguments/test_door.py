@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import pint
 import pytest
+import xarray
 
 import ppafo
 from ppafo.arguments import Count, Fraction, Mass, Overrides, Threads, Word, checked
 from ppafo.cli.main import main
-from ppafo.errors import ArgumentError, StudyError
+from ppafo.errors import ArgumentError, DataError, StudyError
 from ppafo.wording import argument_text
 
 TASK = "torque-task-proportional"
@@ -51,6 +53,16 @@ def walked(
             {"overrides": ("a.b=2 mm", "c.d=4.0 SI", "c.e=true", "n=3 SI")},
         ),
         ({"mass": 1, "threads": None}, {"threads": None}),
+        # What carries a unit is converted, whoever's it is.
+        ({"mass": xarray.DataArray(725.0, attrs={"units": "hg"})}, {"mass": 72.5}),
+        ({"mass": pint.UnitRegistry().Quantity(72.5, "kilogram")}, {"mass": 72.5}),
+        ({"mass": pint.UnitRegistry().Quantity(np.array(72500), "g")}, {"mass": 72.5}),
+        ({"mass": ppafo.Metric(72.5, "kg", "")}, {"mass": 72.5}),
+        ({"mass": 1, "share": xarray.DataArray(0.5, attrs={"units": "1"})}, {"share": 0.5}),
+        (
+            {"mass": 1, "overrides": {"valve.area": pint.UnitRegistry().Quantity(3, "mm^2")}},
+            {"overrides": ("valve.area=3.0 mm ** 2",)},
+        ),
     ],
 )
 def test_a_value_arrives_as_the_function_takes_it(given: dict[str, Any], arrived: dict[str, Any]) -> None:
@@ -69,12 +81,32 @@ def test_a_value_arrives_as_the_function_takes_it(given: dict[str, Any], arrived
         ({"mass": 1, "names": ["a", 2]}, "names[1]=2: must be a text"),
         ({"mass": 1, "overrides": {"a": float("nan")}}, "overrides: a = nan: must be a finite number in SI units"),
         ({"mass": 1, "file": ""}, "file='': must be a name or a path"),
+        ({"mass": xarray.DataArray(1.0, attrs={"units": "m"})}, "mass: 1.0 m: unit 'm' does not fit"),
+        ({"mass": xarray.DataArray(1.0, attrs={"units": "1"})}, "mass: 1.0 1: unit '1' does not fit"),
+        ({"mass": 1, "share": pint.UnitRegistry().Quantity(0.5, "kg")}, "share: 0.5 kg: must be a number from 0 to 1"),
+        ({"mass": 1, "draws": pint.UnitRegistry().Quantity(3, "s")}, "draws=<Quantity>: must be a whole number"),
+        ({"mass": "1 kg" + "g" * 10_000}, "mass: 1 kgggg"),
     ],
 )
 def test_another_value_is_refused_by_name(given: dict[str, Any], said: str) -> None:
     with pytest.raises(ArgumentError) as caught:
         walked(**given)
     assert str(caught.value).startswith(said)
+
+
+def test_outputs_of_the_package_keep_their_unit_at_every_door() -> None:
+    result = ppafo.simulate(TASK, ["run.duration=0.3 s"])
+    used = result.metrics["gas_supplied"]
+    table = result.dataset(units={"supplied_mass": "mg"})["supplied_mass"]
+    by_door = [str(ppafo.bottle(gas_per_stride=gas, stride_time=1.0)) for gas in (used, table[-1])]
+    assert by_door == [str(ppafo.bottle(gas_per_stride=f"{used.value!r} kg", stride_time=1.0))] * 2
+    for values in (table, pint.UnitRegistry().Quantity(table.values, "mg")):
+        with pytest.raises(DataError, match="in 'kg' carry the unit 'mg'"):
+            result.recording.with_channel("supplied_mass", values, "kg")
+    same = result.recording.with_channel(
+        "supplied_mass", result.dataset(units={"supplied_mass": "kg"})["supplied_mass"], "kg"
+    )
+    assert same == result.recording
 
 
 def test_a_number_among_overrides_is_in_si_units_and_a_text_has_its_own() -> None:
