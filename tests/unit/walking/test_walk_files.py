@@ -155,18 +155,3 @@ def test_simulate_runs_a_walk_with_its_metrics_and_its_figure(
 def test_every_number_of_a_walk_can_vary_from_either_form(tmp_path: Path) -> None:
     new = load_scenario(written(tmp_path, text_of(NAME) + MOTION))
     assert declared_numbers(new).keys() == declared_numbers(load_scenario(NAME)).keys()
-
-
-def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others() -> None:
-    page = (Path(__file__).parents[3] / "page" / "source" / "following.ts").read_text(encoding="utf-8")
-    terms = [
-        term
-        for name in ppafo.list_walks()
-        for path, links in load_scenario(name).links.items()
-        if path.startswith("controller.")
-        for link in links
-        for term in link.terms
-    ]
-    rules = {f"{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}" for term in terms}
-    assert "default_gains.proportional_gain_of_device" in rules
-    assert {rule for rule in rules if f'"{rule}":' not in page} == set()
