@@ -14,8 +14,10 @@ import re
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -171,10 +173,16 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
         return {"kind": "locked", "angle": f"{angle:.6f} rad"}
 
     def task(
-        name: str, motion: dict[str, Any], law: dict[str, Any], reference: dict[str, Any], valve: str = "prop"
+        name: str,
+        motion: dict[str, Any],
+        law: dict[str, Any],
+        reference: dict[str, Any],
+        valve: str = "prop",
+        small: Sequence[str] = (),
     ) -> DrawnTask:
         duration = 4.0 if name.startswith("angle") else 2.5
         document = _document(file, valve, motion, law, reference, duration, rate)
+        document["device"]["overrides"] = list(small)
         if name.endswith("noise"):
             document["sensors"] = {"angle_noise": "0.05 deg", "pressure_noise": "0.5 kPa_d", "seed": 1}
         return DrawnTask(name, document)
@@ -197,6 +205,7 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
     yield task("dead zone", locked(middle), {"kind": "on_off_dead_zone"}, hold(level))
     gain = {"kind": "pid", "proportional_gain": f"{draw.choice((0.003, 0.3, 30.0)):.3g} 1/(N m)"}
     yield task("gains of another", locked(middle), gain, hold(level))
+    yield from _pulses(draw, partial(task, motion=locked(middle)), device, (base, level, travel), sine)
     gauge = float(device.supply.pressure) - float(device.supply.atmospheric_pressure)
     for name, share in (("pressure", draw.uniform(0.3, 0.8)), ("pressure above supply", 1.3)):
         pressure = {"of": "pressure_1", "kind": "ramp_hold", "ramp_time": "0.3 s", "start_level": "0 Pa_g"}
@@ -216,6 +225,11 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
         believed = {**cascade, "static_torque": f"{share * friction:.6g} N m"}
         yield task(f"angle, friction x {share:g}", free, believed, slow)
     yield task("angle, noise", free, cascade, slow)
+    there_and_back = _table_of((0.5, end), (1.5, end), (2.0, start), first=start, unit="rad")
+    there_and_back = {"of": "angle", "level": "0 rad", **there_and_back}
+    yield task("angle, there and back", free, cascade, there_and_back)
+    stuck = {**cascade, "static_torque": "0 N m", "friction_torque": "0 N m"}
+    yield task("angle, stuck", free, stuck, there_and_back, small=[f"friction.static_torque={2.0 * there:.6g} N m"])
     if back:
         yield task("angle, nothing pulls back", {**free, "external_torque": "0 N m"}, cascade, slow)
     swing = {"of": "angle", "kind": "sine", "level": f"{middle:.6f} rad", "amplitude": f"{0.15 * (high - low):.6f} rad"}
@@ -225,6 +239,54 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
         cascade,
         {**swing, "frequency": f"{draw.uniform(0.2, 1.5):.3g} Hz"},
     )
+
+
+def _pulses(
+    draw: random.Random,
+    task: Callable[..., DrawnTask],
+    device: Any,
+    torques: tuple[float, float, float],
+    sine: Mapping[str, Any],
+) -> Iterator[DrawnTask]:
+    """Give tasks with pulses, tables and ripples, from torque at rest, level and travel of the torque [N m]."""
+    (base, level, travel), pid = torques, {"kind": "pid"}
+    # Up, held, and down again, as in push-off; and what never rests.
+    for name, top, low_end in (
+        ("pulse", level, base),
+        ("trapezoid", level, base + 0.2 * (level - base)),
+        ("pulse beyond", base + 1.5 * travel, base),
+    ):
+        knots = [(0.3, top), (0.3 + draw.uniform(0.3, 0.8), top), (1.4, low_end)]
+        yield task(f"torque {name}", law=pid, reference=_table_of(*knots, first=base))
+    small = _smaller_valve(device, 1.0e-3)
+    yield task(
+        "torque pulse, tiny valve",
+        law=pid,
+        reference=_table_of((0.3, level), (0.7, level), (1.0, base), first=base),
+        small=small,
+    )
+    knots = [(0.4 * number, base + travel * draw.uniform(0.1, 0.7)) for number in range(1, 6)]
+    yield task("torque table", law=pid, reference=_table_of(*knots, first=base))
+    ripple = {**sine, "amplitude": f"{draw.choice((0.001, 0.02, 0.05)) * travel:.6g} N m", "frequency": "2 Hz"}
+    yield task("torque ripple", law=pid, reference=ripple)
+    weak = {"kind": "pid", "proportional_gain": f"{1.0 / travel:.4g} 1/(N m)", "integral_gain": "0 1/(N m s)"}
+    yield task("torque ripple, dead band", law=weak, reference=ripple, small=["valve.dead_band=0.3"])
+
+
+def _table_of(*knots: tuple[float, float], first: float = 0.0, unit: str = "N m") -> dict[str, Any]:
+    """Reference that goes once from knot to knot, times [s] and values, and stays at the last one."""
+    found = {"kind": "tabulated", "period": "100 s", "value_01": f"{first:.6g} {unit}"}
+    for number, (time, value) in enumerate((*knots, (99.0, knots[-1][1])), 2):
+        found |= {f"time_{number:02}": f"{time:.4g} s", f"value_{number:02}": f"{value:.6g} {unit}"}
+    return found
+
+
+def _smaller_valve(device: Any, share: float) -> list[str]:
+    """Overrides that reduce the orifice of a valve to a share [-]."""
+    orifice = device.valve.orifice
+    if hasattr(orifice, "sonic_conductance"):
+        return [f"valve.sonic_conductance={share * orifice.sonic_conductance!r} m^3/(s Pa)"]
+    return [f"valve.area={share * orifice.area!r} m^2"]
 
 
 def _middle(file: Path) -> dict[str, Any]:
@@ -255,8 +317,28 @@ def _document(
     }
 
 
+def judge_table(result: Result) -> str:
+    """Judge a run whose reference goes from knot to knot: each rest of 0.2 s or more by its last third, all by RMS."""
+    recording, of = result.recording, result.scenario.controlled
+    reference = recording["reference" if of == "torque" else f"reference_{of}"]
+    start = 0.0 if of == "torque" else float(recording[of][0])
+    change = float(np.max(np.abs(reference - start)))
+    error = (recording[of] - reference) / change
+    moves = np.flatnonzero(np.abs(np.diff(reference)) > 1.0e-9 * change)
+    ends = [-1, *moves.tolist(), reference.size - 1]
+    measures = [float(np.sqrt(np.mean(error**2))) / 0.2]
+    for first, last in pairwise(ends):
+        if last - first > 100:
+            part = error[first + 1 + 2 * (last - first) // 3 : last]
+            measures.append(max(float(np.mean(np.abs(part))) / _MEAN, 0.5 * float(np.ptp(part)) / _HALF_RANGE))
+    measure = max(measures)
+    return GOOD if measure < 1.0 / _BAND else FAILS if measure > _BAND else BETWEEN
+
+
 def judge(result: Result, only_switches: bool) -> str:
     """Judge a run by its last third, an angle's swing by half of the hold: good, failing, or between."""
+    if result.scenario.reference.kind == "tabulated":
+        return judge_table(result)
     recording, of = result.recording, result.scenario.controlled
     reference = recording["reference" if of == "torque" else f"reference_{of}"]
     value = recording[of]
@@ -292,7 +374,7 @@ def judge(result: Result, only_switches: bool) -> str:
 
 def printed_remedy(sentence: str) -> list[str]:
     """Overrides of the remedy that a sentence prints as tried; none where it prints none."""
-    found = re.search(r"; with overrides=(.*) it follows, as a further run shows", sentence)
+    found = re.search(r"with overrides=(.*) it follows, as a further run shows", sentence)
     return [] if found is None else list(ast.literal_eval(found[1]))
 
 
@@ -337,7 +419,7 @@ def _outcome(task: DrawnTask) -> dict[str, Any]:
         return {"judged": "diverged", "sentence": result.status.message}
     verdict = tried(scenario, result.tracking)
     found: dict[str, Any] = {"judged": judge(result, task.only_switches), **_angle_errors(result)}
-    if verdict is None:
+    if not verdict.fails:
         return found
     remedy = printed_remedy(verdict.sentence)
     found |= {"said": True, "sentence": verdict.sentence, "printed": bool(remedy)}

@@ -169,10 +169,6 @@ def _changed_tables(scenario: Scenario) -> Iterator[str]:
         device = changed.document.setdefault("device", {})
         words = [override.words for override in changed.device]
         device["overrides"] = list(over(device.get("overrides", ()), words, valve=scenario.device.valve_name))
-    reference = changed.document.get("reference", {})
-    if not scenario.beyond_reach and "beyond_reach" in reference:
-        # A reference that was beyond reach on purpose no longer is, and a check of the run may fail again.
-        changed.document["reference"] = {name: value for name, value in reference.items() if name != "beyond_reach"}
     for name, table in changed.document.items():
         if table == given.document.get(name):
             continue

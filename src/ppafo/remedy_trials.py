@@ -25,14 +25,14 @@ _LESS_ERROR = 0.5
 """Remaining error divided by the original one, below which a remedy that does not suffice is reported [-]."""
 
 
-def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
+def tried(scenario: Scenario, verdict: "Tracking") -> "Tracking":
     """Return a tracking verdict with the first remedy that succeeds in a simulation.
 
     Remedies are the overrides named in the verdict. If only a remedy of a less certain cause succeeds, that cause
     becomes the cause of the verdict. If none succeeds, the verdict gets the remedy with the smallest remaining error
     (of a walk: in its first strides), provided that this is less than half of the original one.
     """
-    if verdict is None or verdict.accepted:
+    if not verdict.is_useless:
         return verdict
     # What was changed in Python would be lost with overrides.
     is_of_file = replace(reloaded(scenario, ()), run=scenario.run) == scenario
@@ -44,7 +44,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     except PpafoError:
         return verdict
     for cause, remedy, left in judged:
-        if left is None:
+        if left.follows:
             # A number that was tried is one of many; a kind is none.
             example = "for example, " * any(".kind=" not in text for text in remedy.overrides)
             # Pressures are computed for more torque than is requested, but not for more angle.
@@ -52,23 +52,22 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
             margin = ", with a margin" * has_margin
             text = f"{example}with {remedy.text} it follows, as a further run shows{margin}"
             return replace(verdict, cause=cause, tried=text, mended=remedy.overrides if is_of_file else ())
-    of_cause = [(remedy, left.error) for cause, remedy, left in judged if left and cause == verdict.cause]
+    of_cause = [(remedy, left.error) for cause, remedy, left in judged if left.fails and cause == verdict.cause]
     strides = "" if _first_strides(scenario) is scenario else f" in the first {_STRIDES_TRIED:.0f} strides"
     return replace(verdict, tried=_remainder_text(verdict, of_cause, strides))
 
 
-def _judged(trials: "list[tuple[str, Remedy, Scenario]]") -> "Iterator[tuple[str, Remedy, Tracking | None]]":
+def _judged(trials: "list[tuple[str, Remedy, Scenario]]") -> "Iterator[tuple[str, Remedy, Tracking]]":
     """Yield cause, remedy and verdict of the trials up to the first that follows; not of a run without a verdict."""
-    from ppafo.simulation.tracking.verdict import is_undecided
-
     results = of_loaded.simulate_many([_first_strides(changed) for _, _, changed in trials])
     for (cause, remedy, changed), early in zip(trials, results, strict=True):
         # What follows in the first strides of a walk need not follow in the later ones.
-        is_early = early.scenario.run.duration < changed.run.duration and early.tracking is None
+        is_early = early.scenario.run.duration < changed.run.duration and early.tracking.follows
         result = of_loaded.simulate_many([changed])[0] if is_early else early
-        if result.status.is_completed and not is_undecided(result):
-            yield cause, remedy, result.tracking
-            if result.tracking is None:
+        tracking = result.tracking
+        if tracking.follows is not None:
+            yield cause, remedy, tracking
+            if tracking.follows:
                 return
 
 
@@ -109,7 +108,8 @@ def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]", s
     best, error = min(errors, key=lambda pair: pair[1], default=(None, verdict.error))
     if best is not None and error < _LESS_ERROR * verdict.error:
         with shown_in(verdict.units):
-            left = f"an RMS error of {change_text(verdict.controlled, error)} is left{time_text(verdict.since)}"
+            times = time_text(verdict.since, verdict.until)
+            left = f"an RMS error of {change_text(verdict.controlled, error)} is left{times}"
         return f"with {best.text} {left}{strides}, as a further run shows"
     names = ", ".join(dict.fromkeys(each.partition("=")[0] for remedy in verdict.remedies for each in remedy.overrides))
     if not names:

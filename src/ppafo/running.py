@@ -53,7 +53,7 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
     return replace(of_loaded.simulate(scenario_or_load(scenario, overrides)), tries=_tried)
 
 
-def _tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
+def _tried(scenario: Scenario, verdict: "Tracking") -> "Tracking":
     """Return a verdict with the first of its remedies that succeeds in a further run."""
     from ppafo.remedy_trials import tried
 

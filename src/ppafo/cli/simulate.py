@@ -54,14 +54,13 @@ def simulate(
         report = assessed(run_scenario(loaded), check)
         tracking, changed = report.tracking, list(changes_in(loaded))
         # A reference that is not followed makes the result useless, and a check fails.
-        is_useless = tracking is not None and tracking.is_useless
-        passes = report.check is None or (report.check.is_determined and not is_useless)
+        passes = report.check is None or (report.check.is_determined and tracking.passes)
         return CommandOutput(
             _text(report),
             {
                 "scenario": loaded.name,
                 "status": plain(report.result.status),
-                "tracking": None if tracking is None else {**plain(tracking), "sentence": tracking.sentence},
+                "tracking": {**plain(tracking), "sentence": tracking.sentence},
                 "gains": plain(report.gains),
                 "metrics": {name: plain(metric) for name, metric in report.result.metrics.items()},
                 **({"overrides": changed} if changed else {}),
@@ -82,7 +81,7 @@ class _RunReport:
     result: "Result"
     check: "Check | None"
     error: "ErrorEstimate | None"
-    tracking: "Tracking | None"
+    tracking: "Tracking"
     verdict: list[str]
     gains: "Gains | None"
 
@@ -91,7 +90,7 @@ class _RunReport:
         """Command, and file tables, with the remedy that makes the run follow; empty without a remedy."""
         from ppafo.loading import reloaded, usage_text
 
-        mended = () if self.tracking is None else self.tracking.mended
+        mended = self.tracking.mended
         return [usage_text(reloaded(self.result.scenario, mended))] if mended else []
 
 

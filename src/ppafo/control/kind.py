@@ -94,7 +94,7 @@ class ProfileKind:
     rises, only falls or is constant, so that its extremes over an interval are at both ends. ``is_smooth`` is True for
     a profile without corners: a corner in the motion of the shank would be an impact on the foot.
     ``until_jump(parameters, time)`` returns the time [s], above 0, until the next jump of the second derivative of a
-    smooth profile; None without jumps. ``period(parameters)`` returns the period [s] of a table; None for others.
+    smooth profile; None without jumps. ``period(parameters)`` returns the period [s]; None without one.
     """
 
     name: str

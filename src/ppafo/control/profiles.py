@@ -7,6 +7,9 @@ from ppafo.control.kind import ProfileKind
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 
+NEVER = 1.0e6
+"""Time [s] of a knot that is not used, and period of a sine that does not move."""
+
 
 class ConstantProfile(NamedTuple):
     """Constant reference, in the unit of the prescribed quantity."""
@@ -94,6 +97,11 @@ def sine_bounds(profile: Sine) -> tuple[float, float]:
     return profile.level - swing, profile.level + swing
 
 
+def sine_period(profile: Sine) -> float:
+    """Return the period of a sine [s]."""
+    return 1.0 / max(profile.frequency, 1.0 / NEVER)
+
+
 SINE = ProfileKind(
     name="sine",
     summary="A sine about a mean level.",
@@ -103,13 +111,12 @@ SINE = ProfileKind(
     bounds=sine_bounds,
     differences=("amplitude",),
     is_smooth=True,
+    period=sine_period,
 )
 
 
 KNOTS = 32
 """Number of knots in the table; the first knot is at time 0."""
-NEVER = 1.0e6
-"""Time [s] of a knot that is not used."""
 
 
 class Knot(NamedTuple):

@@ -288,6 +288,11 @@ class Program:
         return any(kind.needs_course for kind in self.meters)
 
     @property
+    def needs_parts(self) -> bool:
+        """True if a meter needs the rests and moves of the reference."""
+        return any(kind.needs_parts for kind in self.meters)
+
+    @property
     def is_parted(self) -> bool:
         """True if a step may be divided into parts."""
         return self.is_adaptive or self.samples_inside or self.late_commands or self.late_signals or self.valve.jumps

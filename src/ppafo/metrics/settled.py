@@ -1,9 +1,11 @@
-"""Settled part of a run without recording: numbers for the tracking verdict.
+"""Parts of a reference, rests and moves, in a run without recording: numbers for the tracking verdict.
 
-The settled part is the second half of the hold, or of a run that repeats its reference or rests for less than a tenth.
-These numbers are for verdicts only: no table and no study lists them.
+Judged are the second half of each rest and the whole of each move; of a move at the start of a run, what follows once
+the value has met the reference, and of a reference that repeats, the second half of the run. The last part and the
+worst of the earlier ones are kept. These numbers are for verdicts only: no table and no study lists them.
 """
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -12,36 +14,119 @@ import numpy as np
 from ppafo.metrics.command import Reversals, is_torque_requested, start_reversals, update_reversals
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
-from ppafo.model.columns import larger
+from ppafo.model.columns import choose, larger, smaller
+from ppafo.model.helping import PUSH_OFF
 from ppafo.signals.meter import REQUESTED, WALK, MeterKind, ReferenceSummary, Sample
 
-SHORTEST_HOLD = 0.1
-"""Shortest hold accepted for a verdict, as a fraction of the run [-]."""
+LARGEST_SHARE = 0.05
+"""RMS error at rest divided by the wanted change, above which a law with gradual openings does not follow [-]."""
+LARGEST_LAG = 0.15
+"""Further error divided by the wanted change that a moving reference, or a joint that is moved, allows at most [-]."""
+LAG_TIME = 0.2
+"""Lag behind a moving reference that is allowed beside the error at rest [s]."""
+RETURNING = 20.0
+"""Share of the error of a quick move that counts, divided by the share of its path that leads back [-]."""
+LAG_OF_JOINT = 0.6
+"""Lag that a moving joint allows, divided by its speed and the wanted change [s/rad]."""
+LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
+"""Largest range of the error of an angle at rest [rad], or divided by the way of the reference [-] if that is more."""
+SUSTAINED = 4
+"""Number of reversals on the hold from which a loop counts as oscillating; settling takes one or two."""
+_TINY = 1.0e-300
+"""Divisor in place of 0."""
 
 
-class _SettledSums(NamedTuple):
-    """State of the settled meter: sums and extremes of error, reference, angle and controlled quantity.
+class PartSums(NamedTuple):
+    """Sums over the judged samples of a part of the reference that begins with sample ``start``.
 
-    ``squares`` is the sum of squared errors, ``total`` the sum of errors, ``taken`` the number of samples,
-    ``reference_squares`` and ``reference_total`` the sums for the reference less ``begun``, ``swing`` the reversal
-    state of the error, ``lowest_error`` and ``highest_error`` the extremes of the error, ``command`` the reversals of
-    the command in the last half of the settled part, and ``lowest_angle`` and ``highest_angle`` the extremes of the
-    angle [rad]. ``begun`` is the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is
+    ``rests`` is 1 for a rest, 0 for a move. ``squares`` is the sum of squared errors, ``total`` the sum of errors,
+    ``taken`` the number of samples, ``reference_squares`` and ``reference_total`` the sums for the reference less the
+    initial value, ``lag_squares`` and ``lag_total`` those of the allowed lag, ``swing`` the reversal state of the
+    error, ``lowest_error`` and ``highest_error`` its extremes. ``first`` and ``last`` are the reference before the part
+    and at its end, and ``path`` is the sum of its changes in between, without their sign.
+    """
+
+    start: float = 0.0
+    rests: float = 0.0
+    squares: float = 0.0
+    total: float = 0.0
+    taken: float = 0.0
+    reference_squares: float = 0.0
+    reference_total: float = 0.0
+    lag_squares: float = 0.0
+    lag_total: float = 0.0
+    swing: Swing = Swing(0.0, UNDECIDED, 0.0)
+    lowest_error: float = 0.0
+    highest_error: float = 0.0
+    first: float = 0.0
+    last: float = 0.0
+    path: float = 0.0
+
+
+def judged_share(first: Floats, last: Floats, path: Floats) -> Floats:
+    """Share of the error of a quick move that counts [-]: 0 on a ramp, on which every loop is behind, 1 of a wave."""
+    share: Floats = choose(path > 0.0, RETURNING * (1.0 - abs(last - first) / larger(path, _TINY)), 0.0)
+    limited: Floats = smaller(share, 1.0)
+    return limited
+
+
+def badness(part: PartSums, course: ReferenceSummary) -> float:
+    """Squared ratio of the largest number of a part to its limit, by which the worst of the earlier parts is chosen."""
+    way, taken = max(course.largest, _TINY), max(part.taken, 1.0)
+    lag_squares, share = part.lag_squares / taken, LARGEST_SHARE * way
+    allowed = share * share + 2.0 * share * part.lag_total / taken + lag_squares
+    returns = min(RETURNING * (1.0 - abs(part.last - part.first) / max(part.path, _TINY)), 1.0)
+    ramp = 1.0 - lag_squares / (LARGEST_LAG * way * LARGEST_LAG * way)
+    weight = 1.0 if part.rests > 0.0 else max(returns, ramp)
+    error = weight * weight * part.squares / taken / allowed
+    turns = float(int(max(abs(part.swing.turns) - 1.0, 0.0))) / SUSTAINED
+    # Of an angle at rest the range has a limit, too.
+    span = (part.highest_error - part.lowest_error) / max(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * way)
+    swing = max(turns * turns, span * span * (1.0 - course.of_joint))
+    return max(error, swing) if part.rests > 0.0 else error
+
+
+def chosen_part(is_worse: bool, part: PartSums, other: PartSums) -> PartSums:
+    """Return a part if it is worse, else the other one."""
+    return PartSums(
+        start=part.start if is_worse else other.start,
+        rests=part.rests if is_worse else other.rests,
+        squares=part.squares if is_worse else other.squares,
+        total=part.total if is_worse else other.total,
+        taken=part.taken if is_worse else other.taken,
+        reference_squares=part.reference_squares if is_worse else other.reference_squares,
+        reference_total=part.reference_total if is_worse else other.reference_total,
+        lag_squares=part.lag_squares if is_worse else other.lag_squares,
+        lag_total=part.lag_total if is_worse else other.lag_total,
+        swing=Swing(
+            part.swing.play if is_worse else other.swing.play,
+            part.swing.turns if is_worse else other.swing.turns,
+            part.swing.highest if is_worse else other.swing.highest,
+        ),
+        lowest_error=part.lowest_error if is_worse else other.lowest_error,
+        highest_error=part.highest_error if is_worse else other.highest_error,
+        first=part.first if is_worse else other.first,
+        last=part.last if is_worse else other.last,
+        path=part.path if is_worse else other.path,
+    )
+
+
+class SettledSums(NamedTuple):
+    """State of the settled meter: present part of the reference, and the worst of the earlier ones.
+
+    ``waits`` is 1 while the present rest is in its first half, ``lagged`` a moving reference with the allowed lag,
+    ``met`` 1 once the value has met the reference, and ``command`` the reversals of the command in the last quarter of
+    run or hold. ``begun`` is the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is
     1 once the value has been at or below the reference, and ``top`` the highest value since then; ``met_downwards`` and
     ``bottom`` are the reverse.
     """
 
-    squares: float
-    total: float
-    taken: float
-    reference_squares: float
-    reference_total: float
-    swing: Swing
-    lowest_error: float
-    highest_error: float
+    part: PartSums
+    worst: PartSums
+    waits: float
+    lagged: float
+    met: float
     command: Reversals
-    lowest_angle: float
-    highest_angle: float
     begun: float
     lowest: float
     highest: float
@@ -51,22 +136,35 @@ class _SettledSums(NamedTuple):
     bottom: float
 
 
-def start_settled(course: ReferenceSummary, sample: Sample) -> _SettledSums:
+def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
     """Start the settled meter at the first sample."""
-    value = sample.value
-    error = value - sample.reference
-    return _SettledSums(
-        squares=error * error,
-        total=error,
-        taken=1.0,
-        reference_squares=error * error,
-        reference_total=-error,
-        swing=Swing(error, UNDECIDED, error),
-        lowest_error=error,
-        highest_error=error,
+    value, reference = sample.value, sample.reference
+    error = value - reference
+    return SettledSums(
+        part=PartSums(
+            start=0.0,
+            rests=0.0,
+            squares=error * error,
+            total=error,
+            taken=1.0,
+            reference_squares=error * error,
+            reference_total=-error,
+            lag_squares=0.0,
+            lag_total=0.0,
+            swing=Swing(error, UNDECIDED, error),
+            lowest_error=error,
+            highest_error=error,
+            first=reference,
+            last=reference,
+            path=0.0,
+        ),
+        worst=PartSums(
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, Swing(0.0, UNDECIDED, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0
+        ),
+        waits=0.0,
+        lagged=reference,
+        met=1.0 if abs(error) <= LARGEST_SHARE * course.largest else 0.0,
         command=start_reversals(course, sample),
-        lowest_angle=sample.angle,
-        highest_angle=sample.angle,
         begun=value,
         lowest=value,
         highest=value,
@@ -77,46 +175,77 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> _SettledSums:
     )
 
 
-def update_settled(state: _SettledSums, course: ReferenceSummary, sample: Sample) -> _SettledSums:
-    """Update the settled meter with a sample; its sums restart at half of the run and at half of the hold.
+def allowed_lag(course: ReferenceSummary, lag: float, speed: float) -> float:
+    """Error allowed beside that at rest, for a reference ``lag`` ahead of a late one, and a joint's speed [rad/s]."""
+    of_joint = course.of_joint * LAG_OF_JOINT * abs(speed) * course.largest
+    return min(abs(lag) + of_joint, LARGEST_LAG * course.largest)
 
-    Reversals of the command restart at three quarters, too: a loop that has come to rest by then does not oscillate.
-    """
-    value = sample.value
-    error = value - sample.reference
+
+def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, lag: float) -> PartSums:
+    """Return the sums of the present part with a sample, anew where the part begins or is not judged yet."""
+    before, error, reference = state.part, sample.value - sample.reference, sample.reference
     # From the initial value, or the square of a pressure would hide its change.
-    ahead = sample.reference - state.begun
-    # The first sample of a half is that from which on twice its number is at least this.
-    of_run, of_hold = course.samples - 1.0, course.hold_start + course.samples - 1.0
-    twice = 2.0 * sample.number
-    is_hold = course.is_repeated == 0.0 and is_long_enough(course.hold_start, course.samples)
-    rests = course.hold_start <= sample.number and is_hold
-    half_of_run = twice >= of_run and twice < of_run + 2.0
-    half_of_hold = rests and twice >= of_hold and twice < of_hold + 2.0
-    anew = half_of_run or half_of_hold
-    last_of_run, last_of_hold = 3.0 * of_run, course.hold_start + 3.0 * of_run
-    fourfold = 4.0 * sample.number
-    in_last_half = (fourfold >= last_of_run and fourfold < last_of_run + 4.0) or (
-        rests and fourfold >= last_of_hold and fourfold < last_of_hold + 4.0
-    )
-    swing = next_swing(state.swing, error, OSCILLATION_THRESHOLD * course.largest)
-    command = update_reversals(state.command, course, sample)
-    met_upwards = 1.0 if state.met_upwards > 0.0 or error <= 0.0 else 0.0
-    met_downwards = 1.0 if state.met_downwards > 0.0 or error >= 0.0 else 0.0
-    return _SettledSums(
-        squares=error * error + (0.0 if anew else state.squares),
-        total=error + (0.0 if anew else state.total),
-        taken=1.0 if anew else state.taken + 1.0,
-        reference_squares=ahead * ahead + (0.0 if anew else state.reference_squares),
-        reference_total=ahead + (0.0 if anew else state.reference_total),
+    ahead = reference - state.begun
+    is_new = course.part_start != before.start or course.rests != before.rests
+    twice, of_run = 2.0 * sample.number, course.samples - 1.0
+    is_first = course.part_start == 0.0 and course.rests == 0.0
+    is_half = course.is_repeated > 0.0 and twice >= of_run and twice < of_run + 2.0
+    meets = state.met == 0.0 and abs(error) <= LARGEST_SHARE * course.largest and twice < of_run
+    anew = is_new or state.waits > 0.0 or (is_first and (is_half or meets))
+    swing = next_swing(before.swing, error, OSCILLATION_THRESHOLD * course.largest)
+    return PartSums(
+        start=course.part_start,
+        rests=course.rests,
+        squares=error * error + (0.0 if anew else before.squares),
+        total=error + (0.0 if anew else before.total),
+        taken=1.0 if anew else before.taken + 1.0,
+        reference_squares=ahead * ahead + (0.0 if anew else before.reference_squares),
+        reference_total=ahead + (0.0 if anew else before.reference_total),
+        lag_squares=lag * lag + (0.0 if anew else before.lag_squares),
+        lag_total=lag + (0.0 if anew else before.lag_total),
         swing=Swing(
             error if anew else swing.play, UNDECIDED if anew else swing.turns, error if anew else swing.highest
         ),
-        lowest_error=error if anew else min(state.lowest_error, error),
-        highest_error=error if anew else max(state.highest_error, error),
-        command=Reversals(command.way, command.task, 0.0 if anew or in_last_half else command.turns),
-        lowest_angle=sample.angle if anew else min(state.lowest_angle, sample.angle),
-        highest_angle=sample.angle if anew else max(state.highest_angle, sample.angle),
+        lowest_error=error if anew else min(before.lowest_error, error),
+        highest_error=error if anew else max(before.highest_error, error),
+        first=before.last if is_new else before.first,
+        last=reference,
+        path=abs(reference - before.last) + (0.0 if is_new else before.path),
+    )
+
+
+def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample) -> SettledSums:
+    """Update the settled meter with a sample; a part that ends is kept if it is the worst so far.
+
+    Reversals of the command count from three quarters on: a loop that has come to rest by then does not oscillate.
+    """
+    value = sample.value
+    error = value - sample.reference
+    of_run, of_hold = 3.0 * (course.samples - 1.0), course.hold_start + 3.0 * (course.samples - 1.0)
+    fourfold = 4.0 * sample.number
+    in_last_half = (fourfold >= of_run and fourfold < of_run + 4.0) or (
+        course.hold_start <= sample.number and fourfold >= of_hold and fourfold < of_hold + 4.0
+    )
+    command = update_reversals(state.command, course, sample)
+    met_upwards = 1.0 if state.met_upwards > 0.0 or error <= 0.0 else 0.0
+    met_downwards = 1.0 if state.met_downwards > 0.0 or error >= 0.0 else 0.0
+    late = state.lagged + (sample.reference - state.lagged) * course.interval / (LAG_TIME + course.interval)
+    lagged = sample.reference if course.rests > 0.0 else late
+    lag = allowed_lag(course, sample.reference - lagged, sample.angular_velocity)
+    before = state.part
+    ends = (course.part_start != before.start or course.rests != before.rests) and (
+        before.rests > 0.0 or before.path > 0.0
+    )
+    # At the start of a run the value may be on its way yet.
+    is_begun = before.start > 0.0 or state.met > 0.0
+    is_worse = ends and is_begun and badness(before, course) > badness(state.worst, course)
+    return SettledSums(
+        part=next_part(state, course, sample, lag),
+        worst=chosen_part(is_worse, before, state.worst),
+        waits=course.in_first_half,
+        lagged=lagged,
+        met=1.0 if state.met > 0.0 or abs(error) <= LARGEST_SHARE * course.largest else 0.0,
+        command=Reversals(command.way, command.task, 0.0 if in_last_half else command.turns),
         begun=state.begun,
         lowest=min(state.lowest, value),
         highest=max(state.highest, value),
@@ -127,13 +256,7 @@ def update_settled(state: _SettledSums, course: ReferenceSummary, sample: Sample
     )
 
 
-def is_long_enough(hold_start: float, samples: float) -> bool:
-    """Return whether the hold of a reference, from sample ``hold_start`` on, is long enough for a verdict."""
-    length = samples - 1.0 - hold_start
-    return length >= 1.0 and length >= SHORTEST_HOLD * (samples - 1.0)
-
-
-SETTLED = MeterKind("settled", _SettledSums, start_settled, update_settled, True)
+SETTLED = MeterKind("settled", SettledSums, start_settled, update_settled, needs_course=True, needs_parts=True)
 
 
 def farther(highest: Floats, lowest: Floats) -> Floats:
@@ -144,53 +267,60 @@ def farther(highest: Floats, lowest: Floats) -> Floats:
 
 def deviation(squares: Floats, total: Floats, count: Floats) -> Floats:
     """Standard deviation from sum of squares, sum and number of samples."""
+    count = larger(count, 1.0)
     return np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0))
 
 
 def read_reversals(readings: Readings) -> Floats:
-    """Metric ``settled_reversals`` of the command [1/s], in the last half of the settled part.
+    """Metric ``settled_reversals`` of the command [1/s], in the last half of the last part.
 
-    A settled part below a second counts as one second.
+    A part whose judged samples take less than a second counts as one second.
     """
     sums = readings.meters[SETTLED.name]
-    return np.asarray(2.0 * sums.command.turns / larger((sums.taken - 1.0) * readings.interval, 1.0))
+    return np.asarray(2.0 * sums.command.turns / larger((sums.part.taken - 1.0) * readings.interval, 1.0))
 
 
-def read_share_of_hold(readings: Readings) -> Floats:
-    """Metric ``settled_share_of_hold`` [-]: duration of hold divided by duration of run, 0 between repetitions."""
-    share = (readings.samples - 1 - readings.course.hold_start) / (readings.samples - 1)
-    return np.asarray(share * (1.0 - readings.course.is_repeated))
-
-
-def _of_sums(*names: str, by: Callable[..., Floats] | None = None) -> ReadAt:
-    return ReadAt(tuple(f"meters.{SETTLED.name}.{name}" for name in names), by)
+def _of_sums(part: str, *names: str, by: Callable[..., Floats] | None = None) -> ReadAt:
+    return ReadAt(tuple(".".join(("meters", SETTLED.name, *part.split(), name)) for name in names), by)
 
 
 _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
-    "error": _of_sums("squares", "taken", by=root_mean),
-    "missing": _of_sums("total", "taken", by=mean_of),
-    "worst": _of_sums("highest_error", "lowest_error", by=farther),
-    "span": _of_sums("highest_error", "lowest_error", by=less),
-    "wave": _of_sums("reference_squares", "reference_total", "taken", by=deviation),
-    "turns": _of_sums("swing.turns", by=count_of),
-    "angle_range": _of_sums("highest_angle", "lowest_angle", by=less),
-    **{name: _of_sums(name) for name in ("begun", "lowest", "highest", "top", "bottom")},
-    "reversals": read_reversals,
-    "share_of_hold": read_share_of_hold,
-    "extent": ReadAt(("course.largest",)),
+    **{
+        f"{prefix}_{name}": _of_sums(part, *fields, by=function)
+        for prefix, part in (("settled", "part"), ("worst", "worst"))
+        for name, fields, function in (
+            ("error", ("squares", "taken"), root_mean),
+            ("missing", ("total", "taken"), mean_of),
+            ("largest", ("highest_error", "lowest_error"), farther),
+            ("span", ("highest_error", "lowest_error"), less),
+            ("wave", ("reference_squares", "reference_total", "taken"), deviation),
+            ("turns", ("swing.turns",), count_of),
+            ("lag", ("lag_squares", "taken"), root_mean),
+            ("mean_lag", ("lag_total", "taken"), mean_of),
+            ("returning", ("first", "last", "path"), judged_share),
+            ("rests", ("rests",), None),
+        )
+    },
+    **{f"settled_{name}": _of_sums("", name) for name in ("begun", "lowest", "highest", "top", "bottom")},
+    "settled_reversals": read_reversals,
+    "settled_extent": ReadAt(("course.largest",)),
+    "settled_last": ReadAt(("course.last",)),
 }
 SETTLED_METRICS = {
-    f"settled_{name}": MetricKind(f"settled_{name}", "-", "for verdicts", (), None, read, (SETTLED,))
-    for name, read in _NUMBERS.items()
+    name: MetricKind(name, "-", "for verdicts", (), None, read, (SETTLED,)) for name, read in _NUMBERS.items()
 }
-"""Metrics of the settled part by name [SI unit of the controlled quantity], used for verdicts only."""
+"""Metrics of the last part and of the worst earlier one by name [SI unit of the controlled quantity], for verdicts."""
 
 
 class _PlantarflexionPeaks(NamedTuple):
-    """Largest torque in plantarflexion [N m] that a walk requests, and that the actuator gives; 0 without any."""
+    """Largest torque in plantarflexion [N m] that a walk requests, and that the actuator gives; 0 without any.
+
+    ``push_off_peak`` is the largest one that it gives in push-off.
+    """
 
     requested_peak: float = 0.0
     given_peak: float = 0.0
+    push_off_peak: float = 0.0
 
 
 def start_plantarflexion(_course: ReferenceSummary, sample: Sample) -> _PlantarflexionPeaks:
@@ -203,14 +333,20 @@ def update_plantarflexion(
 ) -> _PlantarflexionPeaks:
     """Update the plantarflexion meter with a sample."""
     requested = sample.reference if is_torque_requested(sample.command, sample.stride.phase) else 0.0
-    return _PlantarflexionPeaks(max(state.requested_peak, requested), max(state.given_peak, sample.torque))
+    in_push_off = sample.torque if sample.stride.phase == PUSH_OFF else 0.0
+    return _PlantarflexionPeaks(
+        max(state.requested_peak, requested),
+        max(state.given_peak, sample.torque),
+        max(state.push_off_peak, in_push_off),
+    )
 
 
 _METERS = (MeterKind("plantarflexion", _PlantarflexionPeaks, start_plantarflexion, update_plantarflexion),)
 WALK_PEAKS = {
-    name: MetricKind(name, "N m", "for verdicts", (), None, read, _METERS, needs=(WALK, REQUESTED))
+    name: MetricKind(name, "N m", "for verdicts", (), None, read, _METERS, needs=(WALK, *of_request))
     for name in _PlantarflexionPeaks._fields
     for read in (ReadAt((f"meters.plantarflexion.{name}",)),)
+    for of_request in ((REQUESTED,) if name == "requested_peak" else (),)
 }
 """Metrics of the peaks of a walk by name, used for verdicts only."""
 VERDICT_METRICS = {**SETTLED_METRICS, **WALK_PEAKS}

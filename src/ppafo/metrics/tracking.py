@@ -18,8 +18,6 @@ ONE_INSTANT = frozenset(
     f"final_{name}error" for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
 )
 """Metrics of a single instant, which are arbitrary while the controlled quantity oscillates."""
-SUSTAINED = 4
-"""Number of reversals on the hold from which a loop counts as oscillating; settling takes one or two."""
 
 
 def error_of(recording: Recording) -> Floats:

@@ -91,12 +91,17 @@ class Sample(NamedTuple):
 
 
 class ReferenceSummary(NamedTuple):
-    """Summary of a whole reference, in its unit, with the start of its final hold.
+    """Summary of a whole reference, in its unit, with the start of its final hold, and its present rest or move.
 
     ``last`` is the last value. ``largest`` is the largest distance over all samples from 0 for a torque, otherwise from
     the initial value of the controlled quantity. ``tolerance`` is the difference from the last value up to which the
     reference rests. ``hold_start`` is the number of the sample after the last one not at rest, ``samples`` the number
-    of samples. ``is_repeated`` is 1 for a table that repeats within the run, whose last rest is one of many, else 0.
+    of samples. ``is_repeated`` is 1 for a reference that repeats within the run, else 0. ``interval`` is the time
+    between two samples [s], and ``of_joint`` 0 for an angle, 1 for a quantity that a moving joint disturbs.
+
+    The present part of the reference begins with sample ``part_start``; ``rests`` is 1 for a rest and 0 for a move, and
+    ``in_first_half`` is 1 in the first half of a rest. The reference is level from sample ``level_start`` on, and
+    ``previous`` is its value at the sample before.
     """
 
     last: float
@@ -105,10 +110,21 @@ class ReferenceSummary(NamedTuple):
     hold_start: float
     samples: float
     is_repeated: float = 0.0
+    interval: float = 0.0
+    of_joint: float = 1.0
+    previous: float = 0.0
+    level_start: float = 0.0
+    part_start: float = 0.0
+    rests: float = 0.0
+    in_first_half: float = 0.0
 
 
 SAME_LEVEL = 1.0e-9
 """Largest difference of equal levels of a reference, relative to its largest value [-]."""
+LEVEL_RATE = 0.02
+"""Largest rate of a reference at rest, relative to its largest value [1/s]: of less, no loop is behind."""
+SHORTEST_REST, FEWEST_OF_REST = 1.0 / 9.0, 2.0
+"""Length of the shortest rest divided by the length of the move before it [-], and its smallest number of samples."""
 
 
 def is_away(reference: float, last: float, tolerance: float) -> bool:
@@ -123,13 +139,52 @@ def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary
     return course._replace(hold_start=sample.number + 1.0 if away else course.hold_start)
 
 
+def is_level(course: ReferenceSummary, reference: float, other: float, samples: float) -> bool:
+    """Return whether two values of a reference, a number of samples apart, are of one level."""
+    return abs(reference - other) <= LEVEL_RATE * course.largest * course.interval * samples
+
+
+def shortest_rest(moved: float) -> float:
+    """Return the least number of samples of a rest after a move of some number of samples."""
+    return max(FEWEST_OF_REST, float(int(SHORTEST_REST * moved)) + 1.0)
+
+
+def looked_at(course: ReferenceSummary, sample: Sample) -> float:
+    """Return the number of the later sample whose reference tells what the present sample is part of.
+
+    That is the end of the shortest rest that would be one, or of a rest of which the present sample is in the middle.
+    """
+    goes_on = is_level(course, sample.reference, course.previous, 1.0)
+    start = course.level_start if goes_on else sample.number
+    middle = 2.0 * sample.number - start + 1.0
+    return middle if goes_on and course.rests > 0.0 else start + shortest_rest(start - course.part_start)
+
+
+def advance_part(course: ReferenceSummary, sample: Sample, later: float, reference: float) -> ReferenceSummary:
+    """Update the present part of the reference with a sample, and with the ``reference`` of sample ``later``."""
+    goes_on = is_level(course, sample.reference, course.previous, 1.0)
+    level_start = course.level_start if goes_on else sample.number
+    lasts = later <= course.samples - 1.0 and is_level(course, sample.reference, reference, later - sample.number)
+    rested = course.rests > 0.0
+    begins = goes_on and not rested and lasts
+    ends = rested and not goes_on
+    return course._replace(
+        previous=sample.reference,
+        level_start=level_start,
+        part_start=level_start if begins or ends else course.part_start,
+        rests=1.0 if begins or (rested and goes_on) else 0.0,
+        in_first_half=1.0 if goes_on and lasts else 0.0,
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class MeterKind:
     """Meter in the catalogue: running evaluation of samples, with a ``state`` of floats (NamedTuple class).
 
     ``start(course, sample)`` creates the state at the first sample, ``update(state, course, sample)`` updates it at
     each later one. The start of the hold in ``course`` is valid up to this sample. A meter without ``needs_course``
-    must not use ``course``; a meter that is ``of_motion`` keeps its initial state while the vane stands still.
+    must not use ``course``, and one without ``needs_parts`` not its present part; a meter that is ``of_motion`` keeps
+    its initial state while the vane stands still.
     """
 
     name: str
@@ -138,3 +193,4 @@ class MeterKind:
     update: Callable[[Any, ReferenceSummary, Any], Any]
     needs_course: bool = False
     of_motion: bool = False
+    needs_parts: bool = False

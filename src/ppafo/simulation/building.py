@@ -27,7 +27,6 @@ from ppafo.simulation.declaration import (
     THERMAL,
     THERMAL_GAS,
     WALL_AREA,
-    changes_reach,
     controller_settings,
     line_quantities,
     reference_settings,
@@ -96,9 +95,6 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         control, control_links = _control(reading, device, times.period, sensors, motion, reference)
         as_written = DocumentReader(request.file, request.content)
         assumptions = read_assumptions(as_written, reading, hardware, request.overrides)
-        # The reason for a reference beyond reach holds for the numbers beside which it is given alone.
-        given = {override.typed for override in request.overrides}
-        is_moved = PURPOSE not in given and changes_reach(given)
         scenario = Scenario(
             name=document["name"],
             description=document.get("description", ""),
@@ -115,7 +111,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
             supply_line=supply_line,
             links={**initial_links, **reference_links, **control_links},
             controlled=controlled,
-            beyond_reach="" if is_moved else str(value_at(document, PURPOSE) or ""),
+            beyond_reach=str(value_at(document, PURPOSE) or ""),
         )
         problem = reference_problem(scenario)
         if problem:

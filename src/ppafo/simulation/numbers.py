@@ -25,7 +25,7 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
 from ppafo.parameters.overrides import one_path, read_overrides
-from ppafo.simulation.declaration import LOCKED_ANGLE, changes_reach
+from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.profiles import disordered_knots, profiles_of
 from ppafo.simulation.scenario import (
     Control,
@@ -165,8 +165,7 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     if replaced:
         device = replace(scenario.device, links={})
         links = left(in_other_forms(scenario.graph, changing), replaced)
-        purpose = "" if changes_reach(replaced) else scenario.beyond_reach
-        scenario = replace(scenario, device=device, links=links, beyond_reach=purpose)
+        scenario = replace(scenario, device=device, links=links)
     for section in changing:
         form = other_form(scenario.device, section)
         in_form = {name: moved.pop(f"{section}.{name}") for name in form}

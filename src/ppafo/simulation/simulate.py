@@ -101,7 +101,7 @@ class Result:
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
     measured: DeferredResult
-    tries: "Callable[..., Tracking | None] | None" = field(default=None, compare=False, repr=False)
+    tries: "Callable[..., Tracking] | None" = field(default=None, compare=False, repr=False)
 
     @property
     def recording(self) -> Recording:
@@ -114,27 +114,20 @@ class Result:
         return self.measured().metrics
 
     @property
-    def tracking(self) -> "Tracking | None":
-        """Verdict on a run that does not follow its reference; None if it follows, or has no reference."""
+    def tracking(self) -> "Tracking":
+        """Verdict on the run: it follows its reference, does not, or is not judged, for a reason."""
         from ppafo.simulation.tracking import tracking_in
 
-        return tracking_in(self) if self.status.is_completed else None
-
-    @property
-    def following(self) -> str:
-        """Sentence on a run that follows its reference; "" if it does not follow, or has no reference."""
-        from ppafo.simulation.tracking import following_text
-
-        return following_text(self) if self.status.is_completed else ""
+        return tracking_in(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Remarks on a missed reference with tried remedies, a stop, a too coarse pair of valves, replaced values."""
-        no_warnings = (self.following, changed_text(changes_in(self.scenario)))
+        no_warnings = (self.tracking.said, changed_text(changes_in(self.scenario)))
         return tuple(sentence for sentence in self.to_dict()["verdict"] if sentence not in no_warnings)
 
     @_in_own_units
-    def sentences(self, verdict: "Tracking | None") -> list[str]:
+    def sentences(self, verdict: "Tracking") -> list[str]:
         """Sentences of ``run.json``: tracking, remarks, a too coarse pair of valves, and changed values.
 
         ``verdict`` is ``tracking``, with or without remedies that were tried.
@@ -142,9 +135,8 @@ class Result:
         from ppafo.simulation.tracking.pair_step import coarse_pair
         from ppafo.simulation.tracking.remarks import remarks_on
 
-        tracked = self.following if verdict is None else verdict.sentence
-        remarks = remarks_on(self, verdict is None and bool(tracked))
-        said = (tracked, *remarks, coarse_pair(self.scenario), changed_text(changes_in(self.scenario)))
+        remarks = remarks_on(self, not verdict.fails and bool(verdict.said))
+        said = (verdict.sentence, *remarks, coarse_pair(self.scenario), changed_text(changes_in(self.scenario)))
         return list(filter(None, said))
 
     @_in_own_units

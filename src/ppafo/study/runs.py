@@ -1,7 +1,7 @@
 """Ensemble runs of a scenario or model over columns of values, with metrics accumulated in one table."""
 
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.metrics import metric_kind
-from ppafo.metrics.settled import VERDICT_METRICS
-from ppafo.metrics.tracking import ONE_INSTANT, SUSTAINED
+from ppafo.metrics.settled import SUSTAINED, VERDICT_METRICS
+from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.progress import Progress, Report
 from ppafo.simulation.clock import TIMES
-from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.ensemble.running import lacking
@@ -176,27 +175,21 @@ def excess(
     """
     if not set(needed_metrics(scenario)) & set(rows):
         unknown = np.full(next(iter(rows.values())).size, np.nan)
-        return TrackingExcess(unknown, unknown, np.zeros_like(unknown))
+        return TrackingExcess(unknown, unknown, np.zeros_like(unknown), unknown > 0.0)
     varied = {path: column for path, column in absolute(scenario, columns, gauge).items() if path not in TIMES}
     least = smallest_change(scenario) if scenario.follows_reference else 0.0
     return tracking_excess(with_numbers(scenario, varied), rows, most_reversals(scenario), least)
 
 
-def is_to_follow(scenario: Scenario, varied: Iterable[str]) -> bool:
-    """Return whether runs are to follow the reference: not if it is stated as beyond reach, which no path changes."""
-    return not scenario.beyond_reach or changes_reach(varied)
-
-
 def tracking_violation(
     rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
 ) -> Floats:
-    """Return the relative excess of each run over the tracking limits (runs,); 0 for a run that follows or is unknown.
+    """Return the relative excess of each run over the tracking limits (runs,); 0 if it follows or is unknown.
 
-    A reference that its scenario declares to be beyond reach cannot be followed, and counts as followed.
+    A run whose reference is beyond reach on purpose counts as one that follows.
     """
-    if not is_to_follow(scenario, columns):
-        return np.zeros(next(iter(rows.values())).size)
-    return np.fmax(excess(rows, scenario, columns, gauge).largest - 1.0, 0.0)
+    found = excess(rows, scenario, columns, gauge)
+    return np.where(found.excused, 0.0, np.fmax(found.largest - 1.0, 0.0))
 
 
 def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:

@@ -45,7 +45,7 @@ _TRIED_RUNS = 8
 STATUSES = ("completed", "diverged", "refused")
 _PLAIN, _OVER_TIME = "-", "_over_time"
 """Unit of a dimensionless column, and suffix of the name of a column with a trace."""
-OSCILLATES, FOLLOWS = "oscillates", "follows"
+OSCILLATES, FOLLOWS, ON_PURPOSE = "oscillates", "follows", "beyond_reach_on_purpose"
 """Names of the columns of flags: the loop of the run oscillates; the run follows its reference."""
 _TEXT_COLUMNS = ("configuration", "status", "reason", "channel")
 ASKED_ABOVE = 10_000_000_000
@@ -234,6 +234,11 @@ def _columns_of_endings(
         ),
         FOLLOWS: TableColumn(
             judged.follows, _PLAIN, "1 where the run follows its reference, 0 where not, empty where that is not known"
+        ),
+        ON_PURPOSE: TableColumn(
+            judged.excused.astype(float),
+            _PLAIN,
+            "1 where it does not, because the reference is beyond reach on purpose",
         ),
     }
 

@@ -20,9 +20,10 @@ from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import changes_in, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
-from ppafo.simulation.tracking import Tracking, following_text, tracking_in
+from ppafo.simulation.tracking import Tracking, tracking_in
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.simulation.tracking.remedies import level_text
+from ppafo.simulation.tracking.verdict import TOO_SHORT
 from ppafo.storage.opensim import write_opensim
 from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
@@ -71,20 +72,12 @@ class WalkResult:
         return np.maximum.reduceat(self.recording["torque"], self.starts)[:-1]
 
     @property
-    def tracking(self) -> Tracking | None:
-        """Verdict on a torque that does not follow the controller's request; None if it follows."""
+    def tracking(self) -> Tracking:
+        """Verdict on the torque: it follows the controller's request, does not, or is not judged, for a reason."""
         strides = self.metrics.get("strides")
-        return None if strides is None or strides.value == 0.0 else tracking_in(self)
-
-    @_in_own_units
-    def torque_sentence(self, verdict: Tracking | None) -> str:
-        """Sentence on the torque: whether it follows its reference; "" if not judged.
-
-        ``verdict`` is ``tracking``, with or without remedies that were tried.
-        """
-        if verdict is not None:
-            return verdict.sentence
-        return following_text(self) if "strides" in self.metrics else ""
+        if strides is None or strides.value == 0.0:
+            return Tracking(None, self.scenario.controlled, TOO_SHORT)
+        return tracking_in(self)
 
     @_in_own_units
     def __repr__(self) -> str:
@@ -102,7 +95,7 @@ class WalkResult:
         head = [f"{self.scenario.name}: {self.status.message}", self.scenario.origin.replaced]
         head.append(changed_text(changes_in(self.scenario)))
         if self.status.kind != "diverged":
-            head += [self.torque_sentence(self.tracking), limited_request(self.scenario), unlimited_switching(self)]
+            head += [self.tracking.sentence, limited_request(self.scenario), unlimited_switching(self)]
             toes = self.metrics.get("lowest_toes")
             if toes is not None and toes.value < 0.0:
                 head.append("the toes would drag in mid-swing: the ankle is not lifted enough")

@@ -23,7 +23,7 @@ def servo(*overrides: str) -> Scenario:
 def test_a_joint_that_friction_holds_is_named_with_a_stiffness_that_moves_it() -> None:
     weak = ("controller.angle_stiffness=4 N m/rad", *LEARNS_NOTHING)
     verdict = simulate(servo(*STUCK, *weak)).tracking
-    assert verdict is not None
+    assert verdict.fails
     assert verdict.moved == 0.0
     assert verdict.sentence.startswith("the angle loop does not move: 0 of the requested 10 deg; static friction holds")
     assert "with 2 N m, but the controller requests only" in verdict.sentence
@@ -49,7 +49,7 @@ def test_a_joint_that_friction_holds_is_named_with_a_stiffness_that_moves_it() -
 )
 def test_a_pressure_that_stays_where_it_is_is_named_with_what_keeps_it(overrides: tuple[str, ...], said: str) -> None:
     verdict = simulate(load_scenario("pressure-loop", (*overrides, "actuator.leak.area=0 mm^2"))).tracking
-    assert verdict is not None
+    assert verdict.fails
     assert said in verdict.sentence
 
 
@@ -60,7 +60,7 @@ HELD = ["motion.kind=free", "motion.angle=75 deg", "reference.level=4 N m"]
 def test_a_free_joint_that_friction_holds_for_the_whole_run_is_said_to_stand_still() -> None:
     held = simulate("torque-task-proportional", [*HELD, "friction.static_torque=20 N m"])
     assert np.ptp(held.recording["angle"]) == 0.0
-    assert held.following.startswith("the torque follows its reference")
+    assert held.tracking.sentence.startswith("the torque follows its reference")
     (said,) = held.warnings
     # The largest torque of the run, which is above the reference of 4 N m.
     most = level_text("N m", held.metrics["peak_torque"].value)

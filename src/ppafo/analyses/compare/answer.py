@@ -38,8 +38,9 @@ class ConfigurationResult:
 
     ``status``: end of the nominal run
     ``metrics``: metrics of the nominal run
-    ``tracking``: verdict on a nominal run that does not follow its reference
+    ``tracking``: verdict on the nominal run
     ``failed_draws``, ``reason``: number of draws whose run failed, and reason of the first failure
+    ``following``: number of draws whose run follows its reference; None without a verdict on any
     ``rows``: runs over the draws; None without draws
     ``renoised``: first runs of ``rows`` repeated with other sensor noise; None without noise
     """
@@ -47,8 +48,9 @@ class ConfigurationResult:
     configuration: str
     status: Status
     metrics: Mapping[str, Metric]
-    tracking: Tracking | None
+    tracking: Tracking
     failed_draws: int
+    following: int | None
     reason: str = field(compare=False)
     scenario: Scenario = field(compare=False, repr=False)
     rows: Rows | None = field(compare=False, repr=False)
@@ -57,14 +59,14 @@ class ConfigurationResult:
     @property
     def word(self) -> str:
         """End of the nominal run in words; not recommended if the run does not follow its reference."""
-        if self.tracking is None or not self.status.is_completed:
+        if not self.tracking.fails or not self.status.is_completed:
             return self.status.kind
         return "beyond reach" if self.follows else self.tracking.kind
 
     @property
     def follows(self) -> bool:
         """True if the nominal run completes and follows its reference, or misses it only as announced."""
-        return self.status.is_completed and (self.tracking is None or not self.tracking.is_useless)
+        return self.status.is_completed and not self.tracking.is_useless
 
     def value(self, metric: str) -> float:
         """Return a metric [SI] of the nominal run; nan if the run does not have the metric."""
@@ -196,6 +198,8 @@ def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
             least = min(values.values())
             named = ", ".join(name for name, value in values.items() if value == least)
             best[metric] = f"{named} ({kind.text(least)})"
+    of = f" of {comparison.draws:,}"
+    follow = ["-" if case.following is None else f"{case.following:,}{of}" for case in task.cases]
     laws = ((case, case.scenario.law) for case in task.cases)
     gains = ((case, gains_of(case.scenario, law)) for case, law in laws if law is not None)
     return [
@@ -205,6 +209,7 @@ def _parts(comparison: ComparisonResult, task: TaskComparison) -> list[Section]:
                 Column("configuration", [case.configuration for case in task.cases]),
                 *(Column(kind.words, [case.value(name) for case in task.cases], kind) for name, kind in kinds),
                 Column("status", [case.word for case in task.cases]),
+                *([Column("draws that follow", follow)] if comparison.draws else []),
             ],
             remarks=[f"{case.configuration}: {used.sentence}" for case, used in gains if used is not None],
         ),
@@ -269,7 +274,7 @@ def remarks_of(comparison: ComparisonResult) -> list[str]:
                 remarks += [coarse_pair(case.scenario), remark_on_following_gains(case.scenario, comparison.varied)]
                 if kept := case.scenario.origin.replaced:
                     remarks.append(f"{where}: {kept}")
-                if case.tracking is not None and not case.follows:
+                if not case.follows:
                     remarks.append(f"{where}: {case.tracking.sentence}; not counted among the best")
             if not case.status.is_completed:
                 failed.append(f"{where}: {case.status.message}")

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
 
+import numpy as np
+
 from ppafo.analyses.compare.answer import (
     ComparisonResult,
     ConfigurationResult,
@@ -29,7 +31,7 @@ from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import Configuration, Study, configurations_with
 from ppafo.studies.varying import value_at, varied_path
-from ppafo.study.runs import FAILED, Rows, RunCounter, scenario_runs, unvaried
+from ppafo.study.runs import FAILED, Rows, RunCounter, excess, scenario_runs, unvaried, with_companions
 from ppafo.wording import argument_text, first_twice, known_names, said_of_configuration
 
 AS_WRITTEN = "as written"
@@ -70,11 +72,13 @@ class _DrawnRuns(NamedTuple):
     ``rows``: runs; None without draws
     ``renoised``: first runs repeated with other sensor noise; None without noise
     ``failure``: reason of the first failed run
+    ``following``: number of runs that follow their reference; None without a verdict on any
     """
 
     rows: Rows | None = None
     renoised: Rows | None = None
     failure: str = ""
+    following: int | None = None
 
 
 def compared(
@@ -202,15 +206,19 @@ def _runs_over_draws(
     counter = RunCounter(runs_of_scenario * len(scenarios), draws.progress)
     drawn = {}
     for (task, name), scenario in scenarios.items():
-        runs = scenario_runs(scenario, metrics, counter, uncertainty.gauge, draws.threads)
+        judged = with_companions(metrics, scenario)
+        runs = scenario_runs(scenario, judged, counter, uncertainty.gauge, draws.threads)
         # The noise is in all configurations, even if the study varies other paths in some of them only.
         paths = [path for path in columns if study is None or path == NOISE_SEED or study.varies(path, name)]
-        rows = runs.run({path: columns[path] for path in paths} or unvaried(scenario, draws.count))
+        varied = {path: columns[path] for path in paths} or unvaried(scenario, draws.count)
+        rows = runs.run(varied)
         runs.check(rows, draws.maximum_failed, f"configuration '{name}', task '{task}'")
         # Read before the runs with other noise, which may overwrite it.
         failure = runs.reason
         renoised = runs.run({path: renoised_columns[path] for path in paths}) if renoised_columns else None
-        drawn[task, name] = _DrawnRuns(rows, renoised, failure)
+        follows = excess(rows, scenario, varied, uncertainty.gauge).follows
+        following = int(np.count_nonzero(follows == 1.0)) if np.isfinite(follows).any() else None
+        drawn[task, name] = _DrawnRuns(rows, renoised, failure, following)
     return drawn
 
 
@@ -228,6 +236,7 @@ def _configuration_result(name: str, nominal: Result, metrics: Sequence[str], dr
         scenario=nominal.scenario,
         rows=drawn.rows,
         renoised=drawn.renoised,
+        following=drawn.following,
     )
 
 

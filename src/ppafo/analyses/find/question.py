@@ -62,9 +62,8 @@ def find(
     >>> import ppafo
     >>> task, metric = "torque-task-proportional", "rms_error <= 0.5 N m"
     >>> print(ppafo.find(task, vary="supply.pressure=20..90 psi_g", such_that=metric).said[0])
-    supply.pressure = 57.1437 psi_g is the lowest value that meets rms_error <= 0.5 N m and follows its reference:
-    rms_error is 0.3427 N m there (bracketed to 3e-05 psi); below it the reference is not followed: the condition alone
-    is met from 55.56 psi_g (not at 54.44 psi_g)
+    supply.pressure = 54.7758 psi_g is the lowest value that meets rms_error <= 0.5 N m: rms_error is 0.5 N m there
+    (bracketed to 3e-05 psi)
     """
     name_plugins(plugins)
     from dataclasses import replace

@@ -20,7 +20,7 @@ from ppafo.simulation.numbers import NOISE_SEED, declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
 from ppafo.simulation.tracking import Tracking
-from ppafo.simulation.tracking.remarks import earlier_swing, standing_still
+from ppafo.simulation.tracking.remarks import standing_still
 from ppafo.simulation.tracking.remedies import change_text
 from ppafo.simulation.tracking.rule import CRITERION_TEXTS
 from ppafo.simulation.tracking.shortfall import shortfall
@@ -29,7 +29,7 @@ from ppafo.studies.draws import seeds_of_noise
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, given_in, varied_path
-from ppafo.study.runs import RunCounter, Runs, excess, is_to_follow, scenario_runs, settled, with_companions
+from ppafo.study.runs import RunCounter, Runs, excess, scenario_runs, settled, with_companions
 from ppafo.units import SI, split_quantity
 from ppafo.wording import one_line
 
@@ -184,7 +184,7 @@ class FindResult:
             # A torque just beyond the actuator's is missed by no more than is allowed, but it is not reached.
             fails |= (verdicts.beyond_reach > 0.0) & changes_reach(columns)
         else:
-            fails = (verdicts.follows == 0.0) & is_to_follow(base, columns)
+            fails = (verdicts.follows == 0.0) & ~verdicts.excused
         # A loop whose command turns all the time meets no condition that anybody would build on.
         usable = np.where(oscillates, np.nan, judged)
         tried = np.empty(values.size, TRIED)
@@ -233,7 +233,7 @@ def outermost(
         ends = f"from {path.quote(low)} to {path.quote(high)}"
         if search.tried["oscillating"].any():
             _, verdict = _judged(base, path, low)
-            said = "" if verdict is None else f"; at {path.quote(low)} {verdict.sentence}"
+            said = f"; at {path.quote(low)} {verdict.sentence}" if verdict.fails else ""
             raise StudyError(f"scenario '{base.name}': the loop oscillates in every run {ends}{said}")
         reason = f"; the first: {runs.reason}" if runs.reason else ""
         raise StudyError(f"scenario '{base.name}': no run {ends} gives the metric '{condition.metric}'{reason}")
@@ -262,8 +262,8 @@ def outermost(
     return replace(search, verdicts=tuple((value, _verdict(base, path, value)) for value in values))
 
 
-def _judged(base: Scenario, path: VariedPath, value: float) -> tuple[Result, Tracking | None]:
-    """Return the run at a value [SI], and the verdict with its tried remedy; None if the run follows its reference."""
+def _judged(base: Scenario, path: VariedPath, value: float) -> tuple[Result, Tracking]:
+    """Return the run at a value [SI], and the verdict with its tried remedy."""
     # Given in the unit of the range, the value and what is said of it are in that unit.
     result = simulate(with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
     # The remedy that succeeds decides between possible causes.
@@ -273,12 +273,11 @@ def _judged(base: Scenario, path: VariedPath, value: float) -> tuple[Result, Tra
 def _verdict(base: Scenario, path: VariedPath, value: float) -> str:
     """Return the verdict on the run at a value [SI], a torque beyond the actuator's included."""
     result, tracking = _judged(base, path, value)
-    said = result.following if tracking is None else "; ".join(filter(None, (tracking.found, tracking.cause)))
+    said = "; ".join(filter(None, (tracking.found, tracking.cause))) if tracking.fails else tracking.said
     lacking = float(np.max(shortfall(result.scenario)))
-    if tracking is None and lacking > 0.0 and changes_reach([path.path]):
+    if not tracking.fails and lacking > 0.0 and changes_reach([path.path]):
         said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
-    remarks = (remark(result, tracking is None) for remark in (standing_still, earlier_swing))
-    return "; ".join(filter(None, (said, *remarks)))
+    return "; ".join(filter(None, (said, standing_still(result, not tracking.fails))))
 
 
 def _refusal(base: Scenario, path: VariedPath, value: float, end: float) -> tuple[str, str]:

@@ -40,9 +40,10 @@ from ppafo.studies.study import Study, check_can_be_swept
 from ppafo.study.blocks import MAXIMUM_RUNS_OF_CHUNK, chunk_count, samples_of
 from ppafo.study.folder import study_folder
 from ppafo.study.manifest import read_manifest
-from ppafo.study.runs import RunCounter, is_to_follow, joined
+from ppafo.study.runs import RunCounter, joined
 from ppafo.study.store import (
     FOLLOWS,
+    ON_PURPOSE,
     OSCILLATES,
     STATUSES,
     FinishedChunk,
@@ -75,13 +76,14 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
     # A run that diverged has a time at which it did; one that was refused never began.
     failed = study.runs - sum(completed.values())
     diverged = sum(part.size for name in completed for part in results.parts(name, "failure_time"))
-    # A reference that lies beyond reach on purpose is followed by no run, unless the study varies the reach.
-    varied = {
-        each.name: [path for path in study.paths if study.varies(path, each.name)] for each in study.configurations
+    flags, excused = (
+        {each.name: np.concatenate(list(results.parts(each.name, column))) for each in study.configurations}
+        for column in (FOLLOWS, ON_PURPOSE)
+    )
+    verdicts = {
+        name: (int(np.count_nonzero(own == 0.0) - np.count_nonzero(excused[name])), own.size)
+        for name, own in flags.items()
     }
-    judged = [each for each in study.configurations if is_to_follow(each.scenario, varied[each.name])]
-    flags = {each.name: np.concatenate(list(results.parts(each.name, FOLLOWS))) for each in judged}
-    verdicts = {name: (int(np.count_nonzero(own == 0.0)), own.size) for name, own in flags.items()}
     return {
         "study": study.name,
         "runs": study.runs,
@@ -95,7 +97,7 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
         "not_following": {name: off for name, (off, _) in verdicts.items()},
         "without_verdict": {
             each.name: completed[each.name] - verdicts[each.name][1]
-            for each in judged
+            for each in study.configurations
             if verdicts[each.name][1] or each.scenario.follows_reference
         },
         "failures": failures,

@@ -19,7 +19,6 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION
 from ppafo.simulation.tracking.pair_step import coarse_pair
-from ppafo.simulation.tracking.remarks import earlier_swing
 from ppafo.studies.intervals import fraction_text
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.wording import count_of, percentage, without_exponent
@@ -198,8 +197,7 @@ def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
         )
     if after.useless:
         return f"{name}: with the best gains found, {after.useless}"
-    earlier = earlier_swing(after.result, follows=after.result.tracking is None)
-    return f"{name}: {_change(problem, before, after)}{earlier and f'; {earlier}'}"
+    return f"{name}: {_change(problem, before, after)}"
 
 
 def _in_draws(problem: Problem, fraction: float) -> str:

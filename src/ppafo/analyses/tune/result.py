@@ -106,9 +106,9 @@ class GainResult:
 
     @property
     def useless(self) -> str:
-        """Verdict on a nominal run that does not follow its reference; empty if it does."""
+        """Verdict on a nominal run that should follow its reference and does not; empty for others."""
         tracking = self.result.tracking
-        return tracking.sentence if tracking is not None and tracking.is_useless else ""
+        return tracking.sentence if tracking.is_useless and not self.result.scenario.beyond_reach else ""
 
     @property
     def is_feasible(self) -> bool:

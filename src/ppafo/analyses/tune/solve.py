@@ -69,7 +69,9 @@ def solve_tuning(problem: Problem, threads: int | None, progress: Report | None)
     scales = _scales(problem, _metrics_of_candidates(runs, problem, gains_before, draws))
 
     def costs(fractions: Floats) -> Floats:
-        values = {gain.path: gain.value(fractions[:, column]) for column, gain in enumerate(problem.searched)}
+        # As they are pasted: what keeps a constraint by less than the last digit would break it.
+        candidates = [problem.gains(each) for each in fractions.tolist()]
+        values = {gain.path: np.array([gains[gain.path] for gains in candidates]) for gain in problem.searched}
         return judge(_metrics_of_candidates(runs, problem, values, draws), problem, scales).cost
 
     starts = search(costs, [gain.fraction(gain.before) for gain in problem.searched], problem.effort)

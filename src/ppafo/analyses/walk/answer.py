@@ -99,11 +99,11 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     verdict, gains = tried(scenario, worn.tracking), gains_of(scenario, law)
     cut_off = (walked for walked in (worn, comparison.without_device) if not walked.status.is_completed)
     said = [ended, *(f"{walked.scenario.name}: {walked.status.message}" for walked in cut_off)]
-    said += [benefit_sentence(comparison), worn.torque_sentence(verdict), limited_request(scenario)]
+    said += [benefit_sentence(comparison), verdict.sentence, limited_request(scenario)]
     said += [unlimited_switching(worn), scenario.origin.replaced, "" if gains is None else gains.sentence]
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
-    mended = usage_text(reloaded(scenario, verdict.mended)) if verdict is not None and verdict.mended else ""
+    mended = usage_text(reloaded(scenario, verdict.mended)) if verdict.mended else ""
     assumed = [(assumption.path, assumption.note) for assumption in scenario.assumptions]
     return Finding(
         name="walk",
@@ -126,10 +126,10 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     )
 
 
-def _walk_data(comparison: WalkComparison, verdict: Tracking | None) -> dict[str, Any]:
+def _walk_data(comparison: WalkComparison, verdict: Tracking) -> dict[str, Any]:
     """Return ``walk.json``: metrics (with the device, without it, healthy) and events as plain data in SI units.
 
-    ``verdict`` is on a torque that does not follow the controller's request, None if the torque follows.
+    ``verdict`` is on the torque that the controller requests.
     """
     worn, bare = comparison.with_device, comparison.without_device
     return {
@@ -143,7 +143,7 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking | None) -> dict[str
         "versions": versions(),
         "configuration": walk_document(worn.scenario),
         "shown": dict(worn.scenario.device.shown),
-        "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
+        "tracking": {**plain(verdict), "sentence": verdict.sentence},
         "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
         "minutes": float(worn.recording.time[-1]) / 60.0,
         **bottle_data(worn),

@@ -44,6 +44,7 @@ def walk_with_and_without(
     from ppafo.analyses.walk.answer import finding_of
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
+    from ppafo.simulation.tracking.verdict import NOTHING_TO_FOLLOW
     from ppafo.walking.loading import check_duration_once, load_walk
     from ppafo.walking.walk import compare_walks
 
@@ -55,7 +56,9 @@ def walk_with_and_without(
     warn_of_coarse_pairs([chosen])
     comparison = compare_walks(chosen, minutes=minutes, progress=partial(_report_walk, progress or report_nothing))
     finding = finding_of(comparison)
-    return replace(finding, passed=finding.passed and finding.found["tracking"] is None) if check else finding
+    tracking = finding.found["tracking"]
+    follows = tracking["follows"] or tracking["reason"] in NOTHING_TO_FOLLOW
+    return replace(finding, passed=finding.passed and follows) if check else finding
 
 
 _LONG_WALK = 12.0

@@ -12,7 +12,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane
 from ppafo.engine.step.phases import present_pressures
 from ppafo.engine.step.sample import reference_at
-from ppafo.model.controlled import TORQUE
+from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import ThermalParameters
 from ppafo.signals.meter import (
@@ -25,7 +25,9 @@ from ppafo.signals.meter import (
     Sample,
     StrideSample,
     advance_course,
+    advance_part,
     is_away,
+    looked_at,
 )
 
 NO_FOOT = FootSample(**dict.fromkeys(FootSample._fields, 0.0))
@@ -152,6 +154,9 @@ def begin_reference_summary(parts: Program, lane: Lane, interval: float, last_in
         hold_start=0.0,
         samples=last_index + 1.0,
         is_repeated=is_repeated,
+        interval=interval * lane.timing.step,
+        of_joint=0.0 if parts.controlled == ANGLE else 1.0,
+        previous=first,
     )
 
 
@@ -189,6 +194,10 @@ def start_meters(parts: Program, lane: Lane, elapsed: float, index: int, interva
 def update_meters(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
     """Update every meter with one more sample; meters of motion keep their first state for a locked vane."""
     sample_with_summary(parts, lane, elapsed, index, interval)
+    if parts.needs_parts:
+        later = looked_at(lane.course, lane.sample)
+        reference = reference_at(parts, lane, later * interval * lane.timing.step)
+        lane.course = advance_part(lane.course, lane.sample, later, reference)
     for group, kind in parts.meter_groups.items():
         if not (parts.is_locked and kind.of_motion):
             lane[group] = kind.update(lane[group], lane.course, lane.sample)

@@ -7,6 +7,7 @@ import numpy as np
 from ppafo.control.catalog import CONTROLLERS, switching_remedy
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
+from ppafo.metrics.settled import LARGEST_SHARE
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, error_functions
 from ppafo.simulation.declaration import law_settings
@@ -40,7 +41,6 @@ from ppafo.simulation.tracking.remedies import (
     stiffer_laws,
     torque_asked,
 )
-from ppafo.simulation.tracking.rule import LARGEST_SHARE
 
 _MOSTLY = 0.5
 """Fraction of the settled part that counts as most of it [-]."""
@@ -204,7 +204,7 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
     scenario, sensors, angle = case.scenario, case.scenario.sensors, case.recording["angle"][case.settled.samples]
     # A joint that moves far oscillates where its loop is fastest, near a stop.
     rates = [(_loop_rate(scenario, float(each)), float(each)) for each in (angle.mean(), angle.min(), angle.max())]
-    rate, fastest = max(rates)
+    (rate, fastest), softer = max(rates), stiffened(scenario, (0.5, 0.25))
     if rate > _QUICKER:
         text = (
             f"at {level_text('rad', fastest)} the chambers are so small that the loop is {rate:.2g} times "
@@ -212,7 +212,7 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
         )
         # Near a stop for a part of the time, a loop needs no gain for that angle throughout.
         factors = (rate, 2.0 * rate) if rate == rates[0][0] else (2.0, 4.0, rate)
-        return TrackingCause(text, rescaled_gains(scenario, law, (1.0 / factor for factor in factors)))
+        return TrackingCause(text, (*rescaled_gains(scenario, law, (1.0 / factor for factor in factors)), *softer))
     if sensors.angle_noise or sensors.pressure_noise:
         noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
         reason = f"sensor noise ({noise}) reverses the command"
@@ -223,7 +223,7 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
     else:
         reason = "the loop has delays that this gain does not include"
     text = f"`{gain}` is about the gain computed for this device: {reason}"
-    return TrackingCause(text, rescaled_gains(scenario, law, (0.5, 0.25)))
+    return TrackingCause(text, (*rescaled_gains(scenario, law, (0.5, 0.25)), *softer))
 
 
 def _loop_rate(scenario: Scenario, angle: float) -> float:
@@ -419,8 +419,8 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     gains_of_another_device,
     _lag,
     _still_approaching,
-    _poor_sensors,
     _law_without_torque_loop,
+    _poor_sensors,
     _not_settled,
 )
 """Causes of a task, most certain first; the last one always applies."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
 from ppafo.metrics.metric import Floats, followed
+from ppafo.metrics.settled import LARGEST_SHARE
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
 from ppafo.parameters.device import Device
@@ -27,7 +28,6 @@ from ppafo.simulation.tracking.remedies import (
     stiffer_laws,
     torque_asked,
 )
-from ppafo.simulation.tracking.rule import LARGEST_SHARE
 from ppafo.simulation.tracking.settled import FEWEST_PERIODS
 
 _MARGINS = (1.05, 1.5)

@@ -4,21 +4,21 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.metrics.metric import Floats
 from ppafo.metrics.settled import SETTLED_METRICS, WALK_PEAKS
 from ppafo.model.columns import first
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import (
-    LARGEST_SHARE,
     REVERSALS,
-    excess_of_task,
+    excess_of_part,
     excess_of_walk,
     is_noisy,
     only_switches,
 )
-from ppafo.simulation.tracking.settled import SettledPart, settled_tasks
-from ppafo.simulation.tracking.shortfall import shortfall
+from ppafo.simulation.tracking.settled import SettledPart, settled_parts
+from ppafo.simulation.tracking.shortfall import available_torque, shortfall
 
 _OF_WALK = ("torque_error", "requested_torque", "peak_torque", *WALK_PEAKS)
 """Metrics by which a walk is judged, in addition to the reversals of its command."""
@@ -49,12 +49,13 @@ class TrackingExcess(NamedTuple):
 
     With ``largest`` up to 1 the run follows its reference, with ``oscillation`` up to 1 its loop does not oscillate.
     ``beyond_reach`` [N m] is the requested torque that the actuator cannot reach (runs,), which the limits allow in
-    part.
+    part. A run that does not reach it on purpose is ``excused``.
     """
 
     largest: Floats
     oscillation: Floats
     beyond_reach: Floats
+    excused: NDArray[np.bool_]
 
     @property
     def follows(self) -> Floats:
@@ -81,36 +82,39 @@ def tracking_excess(
     numbers = {name: metrics.get(name, none) for name in needed_metrics(scenario)}
     with np.errstate(divide="ignore", invalid="ignore"):
         if not scenario.follows_reference:
-            error, requested, peak, *_ = (numbers[name] for name in _OF_WALK)
+            error, requested, peak = (numbers[name] for name in _OF_WALK[:3])
             limit = np.asarray(scenario.controller.settings.get("largest_torque", 0.0))
             of_walk: dict[str, Any] = {
                 "wanted_change": np.nan_to_num(requested, nan=np.inf),
                 "rms_error": np.nan_to_num(error),
                 "peak": peak,
-                **{name: np.nan_to_num(numbers[name]) for name in WALK_PEAKS},
+                "requested_peak": np.nan_to_num(numbers["requested_peak"]),
+                "given_peak": np.nan_to_num(numbers["given_peak"]),
             }
+            asks = np.isfinite(error)
+            if not np.any(asks):
+                highest = np.minimum(limit, available_torque(scenario)[1])
+                of_walk |= {"requested_peak": highest, "given_peak": np.nan_to_num(numbers["push_off_peak"])}
             settled = SettledPart(samples=slice(None), **of_walk)
             # A law that requests no torque is judged by the peak alone.
             excess = excess_of_walk(settled, turning, limit)
-            known = (np.isfinite(error) & (requested > 0.0)) | (np.isnan(error) & np.isfinite(peak) & (limit > 0.0))
+            known = (asks & (requested > 0.0)) | (~asks & np.isfinite(peak) & (limit > 0.0))
             known_turning = np.where(counted | known, turning, np.nan)
-            return TrackingExcess(np.where(known, excess, np.nan), known_turning, np.zeros_like(none))
-        settled = settled_tasks(scenario, numbers, least)
-        found = excess_of_task(settled, only_switches(scenario, scenario.law))
-        # On the ramp every loop is behind, and what lies beyond reach may not have been asked for yet.
-        beyond = np.where(settled.ends_on_ramp, 0.0, shortfall(scenario))
-        allowed = LARGEST_SHARE * settled.wanted_change
-        # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error.
-        # The mean error of a wave does not show its peaks.
-        cut = np.where(settled.rests, 0.0, beyond / allowed)
-        missing = np.where(beyond > 0.0, np.fmax(np.abs(settled.mean_error) / allowed, cut), 0.0)
+            zeros = np.zeros(none.size)
+            return TrackingExcess(np.where(known, excess, np.nan), known_turning, zeros, zeros > 0.0)
+        last, worst = settled_parts(scenario, numbers, least)
+        beyond, is_switched = shortfall(scenario), only_switches(scenario, scenario.law)
+        found = [excess_of_part(part, is_switched, beyond) for part in (last, worst)]
     known = np.isfinite(numbers["settled_error"])
-    largest = np.max([turning, *found, missing], axis=0)
-    known_verdict = known & ~(settled.is_undecided & (largest <= 1.0))
+    # Without an earlier part its numbers are nan.
+    largest = np.fmax(turning, np.fmax(*(part.largest for part in found)))
+    known_verdict = known & ~(last.is_undecided & (largest <= 1.0))
     # A value that does not move is no oscillation, however far it is from the reference, and a cut wave is none either.
-    oscillation = np.fmax(turning, np.where((found.standstill > 1.0) | (cut > 1.0), 0.0, found.oscillation))
+    swings = (np.where((each.standstill > 1.0) | (each.reach > 1.0), 0.0, each.oscillation) for each in found)
+    beyond = np.where(last.ends_on_ramp, 0.0, beyond) + np.zeros(none.size)
     return TrackingExcess(
         largest=np.where(known_verdict, largest, np.nan),
-        oscillation=np.where(counted | known, oscillation, np.nan),
-        beyond_reach=beyond + np.zeros_like(none),
+        oscillation=np.where(counted | known, np.fmax(turning, np.fmax(*swings)), np.nan),
+        beyond_reach=beyond,
+        excused=(beyond > 0.0) & (largest > 1.0) & bool(scenario.beyond_reach),
     )

@@ -5,34 +5,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.metrics.metric import extent, followed
-from ppafo.metrics.settled import SHORTEST_HOLD
-from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
-from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
+from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
 from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.reach import torque_reach
-from ppafo.signals.meter import SAME_LEVEL
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.load_causes import LOCKED, ON_STOP, stop_of
 from ppafo.simulation.tracking.pair_step import unlimited_switching
-from ppafo.simulation.tracking.remedies import change_text, level_text
-from ppafo.simulation.tracking.rule import LARGEST_SHARE, SMALLEST_MOVE, deviation_limit, only_switches
-from ppafo.simulation.tracking.settled import MOVED_JOINT, settled_task
+from ppafo.simulation.tracking.remedies import level_text
+from ppafo.simulation.tracking.rule import SMALLEST_MOVE
 
 if TYPE_CHECKING:
     from ppafo.simulation.at_hand import RecordedResult
 
 
 def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
-    """Yield remarks on rest, earlier swings, stops, switching, sensor values without effect, and replaced values.
+    """Yield remarks on rest, stops, switching, sensor values without effect, and replaced values.
 
     ``follows``: True if the run follows its reference; a stop may then bear the torque that the reference asks for.
     """
     scenario, recording = result.scenario, result.recording
     motion, actuator, reached = scenario.motion, scenario.device.actuator, []
     yield standing_still(result, follows)
-    yield earlier_swing(result, follows)
     if isinstance(motion, FreeMotion):
         for side, stop in (("lower", actuator.angle_min), ("upper", actuator.angle_max)):
             rests = np.abs(recording["angle"] - stop) <= ON_STOP
@@ -69,34 +63,6 @@ def standing_still(result: "RecordedResult", follows: bool) -> str:
         text += f"; not tried: reduce `friction.static_torque`, or lock the joint ({LOCKED.text})"
     # A joint on which no torque acts is at rest without friction.
     return text if most > SMALLEST_MOVE * holding else ""
-
-
-def earlier_swing(result: "RecordedResult", follows: bool) -> str:
-    """Remark on a swing while the reference rested earlier, as the verdict judges the end of a run; "" for others."""
-    scenario, recording = result.scenario, result.recording
-    if not (follows and scenario.follows_reference) or only_switches(scenario, scenario.law):
-        return ""
-    settled = settled_task(scenario, recording)._replace(rests=True)
-    reference, value = followed(recording)
-    limit, said = float(deviation_limit(settled, is_switched=False)), ""
-    worst = limit if np.isfinite(limit) else 2.0 * LARGEST_SHARE * settled.wanted_change
-    changes = np.flatnonzero(np.abs(np.diff(reference)) > SAME_LEVEL * extent(recording)) + 1
-    lengths = np.diff(changes, prepend=0)
-    # Of a table that repeats, its repetition counts.
-    duration = min(float(scenario.reference.settings.get("period", np.inf)), recording.duration)
-    shortest = SHORTEST_HOLD * len(recording) * duration / recording.duration
-    about = "the end of the run alone" if duration == recording.duration else "all repetitions together"
-    # Of each rest the second half is judged, as of the last one, which has the verdict.
-    for index in np.flatnonzero(lengths >= shortest).tolist():
-        first, end = int(changes[index] - lengths[index]), int(changes[index])
-        half = slice((first + end) // 2, end)
-        error = (value - reference)[half]
-        swings = np.ptp(error) > worst and reversals(error, OSCILLATION_THRESHOLD * settled.wanted_change) > 1
-        if swings and (scenario.controlled == ANGLE or np.ptp(recording["angle"][half]) <= MOVED_JOINT):
-            worst, times = float(np.ptp(error)), f"from {recording.time[first]:.3g} s to {recording.time[end]:.3g} s"
-            swing = f"the {CONTROLLED[scenario.controlled].words} swings by {change_text(scenario.controlled, worst)}"
-            said = f"while the reference rests {times}, {swing}: the verdict is about {about}"
-    return said
 
 
 def _without_effect(scenario: Scenario) -> str:

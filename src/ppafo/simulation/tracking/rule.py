@@ -10,15 +10,19 @@ import numpy as np
 
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import Floats
+from ppafo.metrics.settled import (
+    LARGEST_ANGLE_SWING,
+    LARGEST_LAG,
+    LARGEST_SHARE,
+    LARGEST_SWING_SHARE,
+    SUSTAINED,
+)
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
-from ppafo.metrics.tracking import SUSTAINED
 from ppafo.model.columns import first
 from ppafo.simulation.profiles import profile_bounds, profile_values
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.settled import SettledPart
 
-LARGEST_SHARE = 0.05
-"""RMS error divided by the wanted change, above which a controller with gradual openings does not follow [-]."""
 LARGEST_SHARE_SWITCHED = 0.25
 """RMS error divided by the wanted change, above which an on/off controller, which swings by design, does not follow."""
 LARGEST_MEAN_SWITCHED = 0.15
@@ -28,12 +32,8 @@ LARGEST_SPAN_SWITCHED = 0.6
 
 One step of a quarter, above which a pair is called coarse, beyond each side of a dead zone of +-4.2 % is 58 %.
 """
-LARGEST_SHARE_MOVING = 0.2
-"""RMS error divided by the wanted change, if the reference or the joint moves: every loop lags then [-]."""
 LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
 """Largest angle error for a moving reference [rad], or divided by the reference's range [-] if that allows more."""
-LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
-"""Largest range of the angle error for a reference at rest, in the same two ways: a swing of 1 deg is visible."""
 LARGEST_CREST = 1.5
 """Largest error divided by the largest RMS error, for a smooth wave of a torque or a pressure; of a lag it is 1.41."""
 LARGEST_SHARE_OF_WAVE = 0.5
@@ -50,6 +50,11 @@ LEAST_PEAK_WALK = 0.7
 """Largest torque of a walk in plantarflexion divided by the largest requested one; with less it does not follow [-]."""
 MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
 """Command reversals per stride and per second above which a loop oscillates."""
+_TIMES_OF_SMALL_WAVE = 1.5
+"""Reduction of the error that a moving joint allows, divided by the deviation of the reference [-]: of a wave that
+moves as much as is allowed at rest, the limit is that of a wave alone."""
+_TINY = 1.0e-300
+"""Divisor in place of 0."""
 PER_TURN = 2.0
 """Additional command reversals for each reversal of the reference: there and back."""
 _TIMES_OF_REFERENCE = 4000
@@ -60,8 +65,19 @@ REVERSALS = "command_reversals"
 """Metric that counts reversals of the command."""
 Failure = Literal["does not move", "oscillates", "overshoots", "does not follow"]
 """Kind of failure."""
-Criterion = Literal["RMS error", "mean error", "swing", "largest error", "missing peak torque", "reach", "any reach"]
-"""Number of the settled part with a limit; a torque reference may exceed the reach of a locked or of a moving joint."""
+Criterion = Literal[
+    "RMS error",
+    "mean error",
+    "swing",
+    "largest error",
+    "reversals",
+    "movement",
+    "peak",
+    "missing peak torque",
+    "reach",
+    "any reach",
+]
+"""Number of the judged part with a limit; a torque reference may exceed the reach of a locked or of a moving joint."""
 CRITERION_TEXTS: dict[Criterion | Literal[""], str] = {
     "reach": "the reference exceeds the largest available torque by",
     "any reach": "the reference exceeds the largest available torque at every angle by",
@@ -138,87 +154,122 @@ class _TaskExcess(NamedTuple):
     - ``oscillation``: oscillation of the value
     - ``overshoot``: peak of the value beyond the wanted change
     - ``standstill``: error of a value that does not move, 0 for others
+    - ``reach``: torque that is beyond the actuator's reach, and missing
     """
 
     error: Floats
     oscillation: Floats
     overshoot: Floats
     standstill: Floats
+    reach: Floats
+
+    @property
+    def largest(self) -> Floats:
+        """Largest of the numbers by which a run fails (runs,)."""
+        largest: Floats = np.max(self, axis=0)
+        return largest
 
 
 def rms_error_limit(settled: SettledPart, is_switched: bool) -> Floats:
     """Largest RMS error with which a task follows its reference [SI]; the numbers of ``settled`` may be arrays (runs,).
 
-    ``is_switched`` is true for a valve without gradual openings.
+    A lag is allowed beside the error at rest. ``is_switched`` is true for a valve without gradual openings.
     """
-    rests, wanted = np.asarray(settled.rests), np.asarray(settled.wanted_change)
-    deviation = np.asarray(settled.reference_deviation)
-    # A reference that varies by less than the limit at rest is judged as one that rests.
-    is_wave = ~rests & (deviation > (LARGEST_SHARE_SWITCHED if is_switched else LARGEST_SHARE) * wanted)
-    share = LARGEST_SHARE_SWITCHED if is_switched else np.where(rests, LARGEST_SHARE, LARGEST_SHARE_MOVING)
-    limit: Floats = share * wanted
-    # The limit of a wave does not count the mean error, which has the limit of the wanted change alone.
-    wave_limit = np.hypot(LARGEST_SHARE_OF_WAVE * deviation, settled.mean_error)
-    return np.where(is_wave, np.minimum(limit, wave_limit), limit)
-
-
-def deviation_limit(settled: SettledPart, is_switched: bool) -> Floats:
-    """Largest range of the error while the reference rests, or largest error while it moves; inf without a limit [SI].
-
-    An angle has both limits [rad], a smooth wave of another quantity the second one, an on/off controller the first
-    one. The numbers of ``settled`` may be arrays (runs,).
-    """
-    rests, reference_range = np.asarray(settled.rests), np.asarray(settled.reference_range)
+    wanted, wave = np.asarray(settled.wanted_change), np.asarray(settled.reference_deviation)
     if is_switched:
-        return np.where(rests, LARGEST_SPAN_SWITCHED * np.asarray(settled.wanted_change), np.inf)
+        return LARGEST_SHARE_SWITCHED * wanted
+    at_rest = LARGEST_SHARE * wanted
+    limit = np.sqrt(at_rest**2 + 2.0 * at_rest * settled.mean_lag + np.asarray(settled.lag) ** 2)
+    # The limit of a wave does not count the mean error; of a small wave it is that of any motion.
+    small = at_rest + LARGEST_LAG * wanted - _TIMES_OF_SMALL_WAVE * wave
+    wave_limit = np.maximum(np.maximum(LARGEST_SHARE_OF_WAVE * wave, at_rest), small)
+    return np.asarray(np.minimum(limit, np.hypot(wave_limit, settled.mean_error)))
+
+
+def swing_limit(settled: SettledPart, is_switched: bool) -> Floats:
+    """Largest range of the error, inf without a limit [SI]: of an angle, and of on/off valves at rest.
+
+    The numbers of ``settled`` may be arrays (runs,).
+    """
+    reference_range, motion = np.asarray(settled.reference_range), np.asarray(settled.motion)
+    if is_switched:
+        rest = 1.0 - motion
+        return LARGEST_SPAN_SWITCHED * np.asarray(settled.wanted_change) / np.maximum(rest, _TINY)
     # An error of this many degrees is allowed for an angle, however small its range.
     at_rest = np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * reference_range)
-    moving = np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * reference_range)
-    is_smooth_wave = ~rests & settled.is_reference_smooth
-    other = np.where(is_smooth_wave, LARGEST_CREST * rms_error_limit(settled, False), np.inf)
-    limit: Floats = np.where(reference_range > 0.0, np.where(rests, at_rest, moving), other)
+    moving = 2.0 * np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * reference_range)
+    return np.where(reference_range > 0.0, at_rest + (moving - at_rest) * motion, np.inf)
+
+
+def largest_error_limit(settled: SettledPart, is_switched: bool) -> Floats:
+    """Largest error while a reference moves, inf without a limit [SI]: of an angle, and of a smooth wave.
+
+    The numbers of ``settled`` may be arrays (runs,).
+    """
+    reference_range, motion = np.asarray(settled.reference_range), np.asarray(settled.motion)
+    if is_switched:
+        return np.full_like(motion, np.inf)
+    angle = np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * reference_range)
+    is_wave = ~np.asarray(settled.rests) & settled.is_reference_smooth
+    wave = np.where(is_wave, LARGEST_CREST * rms_error_limit(settled, False), np.inf)
+    limit: Floats = np.where(reference_range > 0.0, angle, wave) / np.maximum(motion, _TINY)
     return limit
 
 
-def excess_of_task(settled: SettledPart, is_switched: bool) -> _TaskExcess:
-    """Tracking numbers of a task divided by their limits, except command reversals: it follows if none exceeds 1.
+def mean_error_limit(settled: SettledPart, is_switched: bool) -> Floats:
+    """Largest mean error at rest [SI]: of on/off valves, which swing about the reference by design; inf for others."""
+    rest = np.maximum(1.0 - np.asarray(settled.motion), _TINY)
+    return (
+        LARGEST_MEAN_SWITCHED * np.asarray(settled.wanted_change) / rest if is_switched else np.full_like(rest, np.inf)
+    )
 
-    ``is_switched`` is true for a valve without gradual openings. The numbers of ``settled`` may be arrays (runs,).
+
+def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | float = 0.0) -> _TaskExcess:
+    """Tracking numbers of a part of a task divided by their limits, except command reversals: up to 1 it follows.
+
+    Every limit is a continuous function of amplitude and speed of the reference, and of the joint's speed.
+    ``is_switched`` is true for a valve without gradual openings, and ``beyond`` the torque beyond reach [N m]. The
+    numbers of ``settled`` may be arrays (runs,).
     """
-    rests, wanted, mean_error = np.asarray(settled.rests), settled.wanted_change, np.abs(settled.mean_error)
-    deviation: Floats = np.where(rests, settled.error_range, settled.largest_error)
-    deviation = deviation / deviation_limit(settled, is_switched)
-    error = np.maximum(np.asarray(settled.rms_error) / rms_error_limit(settled, is_switched), deviation)
-    if is_switched:
-        # On/off valves swing about the reference by design, so that the mean error has a smaller limit.
-        error = np.where(rests, np.maximum(error, mean_error / (LARGEST_MEAN_SWITCHED * wanted)), error)
-    # On a ramp every loop lags, and a run that ends there has no settled part.
-    error = np.where(settled.ends_on_ramp, 0.0, error)
+    wanted, mean_error, motion = settled.wanted_change, np.abs(settled.mean_error), np.asarray(settled.motion)
+    rms = np.asarray(settled.rms_error) / rms_error_limit(settled, is_switched)
+    span = np.asarray(settled.error_range) / swing_limit(settled, is_switched)
+    largest = np.asarray(settled.largest_error) / largest_error_limit(settled, is_switched)
+    mean = mean_error / mean_error_limit(settled, is_switched)
+    # On a quick ramp every loop lags.
+    error = np.max([rms, span, largest, mean], axis=0) * settled.weight
+    reversals = np.asarray(settled.error_reversals) / (SUSTAINED - 1)
     # A joint that creeps has a range of its error, too, but a mean error above the standard deviation.
-    swings = settled.error_deviation > mean_error
+    swings = np.asarray(settled.error_deviation > mean_error)
     if is_switched:
         # A limit cycle beside the reference has a large mean error, and reverses.
-        swings |= np.asarray(settled.error_reversals) > 0
+        swings |= reversals > 0.0
         oscillation, overshoot = np.where(swings, error, 0.0), np.zeros_like(error)
     else:
-        oscillation = np.where(rests | (error > 1.0), np.asarray(settled.error_reversals) / (SUSTAINED - 1), 0.0)
-        oscillation = np.where(rests & swings, np.maximum(oscillation, deviation), oscillation)
-        overshoot = np.where(rests, (settled.peak / wanted - 1.0) / (LARGEST_PEAK - 1.0), 0.0)
+        # While the reference moves, an error that reverses is none to speak of if it is small.
+        oscillation = np.minimum(reversals, error / np.maximum(motion, _TINY))
+        oscillation = np.where(settled.rests & swings, np.maximum(oscillation, span), oscillation)
+        overshoot = (settled.peak / wanted - 1.0) / (LARGEST_PEAK - 1.0) * (1.0 - motion)
     share = np.asarray(settled.rms_error / wanted)
     is_still = (share > LARGEST_SHARE) & (settled.value_range <= SMALLEST_MOVE * wanted)
     standstill = np.where(is_still, share / LARGEST_SHARE, 0.0)
-    return _TaskExcess(error=error, oscillation=oscillation, overshoot=overshoot, standstill=standstill)
+    # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error. The
+    # mean error of a wave does not show its peaks, and a ramp may not have asked for them yet.
+    missing = np.where(settled.rests, mean_error, np.maximum(mean_error, beyond))
+    is_beyond = (np.asarray(beyond) > 0.0) & ~np.asarray(settled.ends_on_ramp)
+    reach = np.where(is_beyond, missing / (LARGEST_SHARE * wanted), 0.0)
+    return _TaskExcess(error, oscillation, overshoot, standstill, reach)
 
 
-def failure_of_task(settled: SettledPart, turning: float, is_switched: bool) -> Failure | None:
+def failure_of_task(excess: _TaskExcess, turning: float) -> Failure | None:
     """Kind of failure of a task; None if the task follows.
 
-    ``turning`` is the number of command reversals divided by its limit; ``is_switched`` is true for a valve without
-    gradual openings.
+    ``turning`` is the number of command reversals divided by its limit.
     """
-    excess = excess_of_task(settled, is_switched)
     if excess.standstill > 1.0:
         return "does not move"
     if turning > 1.0 or excess.oscillation > 1.0:
         return "oscillates"
-    return "does not follow" if excess.error > 1.0 else "overshoots" if excess.overshoot > 1.0 else None
+    if excess.error > 1.0 or (excess.reach > 1.0 and excess.overshoot <= 1.0):
+        return "does not follow"
+    return "overshoots" if excess.overshoot > 1.0 else None

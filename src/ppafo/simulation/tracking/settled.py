@@ -1,27 +1,40 @@
-"""Settled part of a run: record of its numbers, measured from a recording or taken from metrics.
+"""Judged parts of a run: record of the numbers of one, measured from a recording or taken from metrics.
 
-The settled part is the second half of the hold, or of the run if the reference never rests. In a walk, the settled part
-is all samples with a requested torque.
+The reference of a task is cut into rests and moves, and judged are the last one and the worst of the earlier ones. In a
+walk, the judged part is all samples with a requested torque.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
-from ppafo.metrics.command import command_reversals, requested_samples
-from ppafo.metrics.metric import Floats, controlled_in, extent, followed, hold_start
-from ppafo.metrics.settled import SHORTEST_HOLD, is_long_enough
-from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
-from ppafo.metrics.tracking import SUSTAINED
+from ppafo.metrics.command import Reversals, command_reversals, requested_samples
+from ppafo.metrics.metric import Floats, Readings, controlled_in, extent, followed, hold_start, reference_of
+from ppafo.metrics.settled import (
+    LAG_OF_JOINT,
+    LAG_TIME,
+    LARGEST_LAG,
+    LARGEST_SHARE,
+    SETTLED,
+    SETTLED_METRICS,
+    SUSTAINED,
+    PartSums,
+    SettledSums,
+    badness,
+)
+from ppafo.metrics.switching import OSCILLATION_THRESHOLD, Swing, reversals
 from ppafo.model.columns import first
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
+from ppafo.model.helping import PUSH_OFF
 from ppafo.parameters.reach import torque_reach
 from ppafo.signals import Recording
+from ppafo.signals.meter import LEVEL_RATE, SAME_LEVEL, ReferenceSummary, shortest_rest
 from ppafo.simulation.profiles import limits_of, profile_bounds, profile_parameters, profile_values
 from ppafo.simulation.scenario import Scenario
 
@@ -31,8 +44,14 @@ SMALLEST_CHANGE = 0.05
 """Smallest wanted change divided by the range of the controlled quantity [-]; smaller ones are judged as this one."""
 SMALLEST_SIZE = 5.0e-4
 """Smallest wanted change if the range is 0, in typical sizes of the quantity (``ControlledQuantity.size``)."""
-MOVED_JOINT = 0.01
-"""Travel of a joint in the settled part above which it disturbs the loop of a torque or a pressure [rad]."""
+_NO_RETURN = 1.0e-9
+"""Share of a reference's path that leads back, up to which it is a ramp [-]."""
+_TINY = 1.0e-300
+"""Divisor in place of 0."""
+
+
+WHERE_REQUESTED, IN_PUSH_OFF = -1.0, -2.0
+"""In place of the start of a judged part, for a walk."""
 
 
 class SettledPart(NamedTuple):
@@ -69,9 +88,17 @@ class SettledPart(NamedTuple):
     given_peak: float = 0.0
     """Largest torque in plantarflexion that the actuator of a walk gives [N m]; 0 for a task."""
     rests: bool = False
-    """True if reference and joint stand still."""
+    """True if the reference stands still."""
+    motion: float = 0.0
+    """Motion of reference and joint [-]: 0 at rest, 1 where the limits of a moving reference hold."""
+    lag: float = 0.0
+    """RMS of the error that motion allows beside the one at rest [SI]."""
+    mean_lag: float = 0.0
+    """Mean of the error that motion allows beside the one at rest [SI]."""
+    weight: float = 1.0
+    """Weight of the error [-]: 1, and less for a quick ramp, on which every loop is behind."""
     ends_on_ramp: bool = False
-    """True if the run ends before a monotone reference rests."""
+    """True for a move in one direction to the largest reference, which the run does not see settle."""
     reference_range: float = 0.0
     """Range of initial value and reference for an angle [rad]; 0 for other quantities."""
     reference_deviation: float = 0.0
@@ -80,8 +107,10 @@ class SettledPart(NamedTuple):
     """Number of periods of a sine in the part; infinite for another reference."""
     is_reference_smooth: bool = False
     """True for a reference without steps and corners."""
-    start: float = 0.0
-    """Start of the part [s]; 0 for a walk."""
+    start: float = WHERE_REQUESTED
+    """Start of the judged samples of the last part, or of an earlier part [s]; below 0 for a walk."""
+    end: float = 0.0
+    """End of an earlier part [s]; 0 for the last one."""
     duration: float = 0.0
     """Length of the part [s]; in a walk, the duration of the recording."""
     command_reversal_rate: float = 0.0
@@ -94,15 +123,26 @@ class SettledPart(NamedTuple):
         return np.asarray(self.ends_on_ramp) | (moves & (np.asarray(self.reference_periods) < FEWEST_PERIODS))
 
 
-def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
+def settled_walk(recording: Recording, limit: float, available: float) -> SettledPart | None:
     """Settled part of a walk: the samples with a requested torque; None if none is requested.
 
-    For a controller that requests no torque but opens its valves up to a torque ``limit`` [N m], only the peak is set;
-    a ``limit`` of 0 means none.
+    A controller that requests no torque but opens its valves up to a torque ``limit`` [N m], 0 for none, should give
+    that in push-off, or what is ``available`` [N m].
     """
-    peak = float(np.max(np.abs(recording["torque"])))
+    torque = recording["torque"]
+    peak = float(np.max(np.abs(torque)))
     if controlled_in(recording) is None:
-        return SettledPart(samples=slice(None), wanted_change=limit, peak=peak) if limit > 0.0 else None
+        if limit <= 0.0:
+            return None
+        in_push_off = torque[recording["controller_phase"] == PUSH_OFF]
+        return SettledPart(
+            samples=slice(None),
+            wanted_change=limit,
+            peak=peak,
+            requested_peak=min(limit, available),
+            given_peak=float(np.max(in_push_off, initial=0.0)),
+            start=IN_PUSH_OFF,
+        )
     requested = requested_samples(recording)
     reference, value = (series[requested] for series in followed(recording))
     wanted = float(np.sqrt(np.mean(reference**2))) if reference.size else 0.0
@@ -124,57 +164,159 @@ def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
     )
 
 
-def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
-    """Settled part of a task with a reference, measured from its recording."""
+def task_parts(scenario: Scenario, recording: Recording) -> tuple[SettledPart, SettledPart]:
+    """Last part of a task's reference, and the worst of the earlier ones, measured from a recording.
+
+    They are the two that are measured in a run without recording, by the same sums (``metrics.settled``).
+    """
     reference, value = followed(recording)
-    time, count = recording.time, len(recording)
-    hold = hold_start(recording)
-    period = PROFILES[scenario.reference.kind].period
-    # A rest between repetitions is not what the task ends with.
-    is_repeated = period is not None and period(profile_parameters(scenario.reference)) < time[-1] - time[0]
-    has_hold = hold is not None and is_long_enough(hold, count) and not is_repeated
-    first = hold if has_hold and hold is not None else 0
-    samples, last_half = slice((first + count) // 2, None), slice((first + 3 * count) // 4, None)
-    error, settled_reference, start = (value - reference)[samples], reference[samples], float(time[samples][0])
-    duration = float(time[-1] - time[samples][0])
-    change = extent(recording)
-    wanted = max(change, smallest_change(scenario))
-    # A joint that is moved disturbs the loop of a torque or a pressure all the time, as a moving reference does.
-    is_angle = scenario.controlled == ANGLE
-    rests = has_hold and (is_angle or float(np.ptp(recording["angle"][samples])) <= MOVED_JOINT)
-    error_reversals = reversals(error, OSCILLATION_THRESHOLD * wanted)
-    if not rests:
-        error_reversals -= int(_reversals_of_lag(scenario, wanted))
-    steps = np.diff(reference)
-    is_monotone = bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
-    return SettledPart(
+    course = _course(scenario, recording)
+    parts = [_sums_of(part, course, recording) for part in reference_parts(reference, course)]
+    *earlier, (last, samples, _) = parts
+    met = np.abs(value - reference) <= LARGEST_SHARE * course.largest
+    # At the start of a run the value may be on its way yet.
+    earlier = [each for each in earlier if each[0].start > 0.0 or met[: each[2][1] + 1].any()]
+    worst = max(earlier, key=lambda each: badness(each[0], course), default=None)
+    hold = int(max(course.hold_start, 0.0)) if course.hold_start < course.samples - 1.0 else 0
+    last_quarter, span = slice((hold + 3 * len(recording)) // 4, None), recording.time[samples]
+    ahead, below = (int(np.argmax(sign * (value - reference) <= 0.0)) for sign in (1.0, -1.0))
+    sums = SettledSums(
+        part=last,
+        worst=PartSums() if worst is None else worst[0],
+        waits=0.0,
+        lagged=0.0,
+        met=0.0,
+        command=Reversals(0.0, 0.0, command_reversals(recording, last_quarter)),
+        begun=float(value[0]),
+        lowest=float(value.min()),
+        highest=float(value.max()),
+        met_upwards=0.0,
+        top=float(value[ahead:].max()),
+        met_downwards=0.0,
+        bottom=float(value[below:].min()),
+    )
+    readings = Readings({SETTLED.name: sums}, course, np.asarray(course.interval), len(recording), {})
+    numbers = {name: np.asarray(kind.read(readings)) for name, kind in SETTLED_METRICS.items()}
+    last_part, worst_part = map(_single, settled_parts(scenario, numbers, smallest_change(scenario)))
+    last_part = last_part._replace(
         samples=samples,
-        wanted_change=wanted,
-        rms_error=float(np.sqrt(np.mean(error**2))),
-        mean_error=float(np.mean(error)),
-        error_deviation=float(np.std(error)),
-        error_range=float(np.ptp(error)),
-        largest_error=float(np.max(np.abs(error))),
-        error_reversals=error_reversals if error_reversals >= SUSTAINED else 0,
-        value_range=float(np.ptp(value)),
-        peak=_peak(scenario, reference, value) if change >= wanted else 0.0,
-        rests=rests,
-        ends_on_ramp=not rests and hold is None and is_monotone,
-        reference_range=max(change, float(np.ptp(reference))) if is_angle else 0.0,
-        reference_deviation=float(np.std(settled_reference)),
-        reference_periods=float(_settled_periods(scenario)),
-        is_reference_smooth=PROFILES[scenario.reference.kind].is_smooth,
-        start=start,
-        duration=duration,
-        # Noise that reverses the command until the joint rests is no oscillation: only the last half counts.
-        command_reversal_rate=2.0 * command_reversals(recording, last_half) / max(duration, 1.0),
+        start=float(span[0]),
+        duration=float(recording.time[-1] - span[0]),
+        command_reversal_rate=float(numbers["settled_reversals"]),
+    )
+    if worst is not None:
+        _, judged, (begins, ends) = worst
+        start, end, first_judged = (float(recording.time[each]) for each in (begins, ends, judged.start))
+        worst_part = worst_part._replace(samples=judged, start=start, end=end, duration=end - first_judged)
+    return last_part, worst_part
+
+
+def _single(part: SettledPart) -> SettledPart:
+    """Numbers of a part as floats, from arrays of one number."""
+    return SettledPart._make(each.item() if isinstance(each, np.ndarray | np.generic) else each for each in part)
+
+
+def _course(scenario: Scenario, recording: Recording) -> ReferenceSummary:
+    """Summary of a recorded reference, as a run without recording has it at its end."""
+    reference, count = reference_of(recording), len(recording)
+    period = PROFILES[scenario.reference.kind].period
+    duration = float(recording.time[-1] - recording.time[0])
+    is_repeated = period is not None and period(profile_parameters(scenario.reference)) < duration
+    largest, start = extent(recording), hold_start(recording)
+    return ReferenceSummary(
+        last=float(reference[-1]),
+        largest=largest,
+        tolerance=SAME_LEVEL * largest,
+        hold_start=float(count - 1 if start is None else start),
+        samples=float(count),
+        is_repeated=float(is_repeated),
+        interval=duration / (count - 1),
+        of_joint=0.0 if scenario.controlled == ANGLE else 1.0,
+        previous=float(reference[0]),
     )
 
 
-def settled_tasks(scenario: Scenario, metrics: Mapping[str, Floats], least: float) -> SettledPart:
-    """Settled parts of tasks without recording, as arrays (runs,), from ``SETTLED_METRICS`` by name.
+class ReferencePart(NamedTuple):
+    """Rest or move of a reference: first and last sample, and the first one that is judged."""
 
-    ``least`` is the ``smallest_change``. Start, duration and rate of command reversals are not known.
+    first: int
+    last: int
+    judged: int
+    rests: bool
+
+
+def reference_parts(reference: Floats, course: ReferenceSummary) -> list[ReferencePart]:
+    """Rests and moves of a reference in turn, as ``signals.meter.advance_part`` finds them sample by sample."""
+    count, slack = reference.size, LEVEL_RATE * course.largest * course.interval
+    level = np.concatenate([[False], np.abs(np.diff(reference)) <= slack, [False]])
+    begins, after = np.flatnonzero(level[1:] & ~level[:-1]), np.flatnonzero(level[:-1] & ~level[1:]) + 1
+    parts, start = [], 0
+    for begin, end in zip(begins.tolist(), after.tolist(), strict=True):
+        ahead = begin + int(shortest_rest(float(begin - start)))
+        if ahead >= count or abs(reference[ahead] - reference[begin + 1]) > slack * (ahead - begin - 1):
+            continue
+        if begin > start:
+            parts.append(ReferencePart(start, begin, start, rests=False))
+        within = np.arange(begin + 1, end)
+        later = 2 * within - begin + 1
+        seen = later < count
+        waits = np.zeros(within.size, dtype=bool)
+        waits[seen] = np.abs(reference[later[seen]] - reference[within[seen]]) <= slack * (later - within)[seen]
+        waits[0] = True
+        parts.append(ReferencePart(begin, end - 1, int(within[np.flatnonzero(waits)[-1]]) + 1, rests=True))
+        start = end
+    if start < count:
+        parts.append(ReferencePart(start, count - 1, start, rests=False))
+    return [part._replace(judged=min(part.judged, part.last)) for part in parts]
+
+
+def _sums_of(
+    part: ReferencePart, course: ReferenceSummary, recording: Recording
+) -> tuple[PartSums, slice, tuple[int, int]]:
+    """Sums over a part of a recorded reference, its judged samples, and its first and last sample."""
+    reference, value = followed(recording)
+    error, judged, half = value - reference, part.judged, course.samples - 1.0
+    if part.first == 0 and not part.rests:
+        met = np.abs(error) <= LARGEST_SHARE * course.largest
+        first_met = int(np.argmax(met))
+        judged = first_met if met[first_met] and 2.0 * first_met < half else 0
+        judged = math.ceil(0.5 * half) if course.is_repeated and 0.5 * half <= part.last else judged
+        judged = judged if judged <= part.last else 0
+    samples = slice(judged, part.last + 1)
+    share, moves = course.interval / (LAG_TIME + course.interval), reference[part.first : part.last + 1].tolist()
+    # Behind a move, which begins with the level before it.
+    before = max(part.first - 1, 0)
+    late = list(accumulate(moves, lambda late, now: late + (now - late) * share, initial=float(reference[before])))[1:]
+    behind = np.zeros(len(moves)) if part.rests else reference[part.first : part.last + 1] - late
+    speeds = recording["angular_velocity"][samples]
+    of_joint = course.of_joint * LAG_OF_JOINT * np.abs(speeds) * course.largest
+    lag = np.minimum(np.abs(behind[judged - part.first :]) + of_joint, LARGEST_LAG * course.largest)
+    way, error = reference[samples] - value[0], error[samples]
+    sums = PartSums(
+        start=float(part.first),
+        rests=float(part.rests),
+        squares=float(np.sum(error**2)),
+        total=float(np.sum(error)),
+        taken=float(error.size),
+        reference_squares=float(np.sum(way**2)),
+        reference_total=float(np.sum(way)),
+        lag_squares=float(np.sum(lag**2)),
+        lag_total=float(np.sum(lag)),
+        swing=Swing(0.0, 1.0 + reversals(error, OSCILLATION_THRESHOLD * course.largest), 0.0),
+        lowest_error=float(error.min()),
+        highest_error=float(error.max()),
+        first=float(reference[before]),
+        last=float(reference[part.last]),
+        path=float(np.sum(np.abs(np.diff(reference[before : part.last + 1])))),
+    )
+    return sums, samples, (part.first, part.last)
+
+
+def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: float) -> tuple[SettledPart, SettledPart]:
+    """Last part of the references of tasks, and the worst of the earlier ones, from ``SETTLED_METRICS`` by name.
+
+    The numbers may be arrays (runs,); ``least`` is the ``smallest_change``. Those of an earlier part that does not
+    exist are nan. Times and rate of command reversals are not known.
     """
     lowest, highest = profile_bounds(scenario.reference)
     initial: Any = 0.0 if scenario.controlled == TORQUE else metrics["settled_begun"]
@@ -182,30 +324,42 @@ def settled_tasks(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
     wanted = np.maximum(change, least)
     is_upwards = np.abs(highest - initial) >= np.abs(lowest - initial)
     peak = np.where(is_upwards, metrics["settled_top"] - initial, initial - metrics["settled_bottom"])
-    rms, mean, error_reversals = (metrics[f"settled_{name}"] for name in ("error", "missing", "turns"))
-    is_angle, hold = scenario.controlled == ANGLE, metrics["settled_share_of_hold"]
-    rests = (hold >= SHORTEST_HOLD) & (is_angle or (metrics["settled_angle_range"] <= MOVED_JOINT))
-    if not np.all(rests):
-        error_reversals = error_reversals - np.where(rests, 0.0, _reversals_of_lag(scenario, first(wanted)))
-    profile = PROFILES[scenario.reference.kind]
-    numbers: dict[str, Any] = {
+    is_at_peak = (np.abs(metrics["settled_last"] - initial) >= (1.0 - SAME_LEVEL) * change) & (change > 0.0)
+    profile, is_angle = PROFILES[scenario.reference.kind], scenario.controlled == ANGLE
+    common: dict[str, Any] = {
         "wanted_change": wanted,
-        "rms_error": rms,
-        "mean_error": mean,
-        "error_deviation": np.sqrt(np.maximum(rms**2 - mean**2, 0.0)),
-        "error_range": metrics["settled_span"],
-        "largest_error": metrics["settled_worst"],
-        "error_reversals": np.where(error_reversals >= SUSTAINED, error_reversals, 0.0),
         "value_range": metrics["settled_highest"] - metrics["settled_lowest"],
         "peak": np.where(change >= wanted, peak, 0.0),
-        "rests": rests,
-        "ends_on_ramp": (hold <= 0.0) & profile.is_monotone,
         "reference_range": np.maximum(change, highest - lowest) if is_angle else 0.0,
-        "reference_deviation": metrics["settled_wave"],
-        "reference_periods": _settled_periods(scenario),
         "is_reference_smooth": profile.is_smooth,
     }
-    return SettledPart(samples=slice(None), **numbers)
+
+    def part(prefix: str, periods: Any) -> SettledPart:
+        of = {name.removeprefix(f"{prefix}_"): number for name, number in metrics.items() if name.startswith(prefix)}
+        rms, mean, turns, rests = of["error"], of["missing"], of["turns"], of["rests"] > 0.0
+        # The error of a loop that lags reverses, too: of an earlier move nobody knows how often.
+        of_lag = 0.0 if np.all(rests) else _reversals_of_lag(scenario, first(wanted)) if prefix == "settled" else turns
+        turns = turns - np.where(rests, 0.0, of_lag)
+        motion = np.minimum(of["lag"] / (LARGEST_LAG * np.maximum(change, _TINY)), 1.0)
+        numbers: dict[str, Any] = {
+            "rms_error": rms,
+            "mean_error": mean,
+            "error_deviation": np.sqrt(np.maximum(rms**2 - mean**2, 0.0)),
+            "error_range": of["span"],
+            "largest_error": of["largest"],
+            "error_reversals": np.where(turns >= SUSTAINED, turns, 0.0),
+            "rests": rests,
+            "motion": motion,
+            "lag": of["lag"],
+            "mean_lag": of["mean_lag"],
+            "weight": np.where(rests, 1.0, np.maximum(of["returning"], 1.0 - motion**2)),
+            "ends_on_ramp": ~rests & (of["returning"] <= _NO_RETURN) & is_at_peak,
+            "reference_deviation": np.where(rests, 0.0, of["wave"]),
+            "reference_periods": periods,
+        }
+        return SettledPart(samples=slice(None), **numbers, **common)
+
+    return part("settled", _settled_periods(scenario)), part("worst", math.inf)
 
 
 def _settled_periods(scenario: Scenario) -> Any:
@@ -231,16 +385,6 @@ def _reversals_of_lag(scenario: Scenario, wanted: float) -> Any:
     values, rate, _ = profile_values(single, times)
     of_rate = reversals(rate, OSCILLATION_THRESHOLD * float(np.max(np.abs(rate))))
     return max(reversals(values, OSCILLATION_THRESHOLD * wanted), of_rate)
-
-
-def _peak(scenario: Scenario, reference: Floats, value: Floats) -> float:
-    """Largest change of the value in the direction of the reference, after the value first meets the reference."""
-    start = 0.0 if scenario.controlled == TORQUE else float(value[0])
-    ahead = reference - start
-    sign = math.copysign(1.0, float(ahead[int(np.argmax(np.abs(ahead)))]))
-    # What a joint has at the start, such as the torque of its material, is not the loop's.
-    met = int(np.argmax((value - reference) * sign <= 0.0))
-    return float(np.max((value[met:] - start) * sign))
 
 
 def smallest_change(scenario: Scenario) -> float:

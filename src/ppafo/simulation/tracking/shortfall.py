@@ -1,4 +1,4 @@
-"""Torque that a reference requests beyond the available torque of the actuator."""
+"""Torque that an actuator gives at most, and what a reference requests beyond that."""
 
 import numpy as np
 
@@ -15,13 +15,20 @@ _ANGLES = 9
 
 
 def shortfall(scenario: Scenario) -> Floats:
-    """Largest reference minus the available torque [N m] in each run (runs,); 0 if the torque suffices.
-
-    The available torque is with one chamber at its supply and the other vented, independent of the controller. For a
-    moving joint the angle with the largest torque counts.
-    """
+    """Largest reference minus the available torque [N m] in each run (runs,); 0 if the torque suffices."""
     if scenario.controlled != TORQUE:
         return np.zeros(1)
+    lowest, highest = available_torque(scenario)
+    least, most = profile_bounds(scenario.reference)
+    return np.atleast_1d(np.maximum(0.0, np.maximum(most - highest, lowest - least)))
+
+
+def available_torque(scenario: Scenario) -> tuple[Floats, Floats]:
+    """Lowest and highest torque of the actuator [N m] in each run (runs,).
+
+    One chamber is at its supply and the other vented, independent of the controller. For a moving joint the angle with
+    the largest torque counts.
+    """
     device = scenario.device
     actuator, supply, locked = device.actuator, device.supply, scenario.motion.locked_angle
     fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
@@ -32,6 +39,4 @@ def shortfall(scenario: Scenario) -> Floats:
     lowest = [torque_of(model, plant, angle, vented, supply.dorsiflexion_pressure) for angle in angles]
     if supply.is_vacuum:
         highest, lowest = lowest, highest
-    least, most = profile_bounds(scenario.reference)
-    above, below = most - np.max(highest, axis=0), np.min(lowest, axis=0) - least
-    return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))
+    return np.min(lowest, axis=0), np.max(highest, axis=0)

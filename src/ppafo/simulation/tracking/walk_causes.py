@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ppafo.metrics.metric import followed
+from ppafo.metrics.metric import controlled_in, followed
 from ppafo.metrics.switching import SHUT
 from ppafo.parameters.reach import supply_for
 from ppafo.simulation.numbers import number_at
@@ -27,7 +27,7 @@ _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "
 def _request_beyond_reach(case: Case) -> TrackingCause | None:
     """Cause: the controller of a walk often requests more torque than the actuator gives at the current angle."""
     scenario, samples = case.scenario, case.settled.samples
-    if case.failure == "overshoots":
+    if case.failure == "overshoots" or controlled_in(case.recording) is None:
         return None
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
     places, reaches = reach_at_samples(case)

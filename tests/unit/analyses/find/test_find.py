@@ -17,7 +17,7 @@ from ppafo.analyses.find.solve import ACCURACY
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
 from ppafo.report.finding import Finding
-from ppafo.simulation.tracking.settled import settled_task
+from ppafo.simulation.tracking.settled import task_parts
 from tests.model_runs import model_runs
 
 Floats = NDArray[np.float64]
@@ -206,7 +206,7 @@ def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_erro
     finer = ["valve.area=6 mm^2"]
     found = find("torque-task-solenoid", overrides=finer, **few).found
     alone = ppafo.simulate("torque-task-solenoid", [*finer, "supply.pressure=84 psi_g"])
-    final_error, there = alone.metrics["final_error"].value, settled_task(alone.scenario, alone.recording).rms_error
+    final_error, there = alone.metrics["final_error"].value, task_parts(alone.scenario, alone.recording)[0].rms_error
     assert found.unsettled > 0
     assert f"in {found.unsettled} runs the loop still oscillates in the second half" in " ".join(found.remarks)
     assert "these runs must also meet the condition with the RMS error of that half" in " ".join(found.remarks)
@@ -225,7 +225,7 @@ def test_a_step_that_has_settled_is_judged_as_its_run_is_whatever_its_first_reve
         TASK, vary="supply.pressure=50..52 psi_g", such_that="final_error <= 0.1 N m", grid=3, overrides=ringing
     ).found
     alone = ppafo.simulate(TASK, [*ringing, "supply.pressure=50 psi_g"])
-    assert alone.tracking is None
+    assert alone.tracking.follows
     assert alone.metrics["oscillations_hold"].value >= 4.0
     assert alone.metrics["rms_error_hold"].value > 0.1
     assert found.value == found.tried[0].value
@@ -239,7 +239,7 @@ def test_a_run_that_follows_is_a_condition_of_its_own() -> None:
     )
     for value, follows in ((answer.found.value, True), (answer.found.not_met_at, False)):
         run = ppafo.simulate(TASK, [*task, f"controller.proportional_gain={value!r} 1/(N m)"])
-        assert (run.tracking is None) == follows
+        assert (run.tracking.follows is True) == follows
     with pytest.raises(
         StudyError, match="'follows' needs a reference, which scenario 'step-response' lacks; give a condition"
     ):

@@ -14,7 +14,7 @@ from ppafo.analyses.tune.problem import json_schema, list_tunings, load_tuning
 from ppafo.analyses.tune.question import tune
 from ppafo.analyses.tune.result import Tuned
 from ppafo.errors import StudyError
-from ppafo.simulation.tracking.settled import settled_task
+from ppafo.simulation.tracking.settled import task_parts
 
 DOCUMENT: dict[str, Any] = {
     "schema_version": 1,
@@ -187,7 +187,7 @@ def test_a_value_that_is_not_there_yet_is_said() -> None:
 def test_gains_with_which_the_loop_oscillates_are_not_recommended_however_they_score() -> None:
     late = [*DOCUMENT["overrides"], "valve.delay=10 ms"]
     highest = ppafo.simulate("torque-task-proportional", [*late, "controller.proportional_gain=8 1/(N m)"])
-    assert highest.tracking is not None
+    assert highest.tracking.fails
     # What is asked for is a large error: the one of the highest gains is larger than any of a loop at rest.
     tuned = tune(
         changed(
@@ -198,7 +198,7 @@ def test_gains_with_which_the_loop_oscillates_are_not_recommended_however_they_s
         )
     ).found
     verdict = tuned.after.result.tracking
-    assert verdict is None or verdict.kind != "oscillates"
+    assert verdict.kind != "oscillates"
     assert tuned.after.values["rms_error"] < highest.metrics["rms_error"].value
     assert tuned.after.gains["controller.proportional_gain"] < 1.0
 
@@ -213,9 +213,9 @@ def test_gains_with_which_the_loop_rests_beside_its_reference_are_not_recommende
     )
     finding = tune(tuning)
     lazy = ppafo.simulate("torque-task-proportional", [*tuning["overrides"], "controller.proportional_gain=0.01"])
-    assert lazy.tracking is not None
+    assert lazy.tracking.fails
     assert lazy.metrics["gas_supplied"].value < finding.found.after.values["gas_supplied"]
-    assert finding.found.after.result.tracking is None
+    assert finding.found.after.result.tracking.follows
     assert "the loop follows its reference, with the previous gains it did not" in finding.found.verdict
     never = tune(tuning | {"search": [tuning["search"][0] | {"maximum": "0.01 1/(N m)"}]})
     assert not never.passed
@@ -226,7 +226,7 @@ def test_the_metric_that_is_printed_is_the_metric_and_what_is_judged_stands_apar
     late = [*DOCUMENT["overrides"], "valve.delay=10 ms", "controller.proportional_gain=4 1/(N m)"]
     quick = {"starts": 1, "generations": 1, "candidates_per_gain": 4}
     before = tune(changed(overrides=late, objective=[{"metric": "final_error"}], effort=quick)).found.before
-    settled = settled_task(before.result.scenario, before.result.recording)
+    settled = task_parts(before.result.scenario, before.result.recording)[0]
     assert settled.error_reversals > 4
     assert before.values["final_error"] == pytest.approx(before.metrics["final_error"].value, rel=1e-9)
     assert before.judged["final_error"] == pytest.approx(settled.rms_error, rel=1e-6)
