@@ -98,6 +98,7 @@ def _check(page: Any, *overrides: str) -> None:
 
 def _restored(page: Any, scenario: str) -> None:
     page.select_option("#scenario", scenario)
+    _wait(page)
     page.get_by_role("button", name="As written").click()
     page.evaluate("document.querySelectorAll('details').forEach(group => group.open = true)")
 
@@ -130,6 +131,7 @@ def test_a_reload_keeps_settings_and_the_curves_of_another_valve(page: Any) -> N
     _wait(page)
     page.get_by_role("button", name="Keep these curves").click()
     page.select_option("#scenario", TASKS[1])
+    _wait(page)
     _typed(page, "Valve area mm²", "25")
     before = [page.locator(part).text_content() for part in ("#results", "#legend", "#command")]
     assert "torque-task-solenoid, Valve area" in before[0]

@@ -129,6 +129,7 @@ async function refresh() {
     const slow = setTimeout(() => (byId("said").textContent = "Simulating ..."), 300);
     while (isAsked) {
         isAsked = false;
+        clearTimeout(timer);
         delete byId("command").dataset.checksum;
         const tooLong = simulation.settings.find(({longest, to}, place) => longest && chosen[place] > to);
         const run = tooLong ? /** @type {any} */ ({cause: 4, name: tooLong.name}) : await simulate();
@@ -140,7 +141,6 @@ async function refresh() {
 
 /** Show a run, or say why there is none. @param {Run} run */
 function accept(run) {
-    clearTimeout(timer);
     if (run.cause) {
         byId("said").textContent = `Not simulated: ${fault(run)}. The curves are those of the last run.`;
         return;
@@ -340,6 +340,9 @@ function draw() {
 async function openScenario(wanted) {
     const [name, ...changed] = wanted.split("&");
     worker?.terminate();
+    clearTimeout(timer);
+    byId("settings").replaceChildren();
+    delete byId("command").dataset.checksum;
     simulation = simulations.find((one) => one.name === name) ?? simulations[0];
     const {outputs, compared, settings, metrics, samples, checksum} = simulation, own = worker = new Worker(engine);
     const bytes = Uint8Array.from(atob(simulation.wasm), (letter) => letter.charCodeAt(0));
@@ -348,7 +351,14 @@ async function openScenario(wanted) {
     byId("scenario").value = simulation.name;
     byId("description").textContent = simulation.description;
     isBusy = true;
-    const run = await simulate();
+    const asWritten = simulate();
+    for (const change of changed) {
+        const [path, value] = change.split("="), place = settings.findIndex((setting) => setting.path === path);
+        if (place >= 0 && value) {
+            chosen[place] = Number(value);
+        }
+    }
+    const run = await asWritten;
     if (own !== worker) {
         return;
     }
@@ -360,12 +370,6 @@ async function openScenario(wanted) {
     byId("check").classList.toggle("warning", !isSame);
     fillSettings();
     showSettings();
-    for (const change of changed) {
-        const [path, value] = change.split("="), place = settings.findIndex((setting) => setting.path === path);
-        if (place >= 0 && value) {
-            chosen[place] = Number(value);
-        }
-    }
     isBusy = false;
     await refresh();
 }
