@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 from ppafo.arguments import Overrides, Threads, checked
+from ppafo.arguments.values import accepted_values, shown
 from ppafo.engine.run import batch_of
-from ppafo.errors import SimulationError
+from ppafo.errors import ArgumentError, SimulationError
 from ppafo.loading import scenario_or_load
 from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.model.valves.kind import VENT
@@ -21,6 +22,8 @@ from ppafo.simulation.simulate import Result, result_of
 if TYPE_CHECKING:
     from ppafo.simulation.gains import Gains
     from ppafo.simulation.tracking import Tracking
+
+_NUMBER = accepted_values(float)
 
 
 @checked
@@ -172,13 +175,13 @@ class SteppedRun:
         if self.is_over:
             raise SimulationError(f"{self._scenario.name}: the run is over at t = {self.time:.6g} s; start another one")
         try:
-            given = float(command)
-        except (TypeError, ValueError):
+            given = _NUMBER.take("command", command)
+        except ArgumentError:
             given = float("nan")  # no number is refused as this one is
         lowest, highest, *vent = self._allowed
         if not (lowest <= given <= highest or given in vent):
             also = f", or {VENT:g} to vent both chambers" if vent else ""
-            raise SimulationError(f"command = {command!r} at t = {self.time:.6g} s: must be -1 to 1{also}")
+            raise SimulationError(f"command = {shown(command)} at t = {self.time:.6g} s: must be -1 to 1{also}")
         self._given.commands[self._run.sample :] = [given]
         self._run.advance(given)
         self.measurement = self._run.measurement()

@@ -87,6 +87,7 @@ def test_a_result_so_far_ends_at_the_present_sample() -> None:
     [
         ("step-response", None, "None"),
         ("step-response", [0.1], "0.1"),
+        ("step-response", "0.5", "'0.5'"),
         ("step-response", 1.5, "1.5"),
         ("step-response", math.nan, "nan"),
         ("step-response", 2, "must be -1 to 1$"),
