@@ -174,6 +174,19 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
 
 _FACTORS = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
 """Trial values of a parameter divided by its value in the set [-]."""
+_OFF = {
+    "s": _SHIFTS,
+    "": (0.002, 0.006, 0.02, 0.06, 0.2, 0.6),
+    "Hz": (3.0, 8.0, 20.0, 50.0, 130.0, 350.0),
+    "1/s": (0.5, 2.0, 8.0, 30.0, 120.0, 500.0),
+}
+"""Trial values of a number of the valve that is 0 in the set, by its unit: dead times, dead band, spool, slew limit."""
+_OF_GASES = {
+    "gas.molar_mass": (0.0039, 0.046),
+    "gas.heat_capacity_ratio": (1.05, 1.68),
+    "gas.temperature": (250.0, 340.0),
+}
+"""Ends of what gases in use and rooms have [SI]; other values are no cause."""
 _ATMOSPHERES = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
 """Trial atmospheric pressures divided by the pressure in the set [-]: from a high mountain to a deep mine."""
 _SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas")
@@ -198,19 +211,19 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
     for path in (path for path in by_section if path not in left_out):
         value, quantity = number_at(scenario, path), declared[path]
         factors = tuple(factor for factor in _FACTORS if quantity.minimum <= factor * value <= quantity.maximum)
+        if path in _OF_GASES and value > 0.0:
+            factors = tuple((np.geomspace(*_OF_GASES[path], _SIZES_OF_AN_EFFECT) / value).tolist())
         if value > 0.0 and len(factors) > 2:
             words = f"{path} seems to be {{:.3g}} times the model's value"
             change = partial(_scaled, path, value)
             usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
             yield CandidateCause(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
-    if "valve.delay" in declared and number_at(scenario, "valve.delay") == 0.0:
-        yield CandidateCause(
-            "valve.delay",
-            "valve.delay seems to be above 0",
-            lambda delay: ModelChange(numbers={"valve.delay": delay}),
-            tuple(delay for delay in _SHIFTS if delay <= declared["valve.delay"].maximum),
-            unit="s",
-        )
+    of_valve = [path for path in declared if path.startswith("valve.") and path not in left_out]
+    for path in (path for path in of_valve if declared[path].unit in _OFF and number_at(scenario, path) == 0.0):
+        quantity = declared[path]
+        words = f"{path} seems to be above 0"
+        trials = tuple(size for size in _OFF[quantity.unit] if quantity.minimum <= size <= quantity.maximum)
+        yield CandidateCause(path, words, partial(_scaled, path, 1.0), trials, is_ratio=True, unit=quantity.unit or "-")
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
     atmosphere = request.device.supply.atmospheric_pressure
 

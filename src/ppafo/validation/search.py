@@ -42,6 +42,8 @@ _TOGETHER = 32
 """Number of changes replayed in a batch, which limits memory and sets the rate of progress reports."""
 _DIFFERENCE = 0.02
 """Step of a finite difference as a fraction of the distance between two trial magnitudes [-]."""
+_BEST, _OF_BEST = 6, 2
+"""Number of candidates that are nearest after the steps of all, and their further Gauss-Newton steps."""
 _SMALL = 0.1
 """Trial magnitude of a second change, relative to the smallest magnitude on its grid [-]."""
 _PARTING = 1.0e-4
@@ -162,7 +164,7 @@ class CauseSearch:
         """
         best: dict[str, SizedCause] = {}
         trials = [(candidate, size) for candidate in candidates for size in candidate.grid]
-        for step in range(STEPS + 1):
+        for step in range(STEPS + _OF_BEST + 1):
             changes = [candidate.at(size) for candidate, size in trials]
             for (candidate, size), residuals in zip(trials, self.evaluated(changes), strict=True):
                 if residuals is not None:
@@ -172,8 +174,9 @@ class CauseSearch:
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     if previous is None or (gain, cause.is_inside) > (previous.gain, previous.is_inside):
                         best[candidate.name] = cause
-            if step < STEPS:
-                trials = self._improved([cause for cause in best.values() if cause.candidate.has_size])
+            with_size = [cause for cause in best.values() if cause.candidate.has_size]
+            nearest = sorted(with_size, key=lambda cause: -cause.gain)[:_BEST]
+            trials = self._improved(with_size if step < STEPS else nearest) if step < STEPS + _OF_BEST else []
         return [cause for cause in best.values() if cause.is_inside or not cause.candidate.has_size]
 
     def left_by(self, causes: Sequence[SizedCause]) -> list[float]:
