@@ -114,15 +114,16 @@ def chosen_part(is_worse: bool, part: PartSums, other: PartSums) -> PartSums:
 class SettledSums(NamedTuple):
     """State of the settled meter: present part of the reference, and the worst of the earlier ones.
 
-    ``waits`` is 1 while the present rest is in its first half, ``lagged`` a moving reference with the allowed lag,
-    ``met`` 1 once the value has met the reference, and ``command`` the reversals of the command in the last quarter of
-    run or hold. ``begun`` is the initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is
-    1 once the value has been at or below the reference, and ``top`` the highest value since then; ``met_downwards`` and
-    ``bottom`` are the reverse.
+    ``worst_badness`` is that of the latter, ``waits`` is 1 while the present rest is in its first half, ``lagged``
+    a moving reference with the allowed lag, ``met`` 1 once the value has met the reference, and ``command`` the
+    reversals of the command in the last quarter of run or hold. ``begun`` is the initial controlled value,
+    ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been at or below the reference,
+    and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the reverse.
     """
 
     part: PartSums
     worst: PartSums
+    worst_badness: float
     waits: float
     lagged: float
     met: float
@@ -161,6 +162,7 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
         worst=PartSums(
             0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, Swing(0.0, UNDECIDED, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0
         ),
+        worst_badness=0.0,
         waits=0.0,
         lagged=reference,
         met=1.0 if abs(error) <= LARGEST_SHARE * course.largest else 0.0,
@@ -238,10 +240,12 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     )
     # At the start of a run the value may be on its way yet.
     is_begun = before.start > 0.0 or state.met > 0.0
-    is_worse = ends and is_begun and badness(before, course) > badness(state.worst, course)
+    found = badness(before, course)
+    is_worse = ends and is_begun and found > state.worst_badness
     return SettledSums(
         part=next_part(state, course, sample, lag),
         worst=chosen_part(is_worse, before, state.worst),
+        worst_badness=found if is_worse else state.worst_badness,
         waits=course.in_first_half,
         lagged=lagged,
         met=1.0 if state.met > 0.0 or abs(error) <= LARGEST_SHARE * course.largest else 0.0,

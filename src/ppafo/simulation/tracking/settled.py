@@ -183,6 +183,7 @@ def task_parts(scenario: Scenario, recording: Recording) -> tuple[SettledPart, S
     sums = SettledSums(
         part=last,
         worst=PartSums() if worst is None else worst[0],
+        worst_badness=0.0,
         waits=0.0,
         lagged=0.0,
         met=0.0,
