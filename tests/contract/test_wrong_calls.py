@@ -33,20 +33,12 @@ def test_the_table_has_every_public_function_and_each_of_its_arguments() -> None
     ("call", "said"),
     [
         (
-            lambda: ppafo.sweep("s", ["valve.area=3 mm^2"]),
-            "sweep() takes one argument by position: write sweep('s', overrides=['valve.area=3 mm^2'])",
-        ),
-        (lambda: ppafo.walk("solenoid", 5), "walk() takes one argument by position: write walk('solenoid', minutes=5)"),
-        (
-            lambda: ppafo.load_device("ppafo2011", {"valve.area": 3.0e-6}),
-            "write load_device('ppafo2011', overrides={'valve.area': 3e-06})",
+            lambda: ppafo.sweep("s", []),
+            "too many positional arguments; available by position: study; by name: overrides",
         ),
         (lambda: ppafo.find("s", vary="a", such_that="b", higest=True), "did you mean 'highest'?"),
         (lambda: ppafo.find("s"), "find() needs vary and such_that: "),
-        (
-            lambda: ppafo.simulate("torque-task-proportional", overrides=["a=1"], scenario="x"),
-            "scenario is given twice",
-        ),
+        (lambda: ppafo.simulate("s", scenario="x"), "multiple values for argument 'scenario'"),
     ],
 )
 def test_a_mistyped_call_is_answered_with_what_to_write(call, said) -> None:  # type: ignore[no-untyped-def]

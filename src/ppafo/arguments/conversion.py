@@ -3,19 +3,33 @@
 Numbers, flags and texts are also accepted from NumPy. The module imports nothing that is slow to load.
 """
 
+import contextlib
 import math
 import numbers
+import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from ppafo.arguments.reading import ANY, MAXIMUM_DIGITS, NUMBER, NumberRange, NumberWithUnit, point, task
+from ppafo.arguments.reading import ANY, MAXIMUM_DIGITS, NUMBER, NumberRange, NumberWithUnit, task
 from ppafo.errors import ArgumentError
 from ppafo.units import SI
 from ppafo.units.carried import carried
-from ppafo.wording import one_line
 
 _MAXIMUM_LEVELS = 60
 """Maximum depth of nested dictionaries and lists that are copied."""
+
+
+_QUOTED = reprlib.Repr()
+_QUOTED.maxstring = _QUOTED.maxother = 60
+
+
+def shown(value: Any) -> str:
+    """Return a value as quoted in a message: shortened, or the name of its class."""
+    with contextlib.suppress(Exception):  # an object of others may raise when it is asked for its class
+        if isinstance(value, str | bytes | int | float | complex | Path | list | tuple | dict | set | None):
+            return _QUOTED.repr(value)
+    return f"<{type(value).__name__}>"
 
 
 def taken_text(value: Any) -> str:
@@ -59,30 +73,26 @@ def taken_whole(lowest: int) -> Callable[[Any], int]:
 
     def take(value: Any) -> int:
         whole = _scalar(value)
-        if (
-            isinstance(whole, bool)
-            or not isinstance(whole, numbers.Integral)
-            or not lowest <= int(whole) < 10**MAXIMUM_DIGITS
-        ):
+        is_whole = isinstance(whole, numbers.Integral) and not isinstance(whole, bool)
+        if not is_whole or not lowest <= int(whole) < 10**MAXIMUM_DIGITS:
             raise ValueError
         return int(whole)
 
     return take
 
 
-def taken_number(allowed: NumberRange = ANY, read: Callable[[str], float] | None = None) -> Callable[[Any], float]:
+def taken_number(allowed: NumberRange = ANY, read: Callable[[str], Any] | None = None) -> Callable[[Any], Any]:
     """Return a converter of finite numbers in a range, also from NumPy, or of texts converted by ``read``."""
 
-    def take(value: Any) -> float:
+    def take(value: Any) -> Any:
         number = _scalar(value)
         if isinstance(number, str) and read is not None and not NUMBER.fullmatch(number.strip()):
             return read(taken_text(number))
         if read is not None and carried(value) is not None:
             # What carries no dimension is no number in SI: a share is one, a mass is not.
             return read(f"{number!r} 1")
-        if isinstance(number, bool) or not isinstance(number, numbers.Real) or not math.isfinite(number):
-            raise ValueError
-        if float(number) not in allowed:
+        is_number = isinstance(number, numbers.Real) and not isinstance(number, bool)
+        if not is_number or not math.isfinite(number) or float(number) not in allowed:
             raise ValueError
         return number if isinstance(number, NumberWithUnit) else float(number)
 
@@ -118,22 +128,18 @@ def _overrides_of(table: Mapping[Any, Any], section: str) -> Iterator[str]:
         elif isinstance(scalar, str) and scalar.strip():
             yield f"{path}={taken_text(scalar)}"
         else:
-            # A pair of number and unit is to be written as one text.
-            is_pair = isinstance(scalar, list | tuple) and len(scalar) == 2 and isinstance(scalar[1], str)
-            example = f"'{scalar[0]} {scalar[1]}'" if is_pair else "'12.6 mm^2'"
-            requirement = f"must be a finite number in SI units, True, False or a text such as {example}"
-            raise ArgumentError(f"{path} = {one_line(repr(value))}: {requirement}")
+            requirement = "must be a finite number in SI units, True, False or a text such as '12.6 mm^2'"
+            raise ArgumentError(f"{path} = {shown(value)}: {requirement}")
 
 
-def taken_document(value: Any) -> dict[str, Any]:
+def taken_document(value: Any) -> Any:
     """Return a copy of nested dictionaries as the plain data of a file; ValueError for anything but a dictionary.
 
     Accepts mappings of any class, lists, iterators, texts and numbers, also from NumPy. Raises ArgumentError for None.
     """
     if not isinstance(value, Mapping):
         raise ValueError
-    copies: dict[int, tuple[Any, Any]] = {}
-    return {taken_text(name): _plain(item, str(name), 1, copies) for name, item in value.items()}
+    return _plain(value, "", 0, {})
 
 
 def _plain(value: Any, path: str, level: int, copies: dict[int, tuple[Any, Any]]) -> Any:
@@ -144,25 +150,24 @@ def _plain(value: Any, path: str, level: int, copies: dict[int, tuple[Any, Any]]
         return copies[id(value)][1]
     scalar = _scalar(value)
     if scalar is None:
-        raise ArgumentError(f"{path} = {one_line(repr(value))}: has no value; omit the key for the default")
-    # Values nested deeper than in any file are refused by the check of the document.
-    if isinstance(scalar, bytes) or level > _MAXIMUM_LEVELS:
-        return scalar
+        raise ArgumentError(f"{path} = {shown(value)}: has no value; omit the key for the default")
     if isinstance(scalar, str):
         return str.__str__(scalar)
+    # Values nested deeper than in any file are refused by the check of the document.
+    if isinstance(scalar, bytes) or level > _MAXIMUM_LEVELS or not isinstance(scalar, Iterable):
+        return scalar
     if isinstance(scalar, Mapping):
         table: dict[str, Any] = {}
         copies[id(value)] = value, table
-        table.update(
-            (taken_text(name), _plain(item, f"{path}.{name}", level + 1, copies)) for name, item in scalar.items()
-        )
+        for name, item in scalar.items():
+            table[taken_text(name)] = _plain(item, f"{path}.{name}".lstrip("."), level + 1, copies)
         return table
-    if isinstance(scalar, Iterable) and not hasattr(scalar, "keys"):
-        items: list[Any] = []
-        copies[id(value)] = value, items
-        items.extend(_plain(item, f"{path}[{index}]", level + 1, copies) for index, item in enumerate(scalar))
-        return items
-    return scalar
+    if hasattr(scalar, "keys"):
+        return scalar
+    items: list[Any] = []
+    copies[id(value)] = value, items
+    items += (_plain(item, f"{path}[{index}]", level + 1, copies) for index, item in enumerate(scalar))
+    return items
 
 
 def taken_tasks(value: Any) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -173,10 +178,3 @@ def taken_tasks(value: Any) -> tuple[tuple[str, tuple[str, ...]], ...]:
         items = (value,) if isinstance(value, str) else value
         pairs = [task(item) if isinstance(item, str) else item for item in items]
     return tuple((taken_text(name), taken_overrides(overrides)) for name, overrides in pairs)
-
-
-def taken_point(value: Any) -> float | str:
-    """Return a time [s] from a number or a text with its unit, or ``equilibrium``; ValueError for anything else."""
-    if isinstance(value, str) and not NUMBER.fullmatch(value.strip()):
-        return point(value)
-    return taken_number()(value)

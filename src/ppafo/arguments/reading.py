@@ -17,19 +17,6 @@ from ppafo.wording import number_text
 
 NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 """Number without a unit."""
-EXAMPLES = {
-    "kg": ("a mass", ("g", "kg")),
-    "m": ("a length", ("cm", "m")),
-    "s": ("a time", ("ms", "s", "min")),
-    "N m": ("a torque", ("N m",)),
-    "Pa_a": ("a pressure", ("psi_g", "kPa_a")),
-    "kg/s": ("a flow", ("g/s",)),
-    "m^3": ("a volume", ("cm^3",)),
-    "m/s": ("a speed", ("m/s", "km/h")),
-    "Hz": ("a frequency", ("Hz",)),
-    "rad": ("an angle", ("deg", "rad")),
-}
-"""Description and usual units of each quantity, by SI unit."""
 _SHOWN_AS_GIVEN = ("Pa_a", "N m", "kg/s", "m^3")
 """SI units of quantities displayed in the unit in which they were given, since usage differs between laboratories."""
 MAXIMUM_DIGITS = 40
@@ -106,15 +93,10 @@ def fraction(text: str) -> float:
 def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]:
     """Return a converter of texts with a unit, such as ``10 min``, to numbers in SI; ArgumentError for other texts.
 
-    A number without unit is refused with examples; a number outside the range is refused.
+    A number outside the range is refused.
     """
 
     def value_of(text: str) -> float:
-        # The examples for a number without unit are the same number in usual units.
-        if si_unit in EXAMPLES and NUMBER.fullmatch(text.strip()):
-            description, units = EXAMPLES[si_unit]
-            examples = " or ".join(f"'{text.strip()} {unit}'" for unit in units)
-            raise ArgumentError(f"{text}: {description} needs a unit: {examples}")
         with refused_as(ArgumentError, text, UnitError):
             value = parse_quantity(text, si_unit)
         if value not in allowed:

@@ -1,35 +1,34 @@
 """Conversion of Python arguments, by the annotations that also define the arguments of a command."""
 
 import builtins
-import contextlib
+import collections.abc
 import dataclasses
 import inspect
 import os
-import reprlib
+import re
 import sys
-import traceback
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.arguments.conversion import taken_document, taken_flag, taken_number, taken_text, taken_whole
+from ppafo.arguments.conversion import shown, taken_document, taken_flag, taken_number, taken_text, taken_whole
 from ppafo.arguments.words import Word
 from ppafo.errors import ArgumentError, PpafoError
-from ppafo.wording import one_line
-
-_LONGEST = 60
-_SEVERAL = ", or several"
 
 
-class _NotLoaded:
-    """Placeholder for a class named in an annotation whose module is not imported; its objects are recognised by name.
+class _KnownByName(type):
+    """Type of a class named in an annotation whose module is not imported; its objects are recognised by name.
 
     The help of a command needs no import of the class; a caller that passes an object has imported it already.
     """
 
-    def __class_getitem__(cls, _parameters: Any) -> type:
+    def __instancecheck__(cls, value: object) -> bool:
+        """Return True for an object of a class of the same name, or of one derived from such a class."""
+        return cls.__name__ in [base.__name__ for base in type(value).__mro__]
+
+    def __getitem__(cls, _parameters: Any) -> type:
         """Return the class itself: type parameters are ignored."""
         return cls
 
@@ -43,15 +42,21 @@ class _AnnotationNames(dict[str, Any]):
 
     def __missing__(self, name: str) -> Any:
         """Return a Python builtin, or a placeholder for a class not imported."""
-        return getattr(builtins, name) if hasattr(builtins, name) else type(name, (_NotLoaded,), {})
+        return getattr(builtins, name) if hasattr(builtins, name) else _KnownByName(name, (), {})
+
+
+def _annotations(function: Callable[..., Any], with_words: bool) -> Mapping[str, Any]:
+    """Return the evaluated annotations of a function by name; a class not imported becomes a ``_KnownByName``."""
+    names = _AnnotationNames(vars(sys.modules[function.__module__]))
+    return typing.get_type_hints(function, localns=names, include_extras=with_words)
 
 
 def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
-    """Return the parameters by name with evaluated annotations; a class not imported becomes a ``_NotLoaded``.
+    """Return the parameters by name with evaluated annotations.
 
     A parameter of a user function without annotation keeps the empty one of ``inspect``.
     """
-    annotations = _annotations(function)
+    annotations = _annotations(function, with_words=True)
     # Of the function as written, since help displays another signature.
     parameters = inspect.signature(inspect.unwrap(function)).parameters
     return {
@@ -60,20 +65,11 @@ def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.P
     }
 
 
-def _annotations(function: Callable[..., Any]) -> Mapping[str, Any]:
-    """Return the evaluated annotations of a function by name; a class not imported becomes a ``_NotLoaded``."""
-    names = _AnnotationNames(vars(sys.modules[function.__module__]))
-    return typing.get_type_hints(function, localns=names, include_extras=True)
-
-
-class _Shown(NamedTuple):
+class _Shown(str):
     """Type or default as displayed by help: a text without quotation marks."""
 
-    text: str
-
-    def __repr__(self) -> str:
-        """Return the text itself."""
-        return self.text
+    __slots__ = ()
+    __repr__ = str.__str__
 
 
 def show_plainly(value: Any) -> None:
@@ -84,7 +80,7 @@ def show_plainly(value: Any) -> None:
     function = vars(value)["__init__"] if dataclasses.is_dataclass(value) else value
     if not inspect.isfunction(function):
         return
-    types_shown = {name: _Shown(_type_text(annotation)) for name, annotation in _annotations(function).items()}
+    types_shown = {name: _type_text(hint) for name, hint in _annotations(function, with_words=False).items()}
     signature = inspect.signature(function)
     parameters = []
     for name, parameter in signature.parameters.items():
@@ -98,63 +94,40 @@ def show_plainly(value: Any) -> None:
     )
 
 
-_NAMES: Mapping[Any, str] = {types.NoneType: "None", ...: "..."}
-"""Display names of annotations whose Python name differs."""
-
-
-def _type_text(annotation: Any) -> str:
-    """Return an annotation as plain text, ``Scenario | str | Path``, without module names and ``Word``."""
-    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
-    if origin is Annotated:
-        return _type_text(inner[0])
-    if origin in (typing.Union, types.UnionType):
-        texts = dict.fromkeys(_type_text(item) for item in inner if item is not types.NoneType)
-        return " | ".join([*texts, "None"] if types.NoneType in inner else texts)
-    if origin is Literal:
-        return " | ".join(map(repr, inner))
-    if isinstance(annotation, list):
-        return f"[{', '.join(map(_type_text, annotation))}]"
-    # The type parameters of an array are not displayed.
-    parameters = [] if origin is None or origin.__module__ == "numpy" else [_type_text(item) for item in inner]
-    name = _NAMES.get(annotation) or getattr(origin or annotation, "__name__", str(annotation))
-    return f"{name}[{', '.join(parameters)}]" if parameters else str(name)
+def _type_text(hint: Any) -> _Shown:
+    """Return a type as plain text, ``Scenario | str | Path``, without module names."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        return _Shown(" | ".join(dict.fromkeys(map(_type_text, typing.get_args(hint)))))
+    return _Shown(re.sub(r"\b([A-Za-z_]\w*\.)+|Type\b(?<=NoneType)", "", inspect.formatannotation(hint)))
 
 
 class AcceptedValues(NamedTuple):
-    """Accepted values of a parameter: their description in messages, and their conversion to the function's value.
+    """Accepted values of a parameter: their kinds in messages, and their conversion to the function's value.
 
-    ``convert`` is called with the name of the value in messages and the value.
+    ``convert`` is called with the name of the value in messages and the value; whatever it raises refuses the value.
     """
 
-    what: str
+    kinds: tuple[str, ...]
     convert: Callable[[str, Any], Any]
     allows_none: bool = False
 
+    @property
+    def what(self) -> str:
+        """Description of the accepted values, such as ``a text or a path``."""
+        return " or ".join(dict.fromkeys(self.kinds))
+
     def take(self, name: str, value: Any) -> Any:
         """Return the converted value. Raises ArgumentError for an unsuitable one, and none that the value raises."""
+        if value is None and self.allows_none:
+            return None
         try:
             return self.convert(name, value)
-        except PpafoError:
-            raise
+        except PpafoError as error:
+            # An error of one of several values names this value.
+            raise ArgumentError(str(error) if str(error).startswith(name) else f"{name}: {error}") from None
         except Exception as error:  # what an object of others does when it is asked for its length is anybody's guess
-            raised = shortened(*traceback.format_exception_only(error))
-            raise ArgumentError(
-                f"{name}={shown(value)}: must be {self.what}; asked for it, it raises {raised}"
-            ) from error
-
-
-def shown(value: Any) -> str:
-    """Return a value as quoted in a message: short, on one line."""
-    with contextlib.suppress(Exception):  # a subclass of str may have a repr that raises
-        if isinstance(value, str | bytes | int | float | complex | Path | list | tuple | dict | set | None):
-            return shortened(repr(value) if isinstance(value, str | Path) else reprlib.repr(value))
-    return f"<{shortened(type(value).__name__)}>"
-
-
-def shortened(*parts: str) -> str:
-    """Return a text of others on one line, of a long one the begin."""
-    text = one_line(" ".join(parts))
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+            cause = None if isinstance(error, ValueError | TypeError) else error
+            raise ArgumentError(f"{name}={shown(value)}: must be {self.what}") from cause
 
 
 _PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
@@ -164,6 +137,7 @@ _PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     float: ("a finite number", taken_number()),
     # Where a name is accepted too, its converter comes first and takes texts.
     Path: ("a path", lambda value: Path(taken_text(os.fspath(value)))),
+    Mapping[str, Any]: ("a dictionary with strings as keys", taken_document),
 }
 """Description and converter of each type without a ``Word``."""
 
@@ -173,62 +147,31 @@ def accepted_values(annotation: Any) -> AcceptedValues:
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is Annotated:
         # Python flattens nested annotations with the outermost last: that one has priority.
-        word = next((item for item in reversed(inner[1:]) if isinstance(item, Word) and item.take), None)
-        if word is None or word.take is None:
-            return accepted_values(inner[0])
-        values = _single(word.what, word.take)
-        is_repeated = _is_iterable(typing.get_origin(inner[0]))
-        return values if word.takes_all or not is_repeated else _several(values)
+        taking = [(item.what, item.take) for item in inner[1:] if isinstance(item, Word) and item.take]
+        return _single(*taking[-1]) if taking else accepted_values(inner[0])
     if origin in (typing.Union, types.UnionType):
-        return _either([accepted_values(item) for item in inner if item is not types.NoneType], types.NoneType in inner)
-    if origin is Literal:
-        return _single(
-            " or ".join(map(repr, inner)), lambda value: _accepted(taken_text(value), taken_text(value) in inner)
-        )
-    if annotation is Any:
-        return AcceptedValues("anything", lambda _, value: value)
-    return _single(*_PLAIN[annotation]) if annotation in _PLAIN else _of_class(origin or annotation, inner)
-
-
-def _of_class(kind: type, inner: tuple[Any, ...]) -> AcceptedValues:
+        of_any = _either([accepted_values(item) for item in inner if item is not types.NoneType])
+        return of_any._replace(allows_none=types.NoneType in inner)
+    if annotation in _PLAIN:
+        return _single(*_PLAIN[annotation])
+    kind = origin or annotation
     if issubclass(kind, Mapping):
-        if inner[1] is Any:
-            return _single("a dictionary with strings as keys", taken_document)
         return _mapping(accepted_values(inner[1]))
-    if inner and _is_iterable(kind):
+    if inner and issubclass(kind, Iterable):
         return _several(accepted_values(inner[0]))
-    if kind is typing.get_origin(Callable[..., Any]):
-        return _single("a function", lambda value: _accepted(value, callable(value)))
-    if issubclass(kind, _NotLoaded):
-        # An object of a class that is not imported here is recognised by its name.
-        return _single(
-            f"a {kind.__name__}",
-            lambda value: _accepted(value, kind.__name__ in [base.__name__ for base in type(value).__mro__]),
-        )
-    return _single(f"a {kind.__name__}", lambda value: _accepted(value, isinstance(value, kind)))
+    described = "a function" if kind is collections.abc.Callable else f"a {kind.__name__}"
+    return _single(described, lambda value: _of_class(kind, value))
 
 
-def _is_iterable(kind: Any) -> bool:
-    return isinstance(kind, type) and issubclass(kind, Iterable) and not issubclass(kind, str | bytes)
-
-
-def _accepted(value: Any, is_accepted: bool) -> Any:
-    """Return the value if it is accepted; ValueError otherwise."""
-    if not is_accepted:
-        raise ValueError
+def _of_class(kind: type, value: Any) -> Any:
+    """Return an object of a class. Raises TypeError for another."""
+    if not isinstance(value, kind):
+        raise TypeError
     return value
 
 
 def _single(what: str, take: Callable[[Any], Any]) -> AcceptedValues:
-    def named(name: str, value: Any) -> Any:
-        try:
-            return take(value)
-        except ArgumentError as error:
-            raise ArgumentError(f"{name}: {error}") from None
-        except (ValueError, TypeError, OverflowError):
-            raise ArgumentError(f"{name}={shown(value)}: must be {what}{_at_hand(what, value)}") from None
-
-    return AcceptedValues(what, named)
+    return AcceptedValues((what,), lambda _, value: take(value))
 
 
 def _several(element: AcceptedValues) -> AcceptedValues:
@@ -240,7 +183,7 @@ def _several(element: AcceptedValues) -> AcceptedValues:
             return (element.take(name, value),)
         return tuple(element.take(f"{name}[{index}]", item) for index, item in enumerate(value))
 
-    return AcceptedValues(f"{element.what}{_SEVERAL}", take)
+    return AcceptedValues((*element.kinds, "several"), take)
 
 
 def _mapping(element: AcceptedValues) -> AcceptedValues:
@@ -248,21 +191,14 @@ def _mapping(element: AcceptedValues) -> AcceptedValues:
 
     def take(name: str, value: Any) -> dict[str, Any]:
         if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
-            raise ArgumentError(f"{name}={shown(value)}: must be a dictionary with strings as keys")
+            raise TypeError
         return {key: element.take(f"{name}[{key!r}]", item) for key, item in value.items()}
 
-    return AcceptedValues("a dictionary", take)
+    return AcceptedValues(("a dictionary with strings as keys",), take)
 
 
-def _either(kinds: list[AcceptedValues], allows_none: bool) -> AcceptedValues:
+def _either(kinds: list[AcceptedValues]) -> AcceptedValues:
     """Return the converter that applies the first suitable one of several converters."""
-    if len(kinds) == 1:
-        return kinds[0]._replace(allows_none=allows_none)
-    alone = _in_words([kind.what for kind in kinds if not kind.what.endswith(_SEVERAL)])
-    several = _in_words([kind.what.removesuffix(_SEVERAL) for kind in kinds if kind.what.endswith(_SEVERAL)])
-    what = f"{alone}, or several: {several}" if alone and several else f"{several}{_SEVERAL}" if several else alone
-    if alone == several:
-        what = f"{alone}{_SEVERAL}"
 
     def take(name: str, value: Any) -> Any:
         errors: list[ArgumentError] = []
@@ -271,26 +207,6 @@ def _either(kinds: list[AcceptedValues], allows_none: bool) -> AcceptedValues:
                 return kind.take(name, value)
             except ArgumentError as error:
                 errors.append(error)
-        # An error of one of several values names this value.
-        of_items = [error for error in errors if str(error).startswith(f"{name}[")]
-        raise (
-            of_items[-1] if of_items else ArgumentError(f"{name}={shown(value)}: must be {what}{_at_hand(what, value)}")
-        )
+        raise next((error for error in reversed(errors) if str(error).startswith(f"{name}[")), TypeError())
 
-    return AcceptedValues(what, take, allows_none)
-
-
-def _at_hand(what: str, value: Any) -> str:
-    """Return a hint to pass an attribute of the value, such as ``result.recording``, or on a stored result; or ""."""
-    names = [name for name in ("recording", "scenario") if f"a {name.capitalize()}" in what and hasattr(value, name)]
-    if not names and "a Scenario" in what and hasattr(value, "recording"):
-        return "; a stored result is not run or compared again: give what was run; its numbers are in '.metrics'"
-    return f"; pass its attribute '{names[0]}'" if names else ""
-
-
-def _in_words(kinds: list[str]) -> str:
-    """Return a list of value descriptions as text: ``a name, a path or a Recording``; empty for no descriptions."""
-    *others, last = dict.fromkeys(kinds) or [""]
-    what = f"{', '.join(others)} or {last}" if others else last
-    # In a list with a path, a text is a name.
-    return what.replace("a text, a path", "a name, a path").replace("a text or a path", "a name or a path")
+    return kinds[0] if len(kinds) == 1 else AcceptedValues(tuple(each for kind in kinds for each in kind.kinds), take)

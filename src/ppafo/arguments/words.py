@@ -14,14 +14,12 @@ from typing import Annotated, Any
 from ppafo.arguments.conversion import (
     taken_number,
     taken_overrides,
-    taken_point,
     taken_tasks,
     taken_whole,
 )
 from ppafo.arguments.reading import (
     ABOVE_ZERO,
     ANY,
-    EXAMPLES,
     FROM_ZERO,
     MAXIMUM_DIGITS,
     NumberRange,
@@ -43,7 +41,7 @@ class Word:
     decides. ``option`` is the name of the option if different from the parameter; it also makes an option of a
     parameter that Python passes by position. ``help`` is the default help text. ``const`` is the value of an option
     given without a value. ``off`` is the option that clears a flag. ``is_repeated`` marks several values whose type is
-    not just a sequence. With ``takes_all``, ``take`` is called once with all values.
+    not just a sequence.
     """
 
     metavar: str = ""
@@ -55,7 +53,6 @@ class Word:
     const: Any = None
     off: str = ""
     is_repeated: bool = False
-    takes_all: bool = False
 
 
 def _quantity_word(metavar: str, si_unit: str, allowed: NumberRange = ANY) -> Word:
@@ -63,13 +60,8 @@ def _quantity_word(metavar: str, si_unit: str, allowed: NumberRange = ANY) -> Wo
     read = quantity(si_unit, allowed)
     unit = {"Pa_a": "Pa (absolute)"}.get(si_unit, si_unit)
     limits = f", {allowed.words(unit)}," if allowed.words(unit) else ""
-    example = f"'1 {EXAMPLES[si_unit][1][0]}'"
-    return Word(
-        metavar,
-        read,
-        taken_number(allowed, read),
-        f"a number in {unit}{limits} or a text with its unit such as {example}",
-    )
+    what = f"a number in {unit}{limits} or a text with its unit such as '1 {si_unit}'"
+    return Word(metavar, read, taken_number(allowed, read), what)
 
 
 def fraction_word(help_text: str = "") -> Word:
@@ -127,7 +119,6 @@ Overrides = Annotated[
         "where a number is in SI units",
         option="--set",
         help="override one value, for example valve.area=12.6mm^2; may be repeated",
-        takes_all=True,
     ),
 ]
 Seed = Annotated[int, whole_word(0, "random seed; default: the file's")]
@@ -140,7 +131,8 @@ Fraction = Annotated[float, fraction_word()]
 Side = Annotated[str, Word("right|left", help="which foot; default right")]
 Metrics = Annotated[Sequence[str], Word("NAME", option="--metric")]
 Point = Annotated[
-    float | str, Word("TIME", point, taken_point, "a number of seconds, a time such as '1.5 s', or 'equilibrium'")
+    float | str,
+    Word("TIME", point, taken_number(read=point), "a number of seconds, a time such as '1.5 s', or 'equilibrium'"),
 ]
 Tasks = Annotated[
     Mapping[str, Mapping[str, Any] | Sequence[str]] | Sequence[tuple[str, Sequence[str]]],
@@ -151,6 +143,5 @@ Tasks = Annotated[
         "overrides by the name of a task, such as {'slow': {'reference.ramp_time': '2 s'}}",
         option="--task",
         is_repeated=True,
-        takes_all=True,
     ),
 ]

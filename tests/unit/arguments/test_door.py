@@ -10,7 +10,7 @@ import pytest
 import xarray
 
 import ppafo
-from ppafo.arguments import Count, Fraction, Mass, Overrides, Threads, Word, checked
+from ppafo.arguments import Count, Fraction, Mass, Overrides, Point, Threads, Word, checked
 from ppafo.cli.main import main
 from ppafo.errors import ArgumentError, DataError, StudyError
 from ppafo.wording import argument_text
@@ -24,6 +24,7 @@ def walked(
     *,
     overrides: Overrides = (),
     draws: Count = 10,
+    at: Point = "equilibrium",
     share: Fraction = 0.5,
     threads: Threads | None = None,
     names: Annotated[Sequence[str], Word("NAME")] = (),
@@ -58,6 +59,7 @@ def walked(
         ({"mass": pint.UnitRegistry().Quantity(72.5, "kilogram")}, {"mass": 72.5}),
         ({"mass": pint.UnitRegistry().Quantity(np.array(72500), "g")}, {"mass": 72.5}),
         ({"mass": ppafo.Metric(72.5, "kg", "")}, {"mass": 72.5}),
+        ({"mass": 1, "at": xarray.DataArray(1500.0, attrs={"units": "ms"})}, {"at": 1.5}),
         ({"mass": 1, "share": xarray.DataArray(0.5, attrs={"units": "1"})}, {"share": 0.5}),
         (
             {"mass": 1, "overrides": {"valve.area": pint.UnitRegistry().Quantity(3, "mm^2")}},
@@ -74,13 +76,13 @@ def test_a_value_arrives_as_the_function_takes_it(given: dict[str, Any], arrived
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"mass": -1}, "mass=-1: must be a number in kg, above 0 kg, or a text with its unit such as '1 g'"),
+        ({"mass": -1}, "mass=-1: must be a number in kg, above 0 kg, or a text with its unit such as '1 kg'"),
         ({"mass": "-3 kg"}, "mass: -3 kg: must be above 0 kg"),
         ({"mass": 1, "threads": -1}, "threads=-1: must be a whole number, 1 or more"),
         ({"mass": 1, "is_whole": "False"}, "is_whole='False': must be True or False"),
         ({"mass": 1, "names": ["a", 2]}, "names[1]=2: must be a text"),
         ({"mass": 1, "overrides": {"a": float("nan")}}, "overrides: a = nan: must be a finite number in SI units"),
-        ({"mass": 1, "file": ""}, "file='': must be a name or a path"),
+        ({"mass": 1, "file": ""}, "file='': must be a text or a path"),
         ({"mass": xarray.DataArray(1.0, attrs={"units": "m"})}, "mass: 1.0 m: unit 'm' does not fit"),
         ({"mass": xarray.DataArray(1.0, attrs={"units": "1"})}, "mass: 1.0 1: unit '1' does not fit"),
         ({"mass": 1, "share": pint.UnitRegistry().Quantity(0.5, "kg")}, "share: 0.5 kg: must be a number from 0 to 1"),

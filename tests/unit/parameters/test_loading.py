@@ -63,7 +63,7 @@ def test_an_unknown_name_is_answered_with_the_nearest_one() -> None:
 def test_a_name_with_a_zero_byte_is_one_short_line_of_the_argument(name: str) -> None:
     with pytest.raises(ArgumentError) as caught:
         load_parameter_set(name)
-    assert str(caught.value) == f"parameter_set={name!r}: must be a name or a path"
+    assert str(caught.value) == f"parameter_set={name!r}: must be a text or a path"
 
 
 @pytest.mark.parametrize("name", ["mhj.10", "MHJ 10", "", "Ventil-größer"])
