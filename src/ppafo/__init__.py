@@ -21,7 +21,7 @@ from ppafo.version import __version__ as __version__
 _HOMES = {
     "ppafo.analyses.compare.question": ("compare",),
     "ppafo.analyses.design.question": ("design",),
-    "ppafo.analyses.find.question": ("find",),
+    "ppafo.analyses.find": ("find",),
     "ppafo.analyses.identify.question": ("identify",),
     "ppafo.analyses.linearise.question": ("linearise",),
     "ppafo.analyses.reproduce.question": ("reproduce",),

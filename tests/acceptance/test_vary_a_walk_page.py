@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.find.question import find
+from ppafo.analyses.find import find
 from ppafo.loading import load_scenario
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.studies.loading import load_study

@@ -75,7 +75,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
             first_line="Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.",
         ),
         "find": _of_scenario(
-            f"{_ANALYSES}.find.question:find", "Find the lowest or highest value that meets a condition on a metric."
+            f"{_ANALYSES}.find:find", "Find the lowest or highest value that meets a condition on a metric."
         ),
         "tune": Command(
             f"{_ANALYSES}.tune.question:tune",

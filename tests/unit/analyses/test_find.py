@@ -11,9 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import ppafo
-from ppafo.analyses.find.answer import Threshold
-from ppafo.analyses.find.question import find
-from ppafo.analyses.find.solve import ACCURACY
+from ppafo.analyses.find import ACCURACY, Threshold, find
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
 from ppafo.report.finding import Finding
@@ -37,7 +35,7 @@ def of_curve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finding[Threshold
         def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
             return {metric: curve(columns["supply.pressure"] / BAR)}
 
-        monkeypatch.setattr("ppafo.analyses.find.solve.scenario_runs", lambda *_: model_runs(model, [metric]))
+        monkeypatch.setattr("ppafo.study.runs.scenario_runs", lambda *_: model_runs(model, [metric]))
         return find(TASK, vary=RANGE, such_that=condition, **options)
 
     return search
@@ -65,12 +63,12 @@ def test_the_value_is_found_to_a_millionth_of_the_range(
     assert found.not_met_at is not None
     assert abs(found.value / BAR - expected) <= 8.0 * ACCURACY
     assert min(found.value, found.not_met_at) / BAR <= expected <= max(found.value, found.not_met_at) / BAR
-    there = {item.value: item.metric for item in found.tried}
+    there = dict(zip(found.tried["value"], found.tried["metric"], strict=True))
     is_below = [there[value] <= found.limit for value in (found.value, found.not_met_at)]
     assert is_below == ([True, False] if "<=" in condition else [False, True])
     assert found.changes == 1
-    assert sum(item.is_of_grid for item in found.tried) == 64
-    assert np.all(np.diff([item.value for item in found.tried]) > 0.0)
+    assert sum(found.tried["is_of_grid"]) == 64
+    assert np.all(np.diff(found.tried["value"]) > 0.0)
 
 
 def test_a_condition_that_is_never_met_has_no_value_and_shows_the_nearest(
@@ -79,8 +77,9 @@ def test_a_condition_that_is_never_met_has_no_value_and_shows_the_nearest(
     answer = of_curve(lambda p: 2.0 + (p - 4.0) ** 2, grid=9)
     found = answer.found
     assert (found.value, found.not_met_at, found.changes) == (None, None, 0)
-    assert len(found.tried) == 9
-    assert "the nearest is 2 N m at 4 bar_a" in answer.said[0]
+    assert len(found.tried["value"]) == 9
+    assert found.nearest == pytest.approx(4.0 * BAR)
+    assert "of 2 N m at 4 bar_a" in found.said
     assert not answer.passed
 
 
@@ -126,8 +125,7 @@ def test_a_limit_of_valid_values_is_told_from_the_limit_of_the_condition(noise: 
     )
     answer = find(TASK, vary=vary, such_that="follows", highest=True, grid=5, overrides=changes)
     assert answer.found.value == pytest.approx(static, rel=1e-3)
-    assert "it is the highest valid value, not the limit of the condition" in answer.said[0]
-    assert "must be at most friction.static_torque = " in answer.said[0]
+    assert "must be at most friction.static_torque = " in answer.found.remarks[0]
     further = find(
         TASK, vary=vary, such_that="follows", highest=True, grid=5, overrides=[*changes, "friction.static_torque=4 N m"]
     )
@@ -139,7 +137,7 @@ def test_the_lower_end_of_valid_values_is_no_limit_of_a_metric() -> None:
     dynamic = ppafo.load_device("ppafo2011").friction.dynamic_torque
     answer = find(TASK, vary="friction.static_torque=0.01..4 N m", such_that="rms_error <= 1000 N m", grid=5)
     assert answer.found.value == pytest.approx(dynamic, rel=1e-3)
-    assert "it is the lowest valid value, not the limit of the condition" in answer.said[0]
+    assert "must be at most friction.static_torque = " in answer.found.remarks[0]
 
 
 def test_the_value_meets_the_condition_in_a_run_of_its_own_and_its_neighbour_does_not(tmp_path: Path) -> None:
@@ -152,11 +150,11 @@ def test_the_value_meets_the_condition_in_a_run_of_its_own_and_its_neighbour_doe
     for value, meets in ((found.value, True), (found.not_met_at, False)):
         alone = ppafo.simulate(TASK, [f"supply.pressure={value!r} Pa_a"]).metrics["final_error"].value
         assert (alone <= 0.25 + 1e-9) == meets or abs(alone - 0.25) < 1e-6
-    assert heard[-1].done == len(found.tried)
+    assert heard[-1].done == len(found.tried["value"])
     answer.save(tmp_path / "out")
     document = json.loads((tmp_path / "out" / "find.json").read_text())
     assert document["value"] == found.value
-    assert len(document["tried"]) == document["runs"] == found.runs
+    assert len(document["tried"]["value"]) == document["runs"] == found.runs
     assert (tmp_path / "out" / "find.png").stat().st_size > 10_000
     assert answer.plot().axes
     assert "srcdoc" in answer._repr_html_()
@@ -176,7 +174,7 @@ def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenar
         seen.append(seeds)
         return {"final_error": 6.3 - pressure + noise(seeds)}
 
-    monkeypatch.setattr("ppafo.analyses.find.solve.scenario_runs", lambda *_: model_runs(model, ["final_error"]))
+    monkeypatch.setattr("ppafo.study.runs.scenario_runs", lambda *_: model_runs(model, ["final_error"]))
     found = [
         find(
             TASK, vary=RANGE, such_that=LIMIT, overrides=["sensors.pressure_noise=1 kPa_d", f"sensors.seed={seed}"]
@@ -205,9 +203,10 @@ def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_erro
     final_error, there = alone.metrics["final_error"].value, task_parts(alone.scenario, alone.recording)[0].rms_error
     assert found.unsettled > 0
     # What stands under the name of the metric is the metric, and what was asked of stands beside it.
-    (tried,) = (each for each in found.tried if each.value == pytest.approx(101325.0 + 84.0 * 6894.757293168361))
-    assert tried.metric == pytest.approx(final_error)
-    assert tried.judged == pytest.approx(max(final_error, there)) or math.isnan(tried.judged)
+    row = found.tried["value"].index(pytest.approx(101325.0 + 84.0 * 6894.757293168361))
+    assert found.tried["metric"][row] == pytest.approx(final_error)
+    number = found.tried["judged"][row]
+    assert number == pytest.approx(max(final_error, there)) or math.isnan(number)
 
 
 def test_a_step_that_has_settled_is_judged_as_its_run_is_whatever_its_first_reversals() -> None:
@@ -222,8 +221,8 @@ def test_a_step_that_has_settled_is_judged_as_its_run_is_whatever_its_first_reve
     assert alone.tracking.follows
     assert alone.metrics["oscillations_hold"].value >= 4.0
     assert alone.metrics["rms_error_hold"].value > 0.1
-    assert found.value == found.tried[0].value
-    assert found.tried[0].judged == pytest.approx(alone.metrics["final_error"].value)
+    assert found.value == found.tried["value"][0]
+    assert found.tried["judged"][0] == pytest.approx(alone.metrics["final_error"].value)
 
 
 def test_a_run_that_follows_is_a_condition_of_its_own() -> None:

@@ -1,0 +1,479 @@
+"""Search for the lowest or highest value that meets a condition on a metric: a grid, then division of the bracket."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ppafo.arguments import Count, Overrides, Threads, Word, checked
+from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, at_fault, refused_as
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.progress import Report
+from ppafo.units import SI
+from ppafo.units.shown import shown_in
+from ppafo.wording import one_line
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ppafo.report.finding import Finding
+    from ppafo.report.kind import Kind
+    from ppafo.report.panels import Panel
+    from ppafo.simulation.scenario import Scenario
+    from ppafo.simulation.tracking.metered import TrackingExcess
+    from ppafo.studies.distributions import Floats
+    from ppafo.studies.limits import MetricLimit
+    from ppafo.studies.varying import VariedPath
+    from ppafo.study.runs import Rows
+
+ScenarioLike = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of a scenario, or a .toml file")]
+VariedRange = Annotated[str, Word("PATH=LOW..HIGH", option="--vary")]
+Condition = Annotated[str, Word("CONDITION", option="--such-that")]
+Highest = Annotated[bool, Word(off="--lowest", help="find the lowest value (default)")]
+FEWEST, MOST = 3, 100_000
+"""Range of the number of grid values: both ends and one between, up to the maximum."""
+ACCURACY = 1.0e-6
+"""Width of the last bracket, as a fraction of the range of values [-]."""
+FOLLOWS = "follows"
+"""Text of the condition that the run follows its reference, by the verdict of ``simulate``, within the reach."""
+_PARTS = 32
+"""Number of parts into which a bracket is divided: this many parallel runs take little longer than one run."""
+_STREAMS, _SEED = 16, 1
+"""Number of noise streams for every value if sensors are noisy, the same for all values, and their random seed."""
+_RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
+_CONDITION = re.compile(r"\s*([\w.:]+)\s*(<=|>=)\s*(.+?)\s*")
+_SETTLED = "RMS error in the second half of the hold"
+"""Number that decides in place of the error of one instant, for a loop that swings."""
+
+
+@dataclass(frozen=True, slots=True)
+class Threshold:
+    """Lowest or highest value that meets a condition on a metric; numbers in SI.
+
+    - ``said``, ``remarks``: result in a sentence, and remarks on it
+    - ``value``: value found; None if no value meets the condition, to which ``nearest`` is then nearest
+    - ``not_met_at``: next tried value on the outer side, which does not meet it; None at the end of the range
+    - ``changes``: number of changes between met and not met along the tried values
+    - ``met``: first and last tried value of each interval in which the condition is met; beside ``value``, of the grid
+    - ``unsettled``: number of runs that swing at the instant of the metric, as in ``judged``
+    - ``tried``: columns of the tried values, ascending: ``value``, those of ``judged``, and ``is_of_grid``, False for
+      values of a bracket
+    """
+
+    scenario: str
+    path: str
+    unit: str
+    condition: str
+    metric: str
+    limit: float
+    wanted: str
+    said: str
+    remarks: list[str]
+    value: float | None
+    nearest: float | None
+    metric_at_value: float | None
+    not_met_at: float | None
+    changes: int
+    met: list[list[float]]
+    noise_streams: int
+    runs: int
+    failed: int
+    unsettled: int
+    tried: dict[str, list[Any]]
+
+
+@checked
+def find(
+    scenario: ScenarioLike,
+    *,
+    vary: VariedRange,
+    such_that: Condition,
+    highest: Highest = False,
+    grid: Count = 64,
+    overrides: Overrides = (),
+    threads: Threads | None = None,
+    plugins: Plugins = (),
+    progress: Report | None = None,
+) -> Finding[Threshold]:
+    """Find the lowest or highest value that meets a condition on a metric.
+
+    A grid of values over the range is run in parallel. The bracket between the outermost grid value that meets the
+    condition and its outer neighbour is then divided repeatedly, down to 1e-6 of the range. A change of the condition
+    between two neighbouring grid values that both meet it, or both miss it, is not detected.
+
+    Arguments:
+        scenario: name of a scenario, or a .toml file
+        vary: a number of the scenario or its device, and its range, for example 'supply.pressure=20..90 psi_g'
+        such_that: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m', or 'follows': the
+            run follows a reference that the actuator can give
+        highest: find the highest value
+        grid: number of evenly spaced values to try first; default 64
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        threads: number of threads; default: all cores
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is a Threshold: the value, and the metric there
+
+    Raises:
+        StudyError: a range or a condition that cannot be used, and a grid of which every run fails
+        ScenarioError: a scenario that cannot be used
+
+    >>> import ppafo
+    >>> task, metric = "torque-task-proportional", "rms_error <= 0.5 N m"
+    >>> print(ppafo.find(task, vary="supply.pressure=20..90 psi_g", such_that=metric).said[0])
+    supply.pressure = 54.7758 psi_g is the lowest value that meets rms_error <= 0.5 N m: rms_error is 0.5 N m there
+    (bracketed to 3e-05 psi)
+    """
+    name_plugins(plugins)
+    import numpy as np
+
+    from ppafo.loading import scenario_or_load
+    from ppafo.parameters.parameter_set import PATHS_THAT_SET_UNITS, units_of_texts
+    from ppafo.report.kind import of_path
+    from ppafo.simulation.declaration import changes_reach
+    from ppafo.simulation.gains import remark_on_following_gains
+    from ppafo.simulation.numbers import NOISE_SEED
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
+    from ppafo.studies.draws import seeds_of_noise
+    from ppafo.studies.study import with_overrides
+    from ppafo.study.runs import RunCounter, excess, scenario_runs, settled, with_companions
+
+    base = with_overrides(scenario_or_load(scenario), overrides)
+    warn_of_coarse_pairs([base], [vary.partition("=")[0].strip()])
+    # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
+    ranged = vary.rpartition("..")[2] if vary.strip().startswith(PATHS_THAT_SET_UNITS) else ""
+    given = units_of_texts((ranged, such_that.rpartition("=")[2]))
+    with shown_in({**base.device.shown, **given}):
+        with at_fault("vary"):
+            path, low, high = _range(vary, base)
+        with at_fault("such_that"):
+            limit = _limit(such_that, base, path.path)
+        if not FEWEST <= grid <= MOST:
+            raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
+        # The same streams for all values, so that neighbours differ by the value alone.
+        seeds = seeds_of_noise([base], [path.path], _STREAMS, _SEED)
+        streams, reach_varies = max(1, seeds.size), changes_reach([path.path])
+        wanted = "highest" if highest else "lowest"
+        counter = RunCounter(grid * streams, progress)
+        runs = scenario_runs(base, with_companions([limit.metric], base), counter, (), threads)
+
+        def tried(values: Floats) -> Rows:
+            columns = {path.path: np.tile(values, streams)}
+            if seeds.size:
+                columns[NOISE_SEED] = np.repeat(seeds, values.size)
+            rows = runs.run(columns)
+            verdicts = excess(rows, base, columns)
+            return judged(rows[limit.metric], settled(rows, limit.metric), verdicts, limit, reach_varies, streams)
+
+        rows, index, outer = outermost(tried, low, high, grid, highest)
+        values, is_met, remarks = rows["value"], rows["is_met"], []
+        shown = [] if index is None or limit.text != FOLLOWS else [index]
+        if not np.isfinite(rows["judged"]).any():
+            ends, why = f"from {path.quote(low)} to {path.quote(high)}", runs.reason and f"the first: {runs.reason}"
+            fault = f"no run {ends} gives the metric '{limit.metric}'"
+            if rows["oscillating"].any():
+                fault, why = f"the loop oscillates in every run {ends}", _verdict(base, path, low, has_remedy=True)
+            raise StudyError("; ".join(filter(None, (f"scenario '{base.name}': {fault}", why))))
+        nearest = int((np.nanargmin if limit.is_most else np.nanargmax)(rows["judged"])) if index is None else None
+        if nearest is not None and not rows["follows"][nearest]:
+            # A loop that fails even at the nearest value is why no value meets the condition.
+            shown = [nearest]
+        if outer is not None:
+            try:
+                with_overrides(base, [f"{path.path}={float(values[outer])!r} {SI}"])
+                shown += [outer] if shown else []
+            except (ParameterError, ScenarioError) as error:
+                remarks = [f"it is the {wanted} valid value, not the limit of the condition: {error}"]
+        if not seeds.size:  # with noise a single run does not represent the mean over the noise streams
+            remarks += [_verdict(base, path, float(values[row]), index is None) for row in shown]
+        remarks += [remark_on_following_gains(base, [path.path]), base.origin.replaced]
+        if runs.failures:
+            remarks.append(f"{runs.failures} of {runs.count} runs failed: not met; the first: {runs.reason}")
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], is_met, [False]])))
+        found = Threshold(
+            scenario=base.name,
+            path=path.path,
+            unit=path.quantity.unit,
+            condition=limit.text,
+            metric=limit.metric,
+            limit=limit.limit,
+            wanted=wanted,
+            said="",
+            remarks=list(filter(None, remarks)),
+            value=None if index is None else float(values[index]),
+            nearest=None if nearest is None else float(values[nearest]),
+            metric_at_value=None if index is None else float(rows["metric"][index]),
+            not_met_at=None if outer is None else float(values[outer]),
+            changes=int(np.count_nonzero(np.diff(is_met))),
+            met=[[float(values[first]), float(values[after - 1])] for first, after in edges.reshape(-1, 2)],
+            noise_streams=seeds.size,
+            runs=runs.count,
+            failed=runs.failures,
+            unsettled=int(rows["unsettled"].sum()),
+            tried={name: column.tolist() for name, column in rows.items()},
+        )
+        return _finding(found, rows, of_path(path.path, found.unit, given=path.given), base)
+
+
+def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
+    """Return path, lower and upper bound [SI] of a text ``PATH=LOW..HIGH``; StudyError for any other text."""
+    from ppafo.studies.varying import given_in, varied_path
+    from ppafo.units import split_quantity
+
+    quoted, parts = f"'{one_line(text)}'", _RANGE.fullmatch(text)
+    if parts is None:
+        raise StudyError(f"{quoted} is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'")
+    name, lower, upper = parts.groups()
+    with refused_as(StudyError, quoted, ScenarioError, UnitError):
+        path = varied_path(name, base)
+        # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
+        if not split_quantity(lower)[1]:
+            lower = f"{lower} {split_quantity(upper)[1]}".rstrip()
+        low, high = path.level(lower), path.level(upper)
+    if not low < high:
+        raise StudyError(f"{quoted}: the lower end must be below the upper end")
+    return given_in(path, [upper]), low, high
+
+
+def _limit(text: str, base: Scenario, path: str) -> MetricLimit:
+    """Return the limit of a text ``METRIC <= LIMIT``, ``METRIC >= LIMIT`` or ``follows``; StudyError for others.
+
+    Gauge pressures refer to the ambient pressure of the scenario, unless ``path``, the varied number, is this pressure.
+    """
+    from ppafo.metrics import METRICS
+    from ppafo.simulation.ensemble.running import lacking
+    from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
+
+    quoted, parts = f"'{one_line(text)}'", _CONDITION.fullmatch(text)
+    if text.strip() == FOLLOWS:
+        # Every value that is found follows its reference; of two that do not, the error says which is nearer.
+        tracked = (f"rms_{base.controlled}_error", "rms_error", "torque_error", "peak_torque")
+        errors = [name for name in tracked if name in METRICS and not lacking(base, METRICS[name])]
+        if base.controller.is_open_loop or not errors:
+            raise StudyError(f"{quoted} needs a reference, which scenario '{base.name}' lacks")
+        return MetricLimit(errors[0], math.inf, True, FOLLOWS)
+    if parts is None:
+        raise StudyError(
+            f"{quoted} must be METRIC <= LIMIT or METRIC >= LIMIT, for example 'final_error <= 0.3 N m', or '{FOLLOWS}'"
+        )
+    metric, sign, level = parts.groups()
+    check_metrics([metric], base)
+    limit = level_of(level, metric, quoted, atmosphere_of(base, [path]))
+    return MetricLimit(metric, limit, sign == "<=", f"{metric} {sign} {level}")
+
+
+def outermost(
+    tried: Callable[[Floats], Rows], low: float, high: float, grid: int, highest: bool
+) -> tuple[Rows, int | None, int | None]:
+    """Return columns of all tried values, ascending, and rows of the outermost one that is met and its outer neighbour.
+
+    ``tried`` returns columns for values, of which ``is_met`` decides. Rows are None if missing.
+
+    >>> import numpy as np
+    >>> rows, index, outer = outermost(lambda values: {"is_met": values >= 2.5}, 0.0, 9.0, 10, False)
+    >>> print(f"{rows['value'][index]:.5f}, {rows['value'].size} values")
+    2.50000, 134 values
+    """
+    import numpy as np
+
+    values = np.linspace(low, high, grid)
+    rows = {"value": values, **tried(values), "is_of_grid": np.full(grid, True)}
+    while True:
+        met = np.flatnonzero(rows["is_met"])
+        if not met.size:
+            return rows, None, None
+        index = int(met[-1] if highest else met[0])
+        outer = index + (1 if highest else -1)
+        if not 0 <= outer < rows["value"].size:
+            return rows, index, None
+        value, neighbour = rows["value"][[index, outer]].tolist()
+        if abs(value - neighbour) <= ACCURACY * (high - low):
+            return rows, index, outer
+        # Runs of a bracket are simulated side by side, which is faster than one run at a time by bisection.
+        values = np.linspace(value, neighbour, _PARTS + 1)[1:-1]
+        more = {"value": values, **tried(values), "is_of_grid": np.full(values.size, False)}
+        order = np.argsort(np.concatenate([rows["value"], values]), kind="stable")
+        rows = {name: np.concatenate([column, more[name]])[order] for name, column in rows.items()}
+
+
+def judged(
+    metric: Floats, settled: Floats, verdicts: TrackingExcess, limit: MetricLimit, reach_varies: bool, streams: int
+) -> Rows:
+    """Return columns (values,) of runs (streams * values,), given by metric, number in its place if it swings, verdict.
+
+    - ``metric``, ``spread``: mean and standard deviation over the noise streams [SI]; nan if a run failed
+    - ``judged``: number compared with the limit: the mean of ``settled``; nan if the loop oscillates throughout
+    - ``excess``: tracking error divided by its limit [-], the largest; up to 1 the reference is followed
+    - ``follows``, ``is_kept``, ``is_met``: True if the reference is followed in all streams, the limit kept, and both
+    - ``unsettled``, ``oscillating``: number of runs that swing in the second half of the hold, and throughout
+    """
+    import numpy as np
+
+    def by_value(runs: NDArray[Any]) -> NDArray[Any]:
+        return runs.reshape(streams, -1)
+
+    # Nobody would build on a loop whose command turns all the time.
+    oscillates = verdicts.oscillates == 1.0
+    fails = (verdicts.follows == 0.0) & ~verdicts.excused
+    if limit.text == FOLLOWS:
+        # A run without a verdict is none that follows, and a torque just beyond the actuator's is not reached.
+        fails = (verdicts.follows != 1.0) | ((verdicts.beyond_reach > 0.0) & reach_varies)
+    number = by_value(np.where(oscillates, np.nan, settled)).mean(axis=0)
+    is_kept, follows = np.asarray(limit.is_kept(number)), np.logical_not(by_value(fails).any(axis=0))
+    return {
+        "metric": by_value(metric).mean(axis=0),
+        "judged": number,
+        "spread": by_value(metric).std(axis=0, ddof=min(1, streams - 1)),
+        "excess": by_value(verdicts.largest).max(axis=0),
+        "follows": follows,
+        "is_kept": is_kept,
+        "is_met": is_kept & follows,
+        "unsettled": by_value(settled > metric).sum(axis=0),
+        "oscillating": by_value(oscillates).sum(axis=0),
+    }
+
+
+def _verdict(base: Scenario, path: VariedPath, value: float, has_remedy: bool) -> str:
+    """Return value [SI] and verdict of its run, a torque beyond the actuator's included, with the remedy if asked."""
+    from ppafo.remedy_trials import tried
+    from ppafo.running import simulate
+    from ppafo.simulation.declaration import changes_reach
+    from ppafo.simulation.tracking.remarks import standing_still
+    from ppafo.simulation.tracking.remedies import change_text
+    from ppafo.simulation.tracking.rule import CRITERION_TEXTS
+    from ppafo.simulation.tracking.shortfall import shortfall
+    from ppafo.studies.study import with_overrides
+
+    # Given in the unit of the range, the value and what is said of it are in that unit.
+    result = simulate(with_overrides(base, [f"{path.path}={path.quote(value, '.17g')}"]))
+    # The remedy that succeeds decides between possible causes.
+    verdict = tried(result.scenario, result.tracking)
+    lacking = float(shortfall(result.scenario).max())
+    said = verdict.sentence
+    if not verdict.fails and lacking > 0.0 and changes_reach([path.path]):
+        said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
+    elif verdict.fails and not has_remedy:
+        said = "; ".join(filter(None, (verdict.found, verdict.cause)))
+    said = "; ".join(filter(None, (said, standing_still(result, not verdict.fails))))
+    return said and f"at {path.quote(value, '.9g')} {said}"
+
+
+def _finding(found: Threshold, rows: Rows, kind: Kind, base: Scenario) -> Finding[Threshold]:
+    """Return a search as a finding: sentences, table of intervals that meet the condition, metric over value."""
+    import numpy as np
+
+    from ppafo.parameters.overrides import over
+    from ppafo.report.finding import Finding, Section, columns_of
+    from ppafo.report.kind import of_metric
+    from ppafo.simulation.numbers import changes_in
+    from ppafo.wording import override_text
+
+    values, of_limit, is_verdict = rows["value"], of_metric(found.metric), found.condition == FOLLOWS
+    # Values that meet the condition although the run does not follow its reference.
+    missed = 0 if is_verdict else int(np.count_nonzero(~rows["follows"] & rows["is_kept"]))
+    meets = "lets the run follow its reference" if is_verdict else f"meets {found.condition}"
+    meets += " and follows its reference" * bool(missed)
+    row = int(np.searchsorted(values, next(each for each in (found.value, found.nearest) if each is not None)))
+    name, number = found.metric, float(rows["metric"][row])
+    if rows["judged"][row] > number:
+        name, number = _SETTLED, float(rows["judged"][row])
+    used, remarks = "", [*found.remarks]
+    if found.value is None:
+        # The nearest one says whether a wider range could.
+        there = "" if is_verdict else f"{name} of {of_limit.text(number)} at "
+        ends = f"from {kind.text(values[0])} to {kind.text(values[-1])}"
+        said = f"none of the {values.size} values of {found.path} {ends} {meets}; the nearest is {there}"
+        said += kind.text(values[row])
+    else:
+        # In more digits than are shown, so that the value that is pasted meets the condition.
+        used = override_text(over(base.origin.overrides, [f"{found.path}={kind.text(found.value, '.9g')}"]))
+        said = f"{found.path} = {kind.text(found.value)} is the {found.wanted} value that {meets}"
+        there = "" if is_verdict else f": {name} is {of_limit.text(number)} there"
+        if found.not_met_at is None:
+            further = "higher" if found.wanted == "highest" else "lower"
+            said += f", at the end of the range{there}; a wider range may have a {further} value"
+        else:
+            said += f"{there} (bracketed to {kind.change(abs(found.value - found.not_met_at), '.1g')})"
+            outer = row + (1 if found.wanted == "highest" else -1)
+            why = "the loop oscillates" if rows["oscillating"][outer] else "the reference is not followed"
+            if rows["oscillating"][outer] or (rows["is_kept"][outer] and not is_verdict):
+                said += f"; {'above' if found.wanted == 'highest' else 'below'} it {why}"
+    if found.noise_streams:
+        remarks.append(f"the metric is the mean over {found.noise_streams} streams of sensor noise")
+        if found.value is not None:
+            spread = of_limit.change(float(rows["spread"][row]))
+            remarks[-1] += f", over which it varies by {spread} (standard deviation): one run may miss the condition"
+    if found.unsettled:
+        remarks.append(f"{found.unsettled} runs swing in the second half of the hold: its RMS error must meet it too")
+    if turning := int(rows["oscillating"].sum()):
+        remarks.append(f"in {turning} of {found.runs} runs the loop oscillates: not met")
+    if missed:
+        remarks.append(f"at {missed} values the condition is met, but the reference is not followed")
+    # Ends of intervals that are values of the grid are not bracketed as the value found is.
+    grid, met = values[rows["is_of_grid"]], f"the condition is met{' and the reference followed' * bool(missed)}"
+    exact = (values[0], values[-1], found.value)
+    inner = ", ".join(kind.number(end) for interval in found.met for end in interval if end not in exact)
+    beyond = f"of the grid; the condition may be met up to {kind.change(grid[1] - grid[0])} beyond"
+    drawn = "error, swing, peak or command reversals, each divided by its limit, whichever is largest," * is_verdict
+    return Finding(
+        name="find",
+        kicker="Search",
+        title=f"The {found.wanted} {found.path} such that {'the run ' * is_verdict}{found.condition}",
+        said=(said, *remarks),
+        parts=(
+            Section(
+                "Where the condition is met",
+                columns_of(("from", "to"), [[kind.text(end) for end in interval] for interval in found.met]),
+                remarks=[f"{inner}: {beyond}"] if inner else [],
+            ),
+            Section("To use the value" if used else "", code=used),
+            Section(
+                "Metric over the value",
+                panels=(_panel(found, rows, kind, of_limit, met),),
+                name="find",
+                caption=f"The {drawn or 'metric'} over the value; dashed: the limit; shaded and full: where {met}"
+                f"{'; a torque beyond the reach of the actuator does not meet it' * is_verdict}.",
+            ),
+        ),
+        found=replace(found, said=said, remarks=remarks),
+        passed=found.value is not None,
+        overrides=changes_in(base),
+    )
+
+
+def _panel(found: Threshold, rows: Rows, kind: Kind, of_limit: Kind, met: str) -> Panel:
+    """Return a panel of the metric over the value, with the limit, the values that meet it, and the result."""
+    from ppafo.report.kind import Kind
+    from ppafo.report.panels import Mark, Panel
+    from ppafo.report.style import BLACK, BLUE, GREEN, GREY, VERMILION
+
+    values, metric, number, limit = rows["value"], rows["metric"], rows["judged"], found.limit
+    if found.condition == FOLLOWS:
+        # What decides whether a run follows is the excess, which has no larger number beside it.
+        metric = number = rows["excess"]
+        of_limit, limit = Kind("Largest tracking number over its limit"), 1.0
+    of_grid, is_met, turns = rows["is_of_grid"], rows["is_met"], rows["oscillating"] > 0
+    marks = [Mark("line", values, metric)]
+    groups: tuple[tuple[Any, Floats, str, str, dict[str, Any]], ...] = (
+        (of_grid & is_met, metric, "", BLUE, {"marker": "o"}),
+        (of_grid & ~is_met, metric, "", BLUE, {"marker": "o", "markerfacecolor": "white"}),
+        (of_grid & turns, metric, "the loop oscillates", BLACK, {"marker": "x", "markersize": 7}),
+        # The RMS error where that is larger, and what the condition is asked of.
+        (number > metric, number, f"{_SETTLED}, if it swings", GREY, {"marker": "+", "markersize": 6}),
+    )
+    for which, numbers, label, colour, style in groups:
+        if which.any():
+            dots = {"linestyle": "", "markersize": 4, **style}
+            marks.append(Mark("line", values[which], numbers[which], label=label, colour=colour, style=dots))
+    marks.append(Mark("level", (), limit, label="limit", colour=BLACK, style={"linestyle": "--", "linewidth": 1.0}))
+    marks += [Mark("span", ends, label="" if row else met, colour=GREEN) for row, ends in enumerate(found.met)]
+    if found.value is not None:
+        text = f"found: {kind.number(found.value, '.4g')} {kind.axis_unit}".rstrip()
+        marks.append(Mark("at", found.value, label=text, colour=VERMILION))
+    return Panel(kind, of_limit, tuple(marks))
