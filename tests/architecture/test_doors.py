@@ -50,7 +50,7 @@ def texts_of_kinds() -> list[str]:
         "device.valve": own_names(VALVES),
         "motion.kind": own_names(MOTIONS),
         "reference.of": [name for name in CONTROLLED if name != "torque"],
-        "controller.kind": [*own_names(CONTROLLERS), *WALKING_CONTROLLERS],
+        "controller.kind": [*own_names(CONTROLLERS), *own_names(WALKING_CONTROLLERS)],
         "reference.kind": own_names(PROFILES),
     }
     return [f"{path}={name}" for path, names in wanted.items() for name in names]
