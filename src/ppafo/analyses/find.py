@@ -44,8 +44,7 @@ _PARTS = 32
 """Number of parts into which a bracket is divided: this many parallel runs take little longer than one run."""
 _STREAMS, _SEED = 16, 1
 """Number of noise streams for every value if sensors are noisy, the same for all values, and their random seed."""
-_RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
-_CONDITION = re.compile(r"\s*([\w.:]+)\s*(<=|>=)\s*(.+?)\s*")
+_RANGE, _CONDITION = r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*", r"\s*([\w.:]+)\s*(<=|>=)\s*(.+?)\s*"
 _SETTLED = "RMS error in the second half of the hold"
 """Number that decides in place of the error of one instant, for a loop that swings."""
 
@@ -226,7 +225,7 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
     from ppafo.studies.varying import given_in, varied_path
     from ppafo.units import split_quantity
 
-    quoted, parts = f"'{one_line(text)}'", _RANGE.fullmatch(text)
+    quoted, parts = f"'{one_line(text)}'", re.fullmatch(_RANGE, text)
     if parts is None:
         raise StudyError(f"{quoted} is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'")
     name, lower, upper = parts.groups()
@@ -250,7 +249,7 @@ def _limit(text: str, base: Scenario, path: str) -> MetricLimit:
     from ppafo.simulation.ensemble.running import lacking
     from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, level_of
 
-    quoted, parts = f"'{one_line(text)}'", _CONDITION.fullmatch(text)
+    quoted, parts = f"'{one_line(text)}'", re.fullmatch(_CONDITION, text)
     if text.strip() == FOLLOWS:
         # Every value that is found follows its reference; of two that do not, the error says which is nearer.
         tracked = (f"rms_{base.controlled}_error", "rms_error", "torque_error", "peak_torque")
@@ -395,15 +394,15 @@ def _finding(found: Threshold, rows: Rows, kind: Kind, base: Scenario) -> Findin
         used = override_text(over(base.origin.overrides, [f"{found.path}={kind.text(found.value, '.9g')}"]))
         said = f"{found.path} = {kind.text(found.value)} is the {found.wanted} value that {meets}"
         there = "" if is_verdict else f": {name} is {of_limit.text(number)} there"
+        further, beside, step = ("higher", "above", 1) if found.wanted == "highest" else ("lower", "below", -1)
         if found.not_met_at is None:
-            further = "higher" if found.wanted == "highest" else "lower"
             said += f", at the end of the range{there}; a wider range may have a {further} value"
         else:
             said += f"{there} (bracketed to {kind.change(abs(found.value - found.not_met_at), '.1g')})"
-            outer = row + (1 if found.wanted == "highest" else -1)
-            why = "the loop oscillates" if rows["oscillating"][outer] else "the reference is not followed"
-            if rows["oscillating"][outer] or (rows["is_kept"][outer] and not is_verdict):
-                said += f"; {'above' if found.wanted == 'highest' else 'below'} it {why}"
+            if rows["oscillating"][row + step]:
+                said += f"; {beside} it the loop oscillates"
+            elif rows["is_kept"][row + step] and not is_verdict:
+                said += f"; {beside} it the reference is not followed"
     if found.noise_streams:
         remarks.append(f"the metric is the mean over {found.noise_streams} streams of sensor noise")
         if found.value is not None:
