@@ -48,8 +48,6 @@ def _scalar(value: Any) -> Any:
     Otherwise a NumPy time would count as a whole number, and a masked value as the hidden number. A number that carries
     a unit becomes the text of both, as a person writes it.
     """
-    if type(value) is float or isinstance(value, NumberWithUnit):
-        return value
     if (with_unit := carried(value)) is not None:
         number = _scalar(with_unit.magnitude)
         is_number = isinstance(number, numbers.Real) and not isinstance(number, bool)
@@ -68,21 +66,16 @@ def taken_flag(value: Any) -> bool:
     return flag
 
 
-def taken_whole(lowest: int) -> Callable[[Any], int]:
+def taken_whole(lowest: int) -> Callable[[Any], Any]:
     """Return a converter of whole numbers not below ``lowest``, also from NumPy, with ValueError for others."""
-
-    def take(value: Any) -> int:
-        whole = _scalar(value)
-        is_whole = isinstance(whole, numbers.Integral) and not isinstance(whole, bool)
-        if not is_whole or not lowest <= int(whole) < 10**MAXIMUM_DIGITS:
-            raise ValueError
-        return int(whole)
-
-    return take
+    return taken_number(NumberRange(lowest, highest=10**MAXIMUM_DIGITS - 1), of=int)
 
 
-def taken_number(allowed: NumberRange = ANY, read: Callable[[str], Any] | None = None) -> Callable[[Any], Any]:
+def taken_number(
+    allowed: NumberRange = ANY, read: Callable[[str], Any] | None = None, of: type[float] = float
+) -> Callable[[Any], Any]:
     """Return a converter of finite numbers in a range, also from NumPy, or of texts converted by ``read``."""
+    kind: Any = numbers.Integral if of is int else numbers.Real
 
     def take(value: Any) -> Any:
         number = _scalar(value)
@@ -91,10 +84,11 @@ def taken_number(allowed: NumberRange = ANY, read: Callable[[str], Any] | None =
         if read is not None and carried(value) is not None:
             # What carries no dimension is no number in SI: a share is one, a mass is not.
             return read(f"{number!r} 1")
-        is_number = isinstance(number, numbers.Real) and not isinstance(number, bool)
-        if not is_number or not math.isfinite(number) or float(number) not in allowed:
+        if isinstance(number, bool) or not isinstance(number, kind) or not math.isfinite(number):
             raise ValueError
-        return number if isinstance(number, NumberWithUnit) else float(number)
+        if of(number) not in allowed:
+            raise ValueError
+        return number if isinstance(number, NumberWithUnit) else of(number)
 
     return take
 

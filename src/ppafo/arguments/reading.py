@@ -108,10 +108,8 @@ def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]
 
 def minutes(text: str) -> float:
     """Return a time [min] from a number or a text with unit; ArgumentError for any other text."""
-    try:
+    with refused_as(ArgumentError, f"{text!r}: must be a number of minutes, or a time such as '90 s'", UnitError):
         value = float(text) if NUMBER.fullmatch(text) else parse_quantity(text, "s") / 60.0
-    except UnitError as error:
-        raise ArgumentError(f"{text!r}: must be a number of minutes, or a time such as '90 s': {error}") from error
     if not 0.0 < value < math.inf:
         raise ArgumentError(f"{text}: must be finite and above 0 min")
     return value

@@ -10,6 +10,7 @@ import sys
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -150,17 +151,22 @@ def accepted_values(annotation: Any) -> AcceptedValues:
         taking = [(item.what, item.take) for item in inner[1:] if isinstance(item, Word) and item.take]
         return _single(*taking[-1]) if taking else accepted_values(inner[0])
     if origin in (typing.Union, types.UnionType):
-        of_any = _either([accepted_values(item) for item in inner if item is not types.NoneType])
-        return of_any._replace(allows_none=types.NoneType in inner)
+        options = [accepted_values(item) for item in inner if item is not types.NoneType]
+        first = AcceptedValues(tuple(kind for each in options for kind in each.kinds), partial(_first_of, options))
+        return (first if len(options) > 1 else options[0])._replace(allows_none=types.NoneType in inner)
     if annotation in _PLAIN:
         return _single(*_PLAIN[annotation])
     kind = origin or annotation
     if issubclass(kind, Mapping):
-        return _mapping(accepted_values(inner[1]))
+        return AcceptedValues(("a dictionary with strings as keys",), partial(_items, accepted_values(inner[1])))
     if inner and issubclass(kind, Iterable):
-        return _several(accepted_values(inner[0]))
-    described = "a function" if kind is collections.abc.Callable else f"a {kind.__name__}"
-    return _single(described, lambda value: _of_class(kind, value))
+        element = accepted_values(inner[0])
+        return AcceptedValues((*element.kinds, "several"), partial(_each, element))
+    return _single("a function" if kind is collections.abc.Callable else f"a {kind.__name__}", partial(_of_class, kind))
+
+
+def _single(what: str, take: Callable[[Any], Any]) -> AcceptedValues:
+    return AcceptedValues((what,), lambda _, value: take(value))
 
 
 def _of_class(kind: type, value: Any) -> Any:
@@ -170,43 +176,27 @@ def _of_class(kind: type, value: Any) -> Any:
     return value
 
 
-def _single(what: str, take: Callable[[Any], Any]) -> AcceptedValues:
-    return AcceptedValues((what,), lambda _, value: take(value))
+def _first_of(options: list[AcceptedValues], name: str, value: Any) -> Any:
+    """Return what the first option that accepts a value makes of it."""
+    errors: list[ArgumentError] = []
+    for option in options:
+        try:
+            return option.take(name, value)
+        except ArgumentError as error:
+            errors.append(error)
+    raise next((error for error in reversed(errors) if str(error).startswith(f"{name}[")), TypeError())
 
 
-def _several(element: AcceptedValues) -> AcceptedValues:
-    """Return the converter of one or several values to a tuple; a single value counts as a list of one."""
-
-    def take(name: str, value: Any) -> Any:
-        # A table of pandas or xarray has keys like a dictionary; iterating over it yields the names of its columns.
-        if isinstance(value, str | bytes | os.PathLike) or hasattr(value, "keys") or not isinstance(value, Iterable):
-            return (element.take(name, value),)
-        return tuple(element.take(f"{name}[{index}]", item) for index, item in enumerate(value))
-
-    return AcceptedValues((*element.kinds, "several"), take)
+def _items(element: AcceptedValues, name: str, value: Any) -> dict[str, Any]:
+    """Return a copy of a dictionary with text keys, with each value converted."""
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise TypeError
+    return {key: element.take(f"{name}[{key!r}]", item) for key, item in value.items()}
 
 
-def _mapping(element: AcceptedValues) -> AcceptedValues:
-    """Return the converter of a dictionary with text keys; it returns a copy with each value converted."""
-
-    def take(name: str, value: Any) -> dict[str, Any]:
-        if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
-            raise TypeError
-        return {key: element.take(f"{name}[{key!r}]", item) for key, item in value.items()}
-
-    return AcceptedValues(("a dictionary with strings as keys",), take)
-
-
-def _either(kinds: list[AcceptedValues]) -> AcceptedValues:
-    """Return the converter that applies the first suitable one of several converters."""
-
-    def take(name: str, value: Any) -> Any:
-        errors: list[ArgumentError] = []
-        for kind in kinds:
-            try:
-                return kind.take(name, value)
-            except ArgumentError as error:
-                errors.append(error)
-        raise next((error for error in reversed(errors) if str(error).startswith(f"{name}[")), TypeError())
-
-    return kinds[0] if len(kinds) == 1 else AcceptedValues(tuple(each for kind in kinds for each in kind.kinds), take)
+def _each(element: AcceptedValues, name: str, value: Any) -> tuple[Any, ...]:
+    """Return one or several values, converted; a single value counts as a list of one."""
+    # A table of pandas or xarray has keys like a dictionary; iterating over it yields the names of its columns.
+    if isinstance(value, str | bytes | os.PathLike) or hasattr(value, "keys") or not isinstance(value, Iterable):
+        return (element.take(name, value),)
+    return tuple(element.take(f"{name}[{index}]", item) for index, item in enumerate(value))
