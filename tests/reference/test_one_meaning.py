@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from ppafo.loading import load_scenario
+from ppafo.page.workbench import _settings as page_settings
 from ppafo.simulation import numbers
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
-from scripts.one_meaning import BuiltLibrary, at_library, at_study
+from scripts.one_meaning import OTHER_PROGRAM, BuiltLibrary, at_library, at_study
 from scripts.typed_words import single
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -30,6 +31,24 @@ def test_settings_of_a_library_are_single_runs_with_the_same_words_or_refused_by
     assert found.differing == []
     assert found.same > 8
     assert found.refused > 0
+
+
+@needs_gcc
+@pytest.mark.parametrize("name", [*list_scenarios(), *list_walks()])
+def test_a_slider_of_a_page_moves_over_values_that_its_program_runs(name: str, tmp_path: Path) -> None:
+    scenario = load_scenario(name)
+    built, room = BuiltLibrary(scenario, tmp_path), scenario.device.supply.atmospheric_pressure
+    dead = {}
+    for one in page_settings(scenario, built.library, ()):
+        # What a browser lets a slider have is a whole number of steps above its lower end.
+        shown = {
+            one["from"] + one["step"] * (place * ((one["to"] - one["from"]) / one["step"]) // 19) for place in range(20)
+        }
+        zero = float(one["offset"]) + room * one["gauge"]
+        given = [float(f"{zero + float(one['scale']) * position:.12g}") for position in shown if not one["hidden"]]
+        found = [built.planned(built.changed({one["path"]: number}), "no run") for number in given]
+        dead |= {one["path"]: found} if found.count(OTHER_PROGRAM) > len(found) / 4 else {}
+    assert dead == {}
 
 
 @needs_gcc

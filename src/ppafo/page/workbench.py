@@ -20,12 +20,12 @@ from ppafo.arguments import Overrides, checked
 from ppafo.errors import ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.conditions import limits_in_c
 from ppafo.exports.c_library.files import OUTPUTS
 from ppafo.exports.c_library.library import ExportParameter, Library
 from ppafo.loading import load_scenario
 from ppafo.model.controlled import CONTROLLED
 from ppafo.page.module import module_of
-from ppafo.parameters.declaration import limits_text
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.display_units import metric_quantity, metric_words
@@ -168,18 +168,21 @@ def _settings(scenario: Scenario, library: Library, first: Sequence[str]) -> lis
     absent = {name for names, is_above in library.switches if not is_above for name in names}
     words = CONTROLLED[scenario.controlled].words
     order = {path: place for place, path in enumerate(first)}
+    absent |= {"controller_period"} if library.program.program.samples_inside else set()
+    sample = min(one.value for one in library.settings if one.path in ("run.output_interval", "controller.period"))
     return [
         {
             "path": setting.path,
             "name": setting.name,
-            "limits": _typeset(limits_text(setting.quantity)),
+            "ends": limits_in_c(setting.quantity),
+            "least": "at least" if setting.quantity.minimum_allowed else "more than",
             "rules": _rules(setting, library, words),
             "label": library.worded(label_of(setting.path, words)),
             "summary": library.worded(setting.quantity.summary or setting.quantity.name),
             "si": "" if setting.quantity.unit == "1" else setting.quantity.unit,
             "value": setting.value,
             "first": order.get(setting.path, -1),
-            **_slider(setting, scenario.device.supply.atmospheric_pressure, absent),
+            **_slider(setting, scenario.device.supply.atmospheric_pressure, absent, sample),
         }
         for setting in library.settings
     ]
@@ -194,7 +197,7 @@ def _rules(setting: ExportParameter, library: Library, words: str) -> str:
     return f"it must be {' and '.join(rules)}" if rules else ""
 
 
-def _slider(setting: ExportParameter, atmosphere: float, absent: Collection[str]) -> dict[str, Any]:
+def _slider(setting: ExportParameter, atmosphere: float, absent: Collection[str], sample: float) -> dict[str, Any]:
     """Return how a setting is shown, with the ends of its slider in this unit: from 0 to 2.5 times its value."""
     quantity = setting.quantity
     shown = _shown(quantity.unit, quantity_of_unit, is_absolute=setting.path == ATMOSPHERE_PATH)
@@ -202,12 +205,16 @@ def _slider(setting: ExportParameter, atmosphere: float, absent: Collection[str]
     value, low, high = (
         (number - zero) / float(shown["scale"]) for number in (setting.value, quantity.minimum, quantity.maximum)
     )
-    size = _round_up(2.5 * abs(value)) if value else 1.0
+    size, step = _round_up(2.5 * abs(value)) if value else 1.0, 0.0
+    if setting.path == "controller.period":
+        # Other periods may have samples between steps, which is another program.
+        low = step = sample / float(shown["scale"])
+        size = max(size, 20.0 * step)
     if setting.path == "run.duration":
         size = high = _LONGER * value
     start, end = max(low, -size if value < 0.0 else 0.0), min(high, size)
     start, end = min(start, value), max(end, value)
-    step = _round_up((end - start) / 250.0)
+    step = step or _round_up((end - start) / 250.0)
     if not quantity.minimum_allowed and start <= low:
         start = low + step
     is_hidden, is_length = setting.path in _HIDDEN or setting.name in absent, setting.path == "run.duration"
@@ -233,7 +240,8 @@ def _shown(
     unit = f"{unit[:-2]}_a" if is_absolute else unit
     scale, offset, is_gauge = conversion(unit, "" if si == "1" else si)
     zero = QUANTITIES[quantity].zero if quantity else 0.0
-    return {"unit": _typeset(unit), "scale": str(scale), "offset": str(offset), "gauge": is_gauge, "zero": zero}
+    numbers = {"scale": str(scale), "offset": str(offset), "gauge": is_gauge, "zero": zero}
+    return {"unit": _typeset(unit), "typed": unit, **numbers}
 
 
 def _typeset(text: str) -> str:

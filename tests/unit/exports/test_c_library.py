@@ -177,7 +177,9 @@ def test_a_setting_that_no_file_could_have_is_refused_by_name(
 
 
 @pytest.mark.parametrize(
-    ("setting", "value"), [("valve_delay", 0.01), ("sensors_angle_noise", 0.01), ("sensors_pressure_noise", 100.0)]
+    ("setting", "value"),
+    # With suction, and where samples lie between steps, Python runs other functions.
+    [("valve_delay", 0.01), ("sensors_angle_noise", 0.01), ("supply_pressure", 7.0e4), ("controller_period", 1.2e-3)],
 )
 def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: str, value: float) -> None:
     run = Run(step, **{setting: value})

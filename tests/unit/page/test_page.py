@@ -113,6 +113,7 @@ def _typed(page: Any, name: str, text: str) -> str:
 def test_a_typed_number_and_what_follows_it_give_the_bits_of_python(page: Any, scenario: str) -> None:
     for name, typed, override in (
         ("Valve area mm²", "20.3", "valve.area=20.3 mm^2"),
+        ("Sampling period s", "0.003", "controller.period=3 ms"),
         ("Ankle angle deg", "81.9", "motion.angle=81.9 deg"),
         # Settings that others follow: gauge pressures, and the displacement.
         ("Atmosphere psi abs", "12.2", "supply.atmospheric_pressure=12.2 psi_a"),
@@ -121,6 +122,7 @@ def test_a_typed_number_and_what_follows_it_give_the_bits_of_python(page: Any, s
         _restored(page, scenario)
         _typed(page, name, typed)
         _check(page, override)
+        assert f"={typed} " in page.locator("#command").text_content()
 
 
 def test_a_reload_keeps_settings_and_the_curves_of_another_valve(page: Any) -> None:
@@ -144,6 +146,12 @@ def test_a_reload_keeps_settings_and_the_curves_of_another_valve(page: Any) -> N
 def test_each_cause_of_a_refusal_has_words_of_its_own_and_what_is_out_of_reach_a_curve(page: Any) -> None:
     _restored(page, TASKS[1])
     assert "required, within reach" in page.locator("#legend").text_content()
+    assert "The reference is beyond the reach of the actuator by up to 0.9979 N m." in _wait(page)
+    assert "Valve area = nothing is out of range" in _typed(page, "Valve area mm²", "")
+    _restored(page, TASKS[1])
+    said = _typed(page, "Supply pressure psi gauge", "20000")
+    assert "it must be at least \N{MINUS SIGN}14.55 psi gauge and at most 14490 psi gauge. The curves" in said
+    _restored(page, TASKS[1])
     said = _typed(page, "Valve area mm²", "-3")
     assert "Valve area = \N{MINUS SIGN}3 mm² is out of range: it must be at least 0 mm² and at most" in said
     _restored(page, TASKS[1])
@@ -155,8 +163,11 @@ def test_each_cause_of_a_refusal_has_words_of_its_own_and_what_is_out_of_reach_a
     assert page.locator("#panels figure").count() == page.locator("#panels figure.wide").count() + 2
     address = page.url.partition("#")[0]
     page.goto("about:blank")
-    page.goto(f"{address}#{TASKS[1]}&sensors.delay=0.001")
-    assert 'needs functions that this page has not: write a page with --set "sensors.delay=..."' in _wait(page)
+    page.goto(f"{address}#{TASKS[1]}&nosuch=1&supply.pressure=70000")
+    said = _wait(page)
+    assert 'nosuch".' in said
+    assert 'needs functions that this page has not: write a page with --set "supply.pressure=..."' in said
+    assert said.endswith("The curves are those as written.")
     assert page.wrong == []
 
 

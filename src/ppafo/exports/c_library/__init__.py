@@ -7,7 +7,7 @@ from functools import partial
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
-from ppafo.exports.c_library.conditions import RULES_OF_TIMES, choosing
+from ppafo.exports.c_library.conditions import RULES_OF_TIMES, choosing, other_samples, other_supply
 from ppafo.exports.c_library.entries import check_entry, follow_entry, prepare_entry
 from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import exported
@@ -71,9 +71,6 @@ def scenario_library(scenario: Scenario) -> Library:
     preparation = Preparation(
         scenario, program.program, {setting.path: float(place) for place, setting in enumerate(settings, 1)}
     )
-    # Another program where samples lie between steps and did not, or the other way round.
-    interval = "prepared->counts.interval"
-    was_inside = "true" if program.program.samples_inside else "false"
     return Library(
         title=scenario.name,
         description=" ".join(scenario.description.split()),
@@ -81,7 +78,10 @@ def scenario_library(scenario: Scenario) -> Library:
         settings=settings,
         relations=relations_of(scenario),
         switches=_switches(scenario.device, of_sensors),
-        other_program=((f"({interval} != (double)(int64_t){interval}) != {was_inside}", "run_output_interval"),),
+        other_program=(
+            *other_samples(settings, program.program.samples_inside),
+            other_supply(scenario.device),
+        ),
         words=words_of(scenario, links),
         further=partial(prepare_entry, preparation, VANE_PREPARATION, settings),
         following=partial(follow_entry, settings, links, absent) if links else None,

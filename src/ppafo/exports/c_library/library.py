@@ -37,7 +37,8 @@ class ExportParameter:
 class Relation:
     """Required relation between two settings: ``below``, ``at most``, ``at least`` or ``above``, with ``tolerance``.
 
-    The tolerance is in the unit of both settings, or a fraction of the other if ``is_share``.
+    The tolerance is in the unit of both settings, or a fraction of the other if ``is_share``. ``unless`` is a C
+    condition under which the relation is not required.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Relation:
     other: str
     tolerance: float = 0.0
     is_share: bool = False
+    unless: str = ""
 
 
 Rule = tuple[str, str, tuple[str, ...]]

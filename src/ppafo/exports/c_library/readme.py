@@ -33,7 +33,7 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
         f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}",
         *_fixed_of_device(scenario),
         _at_zero(scenario.device, scenario.sensors.flaws),
-        "whether `run_output_interval` is a whole number of steps of the engine",
+        "whether `run_output_interval` is a whole number of steps of the engine, and whether the supply is suction",
     ]
     left_out = [kind.name for kind in METRICS.values() if kind.traced]
     return {

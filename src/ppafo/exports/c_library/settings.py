@@ -6,7 +6,7 @@ from dataclasses import replace
 from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
 from ppafo.model.catalog import device_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.building import consistency
+from ppafo.parameters.building import SUPPLIES, consistency
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.declared import value_at
 from ppafo.parameters.effects import effects_of
@@ -83,9 +83,26 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
         for longer in ("controller_period", "run_output_interval")
     )
     return (
-        *(Relation(c_identifier(path), relation, c_identifier(other), slack) for path, relation, other, slack in rules),
+        *(
+            Relation(
+                c_identifier(path), relation, c_identifier(other), slack, unless=all_opposite(scenario, relation, other)
+            )
+            for path, relation, other, slack in rules
+        ),
         *of_steps,
     )
+
+
+def all_opposite(scenario: Scenario, relation: str, other: str) -> str:
+    """C condition that every supply is on the opposite side of the atmosphere; empty for a relation to another number.
+
+    Then another program runs, with suction or without; between the two, supplies contradict each other.
+    """
+    if other != ATMOSPHERE_PATH:
+        return ""
+    names = [name for name in map(c_identifier, SUPPLIES) if name not in second_chamber(scenario)]
+    sign = "<=" if relation == "at least" else ">="
+    return " && ".join(f"settings->{name} {sign} settings->{c_identifier(ATMOSPHERE_PATH)}" for name in names)
 
 
 def second_chamber(scenario: Scenario) -> dict[str, str]:

@@ -3,9 +3,9 @@
 /**
  * How a number is shown: SI value = offset + scale * shown value, for a gauge pressure plus the atmosphere.
  * Magnitudes up to ``zero`` [SI] are rounding errors.
- * @typedef {{unit: string, scale: string, offset: string, gauge: boolean, zero: number}} Shown
+ * @typedef {{unit: string, typed: string, scale: string, offset: string, gauge: boolean, zero: number}} Shown
  * @typedef {Shown & {path: string, name: string, label: string, summary: string, si: string, value: number, first: number,
- *   from: number, to: number, step: number, hidden: boolean, longest: boolean, limits: string, rules: string}} Setting
+ *   from: number, to: number, step: number, hidden: boolean, longest: boolean, ends: number[], least: string, rules: string}} Setting
  * @typedef {Shown & {name: string, label: string, short: string}} Entry channel or metric
  * @typedef {{title: string, channels: string[]}} Panel
  * @typedef {{name: string, description: string, command: string, settings: Setting[], channels: Entry[], panels: Panel[],
@@ -32,7 +32,7 @@ let chosen = new Float64Array();
 /** @type {Run} */ let written;
 /** @type {Run} */ let last;
 /** @type {Run[]} */ let kept = [];
-let cursor = NaN, isBusy = false, isAsked = false, timer = 0;
+let cursor = NaN, isBusy = false, isAsked = false, timer = 0, unknown = "";
 
 /** @param {string} id @returns {HTMLElement & {value: string, checked: boolean}} */
 function byId(id) {
@@ -112,8 +112,9 @@ function simulate() {
 /** Why there is no run, in words; empty if there is one. @param {Run} run @returns {string} */
 function fault({cause, name}) {
     const place = simulation.settings.findIndex((one) => one.name === name), setting = simulation.settings[place];
-    const value = cause ? `${setting.label} = ${said(chosen[place], setting)}` : "";
-    return ["", `${value} is out of range: it must be ${setting?.limits}`,
+    const value = cause ? `${setting.label} = ${Number.isNaN(chosen[place]) ? "nothing" : said(chosen[place], setting)}` : "";
+    const limits = setting?.ends.map((end, side) => Math.abs(end) < 1e300 ? `${side ? "at most" : setting.least} ${said(end, setting)}` : "");
+    return ["", `${value} is out of range: it must be ${limits?.filter(Boolean).join(" and ")}`,
         `${value} contradicts another setting${setting?.rules && `: ${setting.rules}`}`,
         `${value} needs functions that this page has not: write a page with --set "${setting?.path}=..."`,
         `${value} is too long: a page runs up to ${setting?.to} ${setting?.unit}`][cause];
@@ -142,13 +143,17 @@ async function refresh() {
 /** Show a run, or say why there is none. @param {Run} run */
 function accept(run) {
     if (run.cause) {
-        byId("said").textContent = `Not simulated: ${fault(run)}. The curves are those of the last run.`;
+        byId("said").textContent = `${unknown}Not simulated: ${fault(run)}. The curves are those ${last === written ? "as written" : "of the last run"}.`;
         return;
     }
     last = run;
     showSettings();
     draw();
-    const words = changes().map(([{path, si}, value]) => ` --set "${path}=${value}${si && ` ${si}`}"`);
+    const words = changes().map(([setting, value]) => {
+        // As it is shown, where this is read as the same number.
+        const short = Number(converter(setting)(value).toPrecision(12)), isSame = toSi(short, setting) === value;
+        return ` --set "${setting.path}=${(isSame ? `${short} ${setting.typed}` : `${value} ${setting.si}`).trim()}"`;
+    });
     byId("command").textContent = simulation.command + words.join("");
     history.replaceState(null, "", `#${[...kept, last].map((one) => one.address).join("|")}`);
     // Once for a whole drag: a screen reader would fall behind.
@@ -161,8 +166,11 @@ function say() {
         const [now, before] = [last, written].map((run) => said(run.metrics[metric.name], metric));
         return `${metric.short} ${now}${now === before ? "" : ` (as written ${before})`}`;
     });
+    const {reference, within_reach} = last.columns, entry = simulation.channels.find(({name}) => name === "within_reach");
+    const most = within_reach?.reduce((found, torque, place) => Math.max(found, Math.abs(reference[place] - torque)), 0);
+    const reach = entry && most ? `The reference is beyond the reach of the actuator by up to ${said(most, entry)}. ` : "";
     const ending = last.status === FINISHED ? "" : `The run ended at ${text(last.time.at(-1) ?? 0)} s: ${ENDINGS[last.status]}. `;
-    byId("said").textContent = `${ending}${found.join("; ")}. Simulated in ${text(last.milliseconds, 2)} ms.`;
+    byId("said").textContent = `${unknown}${reach}${ending}${found.join("; ")}. Simulated in ${text(last.milliseconds, 2)} ms.`;
     byId("command").dataset.checksum = String(last.check);
 }
 
@@ -189,10 +197,8 @@ function control(setting, place) {
     const slider = make("input", {type: "range", min: from, max: to, step, "aria-label": `${label}${unit && `, ${unit}`}`});
     for (const input of [number, slider]) {
         input.addEventListener("input", () => {
-            if (input.value !== "") {
-                chosen[place] = toSi(Number(input.value), setting);
-                refresh();
-            }
+            chosen[place] = input.value === "" ? NaN : toSi(Number(input.value), setting);
+            refresh();
         });
     }
     return make("div", {class: "setting"}, make("label", {for: id}, label, " ", make("small", {}, unit)), number, slider);
@@ -344,6 +350,7 @@ async function openScenario(wanted) {
     byId("settings").replaceChildren();
     delete byId("command").dataset.checksum;
     simulation = simulations.find((one) => one.name === name) ?? simulations[0];
+    unknown = !name || name === simulation.name ? "" : `This page has no scenario "${name}". `;
     const {outputs, compared, settings, metrics, samples, checksum} = simulation, own = worker = new Worker(engine);
     const bytes = Uint8Array.from(atob(simulation.wasm), (letter) => letter.charCodeAt(0));
     worker.postMessage({bytes, outputs, compared, settings: settings.length, metrics: metrics.length});
@@ -354,9 +361,8 @@ async function openScenario(wanted) {
     const asWritten = simulate();
     for (const change of changed) {
         const [path, value] = change.split("="), place = settings.findIndex((setting) => setting.path === path);
-        if (place >= 0 && value) {
-            chosen[place] = Number(value);
-        }
+        unknown += place < 0 ? `${simulation.name} has no setting "${path}". ` : "";
+        chosen[place] = value ? Number(value) : NaN;
     }
     const run = await asWritten;
     if (own !== worker) {
