@@ -100,6 +100,8 @@ def _restored(page: Any, scenario: str) -> None:
     page.select_option("#scenario", scenario)
     _wait(page)
     page.get_by_role("button", name="As written").click()
+    # A refusal of before stays on the page until the run is said.
+    page.locator("#command[data-checksum]").wait_for(state="attached")
     page.evaluate("document.querySelectorAll('details').forEach(group => group.open = true)")
 
 
