@@ -1,11 +1,15 @@
 """Prints what `ppafo validate` names of 14 known faults, of two at once, and how often right recordings disagree.
 
     python scripts/known_faults.py --seeds 4711 4712 --pairs 40 --right 100 --processes 4
+    python scripts/known_faults.py --seeds 4711 4712 --declared
 
 Recordings are step responses of the simulated bench (ideal-laboratory), runs in a tenth of the model's steps: 1 kHz,
 free vane, its own noise. Each fault is one of the record or one number of the
-device. `right`: the fault is named first, or among those that the recordings cannot tell from the first; `wrong`:
-another is named; `none`: none is. ``--pairs`` has two different faults at once, drawn with the first seed: no single
+device. `right`: the fault is named first; `listed`: it is among those that the recordings cannot tell from the first;
+`wrong`: others are named; `usual`: errors that sensors of any bench have are; `none`: none is. ``--declared`` has each
+number that is declared for either kind of valve, the joint, the gas and the effects, in turn, with a loop that moves a
+free vane and white noise; `unseen`: without noise the model of the set differs from the recording by less than that
+noise. ``--pairs`` has two different faults at once, drawn with the first seed: no single
 change explains them. ``--right`` has no fault, with seeds from the first on. ``--noise`` adds a kind of noise of
 ``scripts/interval_coverage.py`` to angle and pressures.
 """
@@ -17,6 +21,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache, reduce
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,9 +35,16 @@ import ppafo
 from ppafo.analyses.validate.result import Validation, in_words
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import PpafoError
+from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.rig.experiments import record
+from ppafo.running import simulate
 from ppafo.signals.recording import Recording
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.storage import write_csv
+from ppafo.validation.agreement import compare_recording
+from ppafo.validation.measured import check_recording
+from ppafo.validation.settings import ReplaySettings
 from scripts.interval_coverage import KINDS, NOISE, disturbed
 from scripts.processes import add_processes, results_of
 
@@ -70,12 +82,16 @@ def clipped(recording: Recording) -> Recording:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault: the record that it makes, numbers of the device by path, and how the words that name it begin."""
+    """A fault: the record that it makes, numbers of the device by path, and how the words that name it begin.
+
+    ``valve`` is the valve of a loop that moves the vane; without one, the recording is a step response of the bench.
+    """
 
     title: str
     named: tuple[str, ...]
     record: Callable[[Recording], Recording] = lambda one: one
     device: tuple[str, ...] = ()
+    valve: str = ""
 
 
 FAULTS = (
@@ -123,11 +139,85 @@ FAULTS = (
     Fault("inertia 30 % high", ("foot_plate.inertia",), device=("foot_plate.inertia=0.01092 kg m^2",)),
 )
 NOTHING = Fault("", ())
-VERDICTS = ("right", "wrong", "none", "refused")
+VERDICTS = ("right", "listed", "usual", "none", "unseen", "wrong", "refused")
+
+MOVED = (*SUPPLY, "motion.kind=free", "motion.angle=60 deg", "run.duration=0.8 s", "reference.kind=sine")
+LOOPS = {
+    "proportional": (
+        *("controller.kind=cascade", "controller.rate=1 kHz", "reference.of=angle", "reference.level=70 deg"),
+        *("reference.amplitude=30 deg", "reference.frequency=2 Hz"),
+        *("initial.pressure_1=20 psi_g", "initial.pressure_2=20 psi_g"),
+    ),
+    "solenoid": (
+        *("controller.kind=on_off", "reference.level=0 N m", "reference.amplitude=1 N m", "reference.frequency=3 Hz"),
+        *("initial.pressure_1=atmosphere", "initial.pressure_2=atmosphere"),
+    ),
+}
+"""Loops that open each valve in part, or often, and keep the vane between its stops; before them all is at rest."""
+RESTING = 50
+"""Samples at rest."""
+SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas", "effects")
+OF_OTHERS = {"gas.molar_mass": 0.029, "gas.heat_capacity_ratio": 1.4, "gas.temperature": 320.0}
+"""Air, in a warm room [SI]."""
+OTHER = 1.3
+"""Other numbers divided by those of the set [-]."""
+LACKED = {
+    **{"": 0.05, "s": 0.03, "Hz": 15.0, "1/s": 40.0, "N m": 0.3, "N m/rad": 0.5, "N m s^2/rad^2": 0.01},
+    **{"rad/s": 0.5, "N m/Pa": 1.0e-6, "m^2": 3.0e-6, "kg/(s Pa^2)": 1.0e-16},
+}
+"""Numbers that are 0 in the set, by unit [SI]."""
+
+
+def declared_faults(valve: str) -> tuple[Fault, ...]:
+    """Every number that is declared for a device with a valve, changed to another plausible one."""
+    find_effects(f"effects.{name}" for name in EFFECTS)
+    scenario = load_scenario("step-response", [f"device.valve={valve}"])
+    absent = {f"{part}.{name}" for part in ("valve", "actuator.leak") for name in other_form(scenario.device, part)}
+    switches = {f"effects.{name}.{switch}" for name, one in EFFECTS.loaded().items() for switch in one.switch}
+    faults = []
+    for path, quantity in declared_numbers(scenario).items():
+        section, _, rest = path.partition(".")
+        if section in SECTIONS and path not in absent and (section != "effects" or path in switches):
+            value = number_at(scenario, path)
+            other = OF_OTHERS.get(path, OTHER * value if value else LACKED[quantity.unit])
+            # A weight at the joint is a torque of gravity towards the other end.
+            twins = {"joint_load.weight": "foot_plate.gravity_torque"}
+            named = (f"{path} ", path, rest, rest.partition(".")[0], twins.get(rest, path))
+            faults.append(Fault(f"{valve}, {path} {other:.4g}", named, device=(f"{path}={other!r} SI",), valve=valve))
+    return tuple(faults)
+
+
+def after_rest(recording: Recording) -> Recording:
+    """The recording after samples at rest, with the command 0 that leaves all as it is."""
+    time = np.arange(RESTING + len(recording)) * (recording.time[1] - recording.time[0])
+    channels = {
+        name: replace(one, values=np.pad(one.values, (RESTING, 0), "constant" if name == "command" else "edge"))
+        for name, one in recording.channels.items()
+    }
+    return replace(recording, time=time, channels=channels)
+
+
+def moved(fault: Fault, seed: int) -> tuple[Recording, bool]:
+    """A recording of a loop with a fault, and whether the model of the set is beyond the noise without it."""
+    used = [f"device.valve={fault.valve}", *MOVED, *LOOPS[fault.valve]]
+    changed_there = {override.partition("=")[0] for override in fault.device}
+    kept = [override for override in used if override.partition("=")[0] not in changed_there]
+    made = simulate(load_scenario("step-response", [*kept, *fault.device])).recording
+    made = after_rest(
+        replace(
+            made, channels={name: made.channels[name] for name in KEPT if name in made and name != "supply_pressure"}
+        )
+    )
+    device = load_scenario("step-response", used).device
+    clean = compare_recording(check_recording(made, device, "r.csv"), device, ReplaySettings())
+    is_seen = any(channel.rms > NOISE[channel.channel] for channel in clean.channels if channel.channel in NOISE)
+    random = np.random.default_rng(seed)
+    white = {name: made[name] + size * random.standard_normal(len(made)) for name, size in NOISE.items()}
+    return changed(made, **white), is_seen
 
 
 def recorded(fault: Fault, seed: int, noise: str = "") -> Recording:
-    """A recording of the rig with a fault, and more noise of a kind."""
+    """A recording of the bench with a fault, and more noise of a kind."""
     words = ("motion.kind=free", *SUPPLY, *fault.device)
     made = record("step-response", preset="ideal-laboratory", seed=seed, overrides=words).recording
     made = replace(made, channels={name: made.channels[name] for name in KEPT if name in made})
@@ -137,20 +227,24 @@ def recorded(fault: Fault, seed: int, noise: str = "") -> Recording:
     return fault.record(made)
 
 
-def validated(fault: Fault, seed: int, noise: str = "") -> Validation:
-    """What `ppafo validate` says of a recording with a fault."""
+def validated(recording: Recording, valve: str = "") -> Validation:
+    """What `ppafo validate` says of a recording."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "recorded.csv"
-        write_csv(file, recorded(fault, seed, noise))
-        return ppafo.validate("ppafo2011", [file], overrides=SUPPLY).found
+        write_csv(file, recording)
+        return ppafo.validate("ppafo2011", [file], overrides=SUPPLY, valve=valve or None).found
 
 
-def judged(fault: Fault, found: Validation) -> str:
-    """`right`, `wrong` or `none`."""
+def judged(fault: Fault, found: Validation, is_seen: bool = True) -> str:
+    """One of ``VERDICTS``, without `refused`."""
     best = found.causes.found
-    if best is None:
-        return "none"
-    return "right" if any(in_words(one).startswith(fault.named) for one in (best, *best.same)) else "wrong"
+    alike = () if best is None else (best, *best.same)
+    is_named = [in_words(one).startswith(fault.named) or one.name in fault.named for one in alike]
+    if any(is_named):
+        return "right" if is_named[0] else "listed"
+    if best is not None and not best.is_usual:
+        return "wrong"
+    return "unseen" if not is_seen else "none" if best is None else "usual"
 
 
 def together(first: Fault, second: Fault) -> Fault:
@@ -172,19 +266,24 @@ class Verdict(NamedTuple):
     seconds: float
 
 
+@cache
+def all_faults() -> tuple[Fault, ...]:
+    """Known faults, and every declared number of devices with either kind of valve."""
+    return (*FAULTS, *(fault for valve in LOOPS for fault in declared_faults(valve)))
+
+
 def verdict_of(places: tuple[int, ...], seed: int, noise: str = "") -> Verdict:
-    """What is said of the faults at places of ``FAULTS`` at once; of none, a right recording."""
-    fault = NOTHING
-    for place in places:
-        fault = together(fault, FAULTS[place]) if fault.title else FAULTS[place]
+    """What is said of the faults at places of ``all_faults`` at once; of none, a right recording."""
+    fault = reduce(together, [all_faults()[place] for place in places] or [NOTHING])
     begun = time.process_time()
     try:
-        found = validated(fault, seed, noise)
+        made, is_seen = moved(fault, seed) if fault.valve else (recorded(fault, seed, noise), True)
+        found = validated(made, fault.valve)
     except PpafoError:
         return Verdict("refused", (), False, time.process_time() - begun)
     best = found.causes.found
     same = () if best is None else tuple(one.name for one in (best, *best.same))
-    return Verdict(judged(fault, found), same, found.passes, time.process_time() - begun)
+    return Verdict(judged(fault, found, is_seen), same, found.passes, time.process_time() - begun)
 
 
 def main() -> None:
@@ -192,35 +291,43 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
     parser.add_argument("--right", type=int, default=0, metavar="COUNT", help="COUNT right recordings")
+    parser.add_argument("--declared", action="store_true", help="declared numbers in turn, not the known faults")
     parser.add_argument("--pairs", type=int, default=0, metavar="COUNT", help="COUNT recordings with two faults")
     parser.add_argument("--noise", choices=tuple(KINDS), default="", help="kind of noise that is added")
     add_processes(parser)
     words = parser.parse_args()
     first, random = words.seeds[0], np.random.default_rng(words.seeds[0])
     drawn = [tuple(random.choice(len(FAULTS), 2, replace=False).tolist()) for _ in range(words.pairs)]
-    work: list[tuple[tuple[int, ...], int]] = [((place,), seed) for place in range(len(FAULTS)) for seed in words.seeds]
+    singles = range(len(FAULTS), len(all_faults())) if words.declared else range(len(FAULTS))
+    work: list[tuple[tuple[int, ...], int]] = [((place,), seed) for place in singles for seed in words.seeds]
     work += [(pair, first + number) for number, pair in enumerate(drawn)]
     work += [((), first + number) for number in range(words.right)]
     results = results_of(verdict_of, [(*one, words.noise) for one in work], words.processes)
     total: Counter[str] = Counter()
     spent = 0.0
-    for fault in FAULTS:
+    for place in singles:
         found = [next(results) for _ in words.seeds]
         counts = Counter(one.word for one in found)
         total += counts
         spent += sum(one.seconds for one in found)
         said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
-        print(f"{fault.title}: {said} ({' or '.join(found[0].named)})", flush=True)
+        print(f"{all_faults()[place].title}: {said} ({' or '.join(found[0].named)})", flush=True)
     each = spent / total.total()
     print(f"\n{', '.join(f'{total[verdict]} {verdict}' for verdict in VERDICTS)}; {each:.1f} CPU s each", flush=True)
     if drawn:
         said_of: Counter[str] = Counter()
         for pair in drawn:
             word = next(results).word
+            word = "right" if word == "listed" else word
             said_of[word] += 1
             if word in ("right", "wrong"):
                 print(f"  {', '.join(FAULTS[place].title for place in pair)}: {word}", flush=True)
-        words_for = {"wrong": "another named", "right": "one named that explains both", "none": "none named"}
+        words_for = {
+            "wrong": "another named",
+            "right": "one named that explains both",
+            "none": "none named",
+            "usual": "within usual errors",
+        }
         words_for["refused"] = "refused when read"
         print(f"two faults at once: {', '.join(f'{said_of[name]} {text}' for name, text in words_for.items())}")
     if words.right:

@@ -172,15 +172,24 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
     )
 
 
-_FACTORS = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
+_FACTORS: tuple[float, ...] = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
 """Trial values of a parameter divided by its value in the set [-]."""
 _OFF = {
     "s": _SHIFTS,
     "": (0.002, 0.006, 0.02, 0.06, 0.2, 0.6),
     "Hz": (3.0, 8.0, 20.0, 50.0, 130.0, 350.0),
     "1/s": (0.5, 2.0, 8.0, 30.0, 120.0, 500.0),
+    "m^2": (1e-8, 1e-7, 1e-6, 1e-5),
+    "kg m^2": (1e-4, 1e-3, 1e-2, 1e-1),
+    "N m": _both_ways(0.02, 0.1, 0.3, 0.8, 3.0),
+    "N m s/rad": (1e-3, 1e-2, 1e-1, 0.9),
+    "N m/rad": (0.03, 0.15, 0.8, 4.0, 20.0),
+    "N m s^2/rad^2": (1e-4, 1e-3, 1e-2, 1e-1),
+    "kg/(s Pa^2)": (1e-18, 1e-17, 1e-16, 1e-15, 1e-14),
+    "rad/s": (0.02, 0.08, 0.35, 1.5, 6.0),
+    "N m/Pa": (1e-8, 5e-8, 2e-7, 1e-6, 5e-6),
 }
-"""Trial values of a number of the valve that is 0 in the set, by its unit: dead times, dead band, spool, slew limit."""
+"""Trial values of a number that is 0 in the set, by its unit."""
 _OF_GASES = {
     "gas.molar_mass": (0.0039, 0.046),
     "gas.heat_capacity_ratio": (1.05, 1.68),
@@ -189,15 +198,15 @@ _OF_GASES = {
 """Ends of what gases in use and rooms have [SI]; other values are no cause."""
 _ATMOSPHERES = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
 """Trial atmospheric pressures divided by the pressure in the set [-]: from a high mountain to a deep mine."""
-_SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas")
-"""Sections of the parameter set whose parameters are tried, in this order."""
-_NOT_TRIED = ("actuator.angle_min", "actuator.angle_max", "actuator.restitution")
-"""Parameters observable only when the vane reaches a stop; a replay starts between the stops."""
+_SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas", "effects")
+"""Sections of the parameter set whose parameters are tried, in this order; effects that the set names alone."""
+_NOT_TRIED = "actuator.restitution"
+"""Parameter observable only when the vane reaches a stop; a replay starts between the stops."""
 _OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
 
 
 def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Iterator[CandidateCause]:
-    """Yield every parameter of the set with trial values, and a wrong atmospheric pressure for gauge sensors."""
+    """Yield every number of the set, 0 or not, with trial values, and a wrong atmosphere under gauge sensors."""
     request = replay_of(measured, device, settings)
     scenario = replace(replayed_scenario(request), device=request.device)
     # Supply pressures that a replay follows in the recording, whatever the set has.
@@ -206,24 +215,32 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
         followed = set(_OF_SUPPLY)
     declared = declared_numbers(scenario)
     other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(request.device, part)}
-    left_out = {*_NOT_TRIED, *other_forms, *followed}
+    off = {
+        path for path in declared if path.startswith("effects.") and path.split(".")[1] not in request.device.effects
+    }
+    left_out = {_NOT_TRIED, *other_forms, *followed, *off}
     by_section = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
     for path in (path for path in by_section if path not in left_out):
         value, quantity = number_at(scenario, path), declared[path]
-        factors = tuple(factor for factor in _FACTORS if quantity.minimum <= factor * value <= quantity.maximum)
-        if path in _OF_GASES and value > 0.0:
-            factors = tuple((np.geomspace(*_OF_GASES[path], _SIZES_OF_AN_EFFECT) / value).tolist())
-        if value > 0.0 and len(factors) > 2:
-            words = f"{path} seems to be {{:.3g}} times the model's value"
-            change = partial(_scaled, path, value)
-            usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
-            yield CandidateCause(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
-    of_valve = [path for path in declared if path.startswith("valve.") and path not in left_out]
-    for path in (path for path in of_valve if declared[path].unit in _OFF and number_at(scenario, path) == 0.0):
-        quantity = declared[path]
-        words = f"{path} seems to be above 0"
-        trials = tuple(size for size in _OFF[quantity.unit] if quantity.minimum <= size <= quantity.maximum)
-        yield CandidateCause(path, words, partial(_scaled, path, 1.0), trials, is_ratio=True, unit=quantity.unit or "-")
+        words, base, trials = f"{path} seems to be {{:.3g}} times the model's value", value, _FACTORS
+        if value == 0.0:
+            sign = "above" if quantity.minimum == 0.0 else "other than"
+            words, base, trials = f"{path} seems to be {sign} 0", 1.0, _OFF.get(quantity.unit, ())
+        elif path in _OF_GASES:
+            trials = tuple((np.geomspace(*_OF_GASES[path], _OF_A_GAS) / value).tolist())
+        trials = tuple(size for size in trials if quantity.minimum <= size * base <= quantity.maximum)
+        if len(trials) > 2:
+            is_ratio = min(trials) > 0.0
+            yield CandidateCause(
+                path,
+                words,
+                partial(_scaled, path, base),
+                trials,
+                is_ratio=is_ratio,
+                usual=math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0,
+                is_off=value == 0.0 and is_ratio,
+                unit=quantity.unit or "-",
+            )
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
     atmosphere = request.device.supply.atmospheric_pressure
 
@@ -253,43 +270,56 @@ def _scaled(path: str, value: float, factor: float) -> ModelChange:
 class _UnknownEffect(NamedTuple):
     """Effect that is off in the model and may be present in the device, with one magnitude to fit.
 
-    ``words`` describes the effect in messages. ``scaled`` are the settings equal to the magnitude, which is tried over
-    the ``range`` [unit of these settings]; ``constant`` are the constant settings.
+    ``words`` describes the effect in messages. ``scaled`` are the settings equal to the magnitude, whose ``unit`` has
+    its trial values, and which is shown times ``shown``; ``constant`` are the constant settings.
     """
 
     name: str
     words: str
     scaled: tuple[str, ...]
-    range: tuple[float, float]
+    unit: str
     constant: Mapping[str, float] = MappingProxyType({})
+    shown: float = 1.0
 
 
 _EFFECTS = (
     _UnknownEffect(
-        name="stribeck",
-        words="friction seems to be higher up to {:.2g} rad/s (Stribeck)",
-        scaled=("velocity",),
-        range=(0.02, 6.0),
+        "stribeck",
+        "friction seems to be higher up to {:.2g} rad/s (Stribeck)",
+        ("velocity",),
+        "rad/s",
         constant={"share": 0.9},
     ),
     _UnknownEffect(
-        name="seal_friction",
-        words="friction seems to grow with pressure by {:.2g} N m/Pa",
-        scaled=("static_per_pressure", "dynamic_per_pressure"),
-        range=(1e-8, 5e-6),
+        "seal_friction",
+        "friction seems to grow with pressure by {:.2g} N m/Pa",
+        ("static_per_pressure", "dynamic_per_pressure"),
+        "N m/Pa",
+    ),
+    _UnknownEffect("joint_load", "a spring of {:.2g} N m/rad seems to act at the joint", ("stiffness",), "N m/rad"),
+    _UnknownEffect(
+        "joint_load", "a drag of {:.2g} N m s^2/rad^2 seems to act at the joint", ("drag",), "N m s^2/rad^2"
+    ),
+    _UnknownEffect(
+        "laminar_leak", "a laminar leak of {:.2g} kg/(s Pa^2) seems to pass the seal", ("coefficient",), "kg/(s Pa^2)"
+    ),
+    _UnknownEffect(
+        "line_resistance", "lines seem to throttle as an orifice of {:.2g} mm^2 does", ("area",), "m^2", shown=1e6
     ),
 )
-_SIZES_OF_AN_EFFECT = 5
-"""Number of trial magnitudes of an effect, in geometric progression."""
+_OF_A_GAS = 5
+"""Number of trial values of a property of the gas, in geometric progression."""
 
 
 def effects(device: Device) -> Iterator[CandidateCause]:
     """Yield every effect that is off in the model of the device, with trial magnitudes."""
     for effect in _EFFECTS:
         if effect.name not in device.effects:
-            trial_sizes = tuple(np.geomspace(*effect.range, _SIZES_OF_AN_EFFECT).tolist())
 
             def change(size: float, effect: _UnknownEffect = effect) -> ModelChange:
                 return ModelChange(effects={effect.name: {**effect.constant, **dict.fromkeys(effect.scaled, size)}})
 
-            yield CandidateCause(effect.name, effect.words, change, trial_sizes, is_ratio=True)
+            name = effect.name if len(effect.scaled) > 1 or effect.constant else f"{effect.name}.{effect.scaled[0]}"
+            yield CandidateCause(
+                name, effect.words, change, _OFF[effect.unit], is_ratio=True, shown=effect.shown, is_off=True
+            )

@@ -140,7 +140,7 @@ def causes_of(
     if errors is not None:
         return Diagnosis(errors, None, len(tried) + len(of_bench))
     not_of_bench = [candidate for candidate in sized if not candidate.usual]
-    for compared, candidates in (([], swaps), (of_bench, not_of_bench), ([], lacking)):
+    for compared, candidates in (([], swaps), (of_bench, [*not_of_bench, *lacking])):
         tried += [*compared, *search.compared(candidates, none)]
         if any(cause.explains for cause in tried):
             return _explained(search, none, tried, sized)

@@ -83,8 +83,8 @@ class CandidateCause:
     change. ``sizes``: trial magnitudes; a single one means that there is nothing to fit. ``is_ratio``: the magnitude is
     a ratio, fitted as its logarithm. ``usual``: largest usual sensor error (of a ratio, its logarithm). ``is_usual``:
     the cause has no magnitude and is usual on any bench. ``is_of_samples``: faulty samples, which are visible without a
-    model. ``is_of_unit``: misread unit, reported only if it explains the recordings. ``unit``: unit of the changed
-    parameter.
+    model. ``is_of_unit``: misread unit, reported only if it explains the recordings. ``is_off``: the model lacks the
+    number or effect, so that a ratio of 1 is a change too. ``unit``: unit of the changed parameter.
     """
 
     name: str
@@ -97,6 +97,7 @@ class CandidateCause:
     is_usual: bool = False
     is_of_samples: bool = False
     is_of_unit: bool = False
+    is_off: bool = False
     unit: str = ""
 
     @property

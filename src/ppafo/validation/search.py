@@ -6,7 +6,7 @@ for a change with a fitted magnitude, else 0.
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import islice
@@ -44,6 +44,8 @@ _DIFFERENCE = 0.02
 """Step of a finite difference as a fraction of the distance between two trial magnitudes [-]."""
 _BEST, _OF_BEST = 6, 2
 """Number of candidates that are nearest after the steps of all, and their further Gauss-Newton steps."""
+_SHORTER = 0.35
+"""Length of a step divided by that of one that went too far [-]."""
 _SMALL = 0.1
 """Trial magnitude of a second change, relative to the smallest magnitude on its grid [-]."""
 _PARTING = 1.0e-4
@@ -163,6 +165,7 @@ class CauseSearch:
         rejected.
         """
         best: dict[str, SizedCause] = {}
+        worse: dict[str, float] = {}
         trials = [(candidate, size) for candidate in candidates for size in candidate.grid]
         for step in range(STEPS + _OF_BEST + 1):
             changes = [candidate.at(size) for candidate, size in trials]
@@ -174,9 +177,12 @@ class CauseSearch:
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     if previous is None or (gain, cause.is_inside) > (previous.gain, previous.is_inside):
                         best[candidate.name] = cause
+                        worse.pop(candidate.name, None)
+                    elif step:
+                        worse[candidate.name] = size
             with_size = [cause for cause in best.values() if cause.candidate.has_size]
             nearest = sorted(with_size, key=lambda cause: -cause.gain)[:_BEST]
-            trials = self._improved(with_size if step < STEPS else nearest) if step < STEPS + _OF_BEST else []
+            trials = self._improved(with_size if step < STEPS else nearest, worse) if step < STEPS + _OF_BEST else []
         return [cause for cause in best.values() if cause.is_inside or not cause.candidate.has_size]
 
     def left_by(self, causes: Sequence[SizedCause]) -> list[float]:
@@ -204,16 +210,23 @@ class CauseSearch:
         counts = np.concatenate([np.full(len(record.channels), record.values.shape[1]) for record in self.records])
         return float(counts @ (np.log(np.maximum(none.squares, 1.0)) - np.log(np.maximum(residuals.squares, 1.0))))
 
-    def _improved(self, causes: Sequence[SizedCause]) -> list[tuple[CandidateCause, float]]:
-        """Return the magnitude of each candidate after a Gauss-Newton step, kept between neighbouring grid points."""
-        ends = []
+    def _improved(self, causes: Sequence[SizedCause], worse: Mapping[str, float]) -> list[tuple[CandidateCause, float]]:
+        """Return the magnitude of each candidate after a Gauss-Newton step, kept between neighbouring grid points.
+
+        A step that led to a ``worse`` magnitude is taken again, shorter.
+        """
+        improved = [
+            (cause.candidate, cause.size + _SHORTER * (worse[cause.candidate.name] - cause.size))
+            for cause in causes
+            if cause.candidate.name in worse
+        ]
+        causes, ends = [cause for cause in causes if cause.candidate.name not in worse], []
         for cause in causes:
             grid = sorted(cause.candidate.grid)
             nearest = int(np.argmin(np.abs(np.array(grid) - cause.size)))
             ends.append((grid[max(0, nearest - 1)], grid[min(len(grid) - 1, nearest + 1)]))
         lengths = [_DIFFERENCE * (high - low) for low, high in ends]
         changes = [cause.candidate.at(cause.size + length) for cause, length in zip(causes, lengths, strict=True)]
-        improved = []
         for cause, moved, length, (low, high) in zip(causes, self.evaluated(changes), lengths, ends, strict=True):
             if moved is not None:
                 slope = (moved.errors - cause.residuals.errors) / length
@@ -227,7 +240,8 @@ class CauseSearch:
         """Return the derivatives of the errors under a change, by the magnitude of each additional candidate."""
         # A delay of all sensors is free already, unless the change has one itself.
         is_free = self.settings.longest_delay > 0.0 and not change.has_delay
-        candidates = [item for item in candidates if not (is_free and item.at(item.grid[0]).has_delay)]
+        # From what is off no straight line leads to a ratio.
+        candidates = [item for item in candidates if not (item.is_off or (is_free and item.at(item.grid[0]).has_delay))]
         steps = [_SMALL * min(map(abs, candidate.grid)) for candidate in candidates]
         changes = [joined(change, candidate.at(step)) for candidate, step in zip(candidates, steps, strict=True)]
         return [
