@@ -44,13 +44,14 @@ def tried(scenario: Scenario, verdict: "Tracking") -> "Tracking":
     except PpafoError:
         return verdict
     for cause, remedy, left in judged:
-        if left.follows:
+        if left.passes:
             # A number that was tried is one of many; a kind is none.
             example = "for example, " * any(".kind=" not in text for text in remedy.overrides)
             # Pressures are computed for more torque than is requested, but not for more angle.
             has_margin = scenario.controlled == TORQUE and any(text.startswith("supply.") for text in remedy.overrides)
             margin = ", with a margin" * has_margin
-            text = f"{example}with {remedy.text} it follows, as a further run shows{margin}"
+            does = "it follows" if left.follows else "it gives what the actuator can give"
+            text = f"{example}with {remedy.text} {does}, as a further run shows{margin}"
             return replace(verdict, cause=cause, tried=text, mended=remedy.overrides if is_of_file else ())
     of_cause = [(remedy, left.error) for cause, remedy, left in judged if left.fails and cause == verdict.cause]
     strides = "" if _first_strides(scenario) is scenario else f" in the first {_STRIDES_TRIED:.0f} strides"
@@ -62,12 +63,12 @@ def _judged(trials: "list[tuple[str, Remedy, Scenario]]") -> "Iterator[tuple[str
     results = of_loaded.simulate_many([_first_strides(changed) for _, _, changed in trials])
     for (cause, remedy, changed), early in zip(trials, results, strict=True):
         # What follows in the first strides of a walk need not follow in the later ones.
-        is_early = early.scenario.run.duration < changed.run.duration and early.tracking.follows
+        is_early = early.scenario.run.duration < changed.run.duration and early.tracking.passes
         result = of_loaded.simulate_many([changed])[0] if is_early else early
         tracking = result.tracking
         if tracking.follows is not None:
             yield cause, remedy, tracking
-            if tracking.follows:
+            if tracking.passes:
                 return
 
 

@@ -322,7 +322,7 @@ def judged(
     fails = (verdicts.follows == 0.0) & ~verdicts.excused
     if limit.text == FOLLOWS:
         # A run without a verdict is none that follows, and a torque just beyond the actuator's is not reached.
-        fails = (verdicts.follows != 1.0) | ((verdicts.beyond_reach > 0.0) & reach_varies)
+        fails |= np.isnan(verdicts.follows) | ((verdicts.beyond_reach > 0.0) & reach_varies)
     number = by_value(np.where(oscillates, np.nan, settled)).mean(axis=0)
     is_kept, follows = np.asarray(limit.is_kept(number)), np.logical_not(by_value(fails).any(axis=0))
     return {
@@ -358,7 +358,8 @@ def _verdict(base: Scenario, path: VariedPath, value: float, has_remedy: bool) -
     if not verdict.fails and lacking > 0.0 and changes_reach([path.path]):
         said = f"{CRITERION_TEXTS['reach']} {change_text(result.scenario.controlled, lacking)}"
     elif verdict.fails and not has_remedy:
-        said = "; ".join(filter(None, (verdict.found, verdict.cause)))
+        intended = f"intended: {verdict.accepted}" if verdict.accepted else ""
+        said = "; ".join(filter(None, (verdict.found, verdict.cause, intended)))
     said = "; ".join(filter(None, (said, standing_still(result, not verdict.fails))))
     return said and f"at {path.quote(value, '.9g')} {said}"
 

@@ -297,6 +297,7 @@ _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
             ("missing", ("total", "taken"), mean_of),
             ("largest", ("highest_error", "lowest_error"), farther),
             ("span", ("highest_error", "lowest_error"), less),
+            ("reference", ("reference_total", "taken"), mean_of),
             ("wave", ("reference_squares", "reference_total", "taken"), deviation),
             ("turns", ("swing.turns",), count_of),
             ("lag", ("lag_squares", "taken"), root_mean),

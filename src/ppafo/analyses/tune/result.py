@@ -108,7 +108,7 @@ class GainResult:
     def useless(self) -> str:
         """Verdict on a nominal run that should follow its reference and does not; empty for others."""
         tracking = self.result.tracking
-        return tracking.sentence if tracking.is_useless and not self.result.scenario.beyond_reach else ""
+        return tracking.sentence if tracking.is_useless else ""
 
     @property
     def is_feasible(self) -> bool:

@@ -22,7 +22,7 @@ class Case(NamedTuple):
     """Run that does not follow its reference.
 
     ``law`` is the controller kind, None for a Python controller; ``settled`` the settled part of ``recording``;
-    ``failure`` the kind of failure.
+    ``failure`` the kind of failure. ``is_for_reach`` is true if the run gives all that the actuator can give.
     """
 
     scenario: Scenario
@@ -30,6 +30,7 @@ class Case(NamedTuple):
     recording: Recording
     settled: SettledPart
     failure: Failure | None
+    is_for_reach: bool = False
 
     @property
     def oscillates(self) -> bool:
@@ -44,8 +45,9 @@ class Case(NamedTuple):
     @property
     def is_fully_open(self) -> NDArray[np.bool_]:
         """True for each sample of the recording with a fully open valve."""
-        command = np.abs(self.recording["command"])
-        return np.asarray((command >= _FULLY_OPEN) & (command <= 1.0 + SHUT))
+        command, settings = np.abs(self.recording["command"]), self.scenario.controller.settings
+        # An on/off law may open its valves by less on purpose.
+        return np.asarray((command >= _FULLY_OPEN * min(settings.get("opening", 1.0), 1.0)) & (command <= 1.0 + SHUT))
 
     @property
     def is_settling(self) -> bool:
@@ -74,12 +76,8 @@ def only_opens_fully(recording: Recording) -> bool:
 
 
 class TrackingCause(NamedTuple):
-    """Cause of a tracking failure: sentence with numbers, remedies to try, and advice if none helps.
-
-    ``is_beyond_reach`` is true if the actuator lacks torque.
-    """
+    """Cause of a tracking failure: sentence with numbers, remedies to try, and advice if none helps."""
 
     text: str
     remedies: tuple[Remedy, ...] = ()
     advice: str = ""
-    is_beyond_reach: bool = False

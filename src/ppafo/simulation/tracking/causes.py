@@ -42,8 +42,8 @@ from ppafo.simulation.tracking.remedies import (
     torque_asked,
 )
 
-_MOSTLY = 0.5
-"""Fraction of the settled part that counts as most of it [-]."""
+_MOSTLY, _PARTLY = 0.5, 0.2
+"""Fractions of the settled part that count as most of it, and as much of a move [-]."""
 _ALWAYS = 0.9
 """Fraction of the samples that counts as nearly all [-]."""
 _FINE = 0.1
@@ -54,6 +54,8 @@ _NARROWER = (2.0, 5.0, 20.0)
 """Factors by which the dead zone of an on/off law is reduced in a trial [-]."""
 _EDGE = 1.05
 """Command divided by the dead band, up to which the command counts as within the band [-]."""
+_TINY = 1.0e-300
+"""Divisor in place of 0."""
 _EXPLAINED = 0.6
 """Smallest fraction of the squared error explained by a lag for which the lag is reported [-]."""
 _SLOWER = (0.7, 0.4, 0.2, 0.1, 0.05)
@@ -67,8 +69,8 @@ _SENSOR_FLAWS = (_DELAY, *(f"sensors.{of}_{flaw}" for flaw in ("noise", "resolut
 """Paths of the imperfections of sensors that a remedy reduces."""
 _LESS = (10.0, 1000.0)
 """Factors by which an imperfection of a sensor is reduced in a trial; the second one for a unit mistaken [-]."""
-_LARGER_VALVES = (3.0, 10.0, 100.0, 2000.0)
-"""Factors by which a valve is enlarged in a trial; the last one for a unit mistaken by 1000 [-]."""
+_LARGER_VALVES, _LARGEST_FACTOR = (1.0, 3.0, 10.0), 1.0e6
+"""Sizes of a valve in trials, divided by the one that makes up for the missing change, and largest such factor [-]."""
 _USUAL_RATE = 1000.0
 """Rate assumed for the paper's controller of a proportional valve [Hz]."""
 _MOVING = 0.02
@@ -267,18 +269,42 @@ def _static_friction(case: Case) -> TrackingCause | None:
     return TrackingCause(text, tuple(remedies), "increase `controller.angle_stiffness`")
 
 
-def small_valve(
-    case: Case, least_share: float, demand: str, factors: tuple[float, ...], advice: str
-) -> TrackingCause | None:
-    """Cause: the valve is fully open for more than a share [-] of the settled part, and too small for the demand.
+def open_share(case: Case) -> float:
+    """Share of the settled part in which the valve is fully open [-]."""
+    return float(np.mean(case.is_fully_open[case.settled.samples]))
 
-    ``factors`` [-] enlarge the valve in trials.
-    """
-    share = float(np.mean(case.is_fully_open[case.settled.samples]))
-    if share <= least_share:
+
+def _small_valve(case: Case) -> TrackingCause | None:
+    """Cause: the valve is fully open for much of the settled part, and too small for this task."""
+    scenario, settled, share = case.scenario, case.settled, open_share(case)
+    if share <= (_MOSTLY if settled.rests or case.oscillates else _PARTLY) or case.is_for_reach:
         return None
-    text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for {demand}"
-    return TrackingCause(text, sized_valves(case.scenario, factors), advice)
+    # What has moved tells how much larger a valve gives the wanted change in the same time.
+    missing = min(settled.wanted_change / max(settled.value_range, _TINY), _LARGEST_FACTOR)
+    factors = sorted({3.0, 10.0, *(times * max(missing, 1.0) for times in _LARGER_VALVES)} - {1.0})
+    larger = sized_valves(scenario, factors)
+    # A reference beyond reach needs both, unless it lies there on purpose.
+    beyond = None if scenario.beyond_reach else torque_beyond_reach(case)
+    both = [
+        remedy(scenario, {**valve.numbers, **within.numbers})
+        for within in (beyond.remedies[:2] if beyond is not None else ())
+        for valve in larger[-3:]
+    ]
+    also = "" if beyond is None else f"; {beyond.text}"
+    text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for this task{also}"
+    advice = "use a larger valve or a slower reference"
+    return TrackingCause(text, tuple(both) or larger, advice)
+
+
+def _within_tolerance(case: Case) -> TrackingCause | None:
+    """Cause: an angle controller accepts a larger error at rest than the verdict does."""
+    scenario, settled = case.scenario, case.settled
+    accepted, allowed = scenario.controller.settings.get("tolerance", 0.0), LARGEST_SHARE * settled.wanted_change
+    if not settled.rests or case.oscillates or not allowed < abs(settled.mean_error) <= accepted:
+        return None
+    text = f"the controller accepts an error of `controller.tolerance = {level_text('rad', accepted)}`"
+    numbers = [{"controller.tolerance": share * allowed} for share in (0.9, 0.5, 0.2)]
+    return TrackingCause(text, (*(remedy(scenario, each) for each in numbers), *stiffened(scenario, (2.0, 4.0))))
 
 
 def _opened_away(case: Case) -> TrackingCause | None:
@@ -303,7 +329,8 @@ def _opened_away(case: Case) -> TrackingCause | None:
             f"{100.0 * away:.0f} % of this time"
         )
         return TrackingCause(text, (), "reverse the sign of the command or of the measurement")
-    if away <= _ALWAYS or begins[samples].any() or not only_opens_fully(case.recording):
+    is_gradual = case.law is not None and not case.only_switches
+    if is_gradual or away <= _ALWAYS or begins[samples].any() or not only_opens_fully(case.recording):
         return None
     worst = change_text(scenario.controlled, case.settled.largest_error)
     opened = f"the valve stays open {worst} beyond the reference: the hysteresis of the controller"
@@ -314,6 +341,9 @@ def _lag(case: Case) -> TrackingCause | None:
     """Cause: the reference moves faster than the loop follows; states the lag if it explains the error."""
     scenario, samples = case.scenario, case.settled.samples
     reference, value = (series[samples] for series in followed(case.recording))
+    # A move of one sample has no rate.
+    if reference.size < 2:
+        return None
     slope, error = np.gradient(reference, case.recording.time[samples]), reference - value
     squares = float(np.mean(slope**2))
     if squares == 0.0 or case.settled.rests or case.only_switches:
@@ -407,15 +437,18 @@ def _not_settled(case: Case) -> TrackingCause:
 
 CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _opened_away,
-    torque_beyond_reach,
+    # What lacks more than the reach takes has another cause before it.
+    lambda case: torque_beyond_reach(case) if case.is_for_reach else None,
     load_beyond_reach,
     flung_at_start,
     torque_at_its_limit,
     _slow_decisions,
+    _within_tolerance,
     _static_friction,
     _shut_valve,
     oscillation,
-    lambda case: small_valve(case, _MOSTLY, "this task", _LARGER_VALVES, "use a larger valve or a slower reference"),
+    _small_valve,
+    torque_beyond_reach,
     gains_of_another_device,
     _lag,
     _still_approaching,

@@ -144,7 +144,7 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
         f"actuator gives {reach_text(worst.reach, worst.upwards)}"
     )
     if lies:
-        return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or add a load", is_beyond_reach=True)
+        return TrackingCause(text, (), f"lock the joint ({LOCKED.text}) or add a load")
     lacking = [peak for peak in peaks if peak.lacking > 0.0]
     torques = [(supply_that_moves(device, peak.upwards), peak.angle, peak.wanted) for peak in lacking]
     changes = _supplies_for(device, torques, _MARGINS)
@@ -156,7 +156,7 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     # The judged half of a trial shows a period of the reference.
     is_long = settled.rests or settled.reference_periods >= FEWEST_PERIODS
     longer = {} if is_long else {"run.duration": scenario.run.duration / settled.reference_periods}
-    return TrackingCause(text, tuple(remedy(scenario, {**each, **longer}) for each in changes), is_beyond_reach=True)
+    return TrackingCause(text, tuple(remedy(scenario, {**each, **longer}) for each in changes))
 
 
 def load_beyond_reach(case: Case) -> TrackingCause | None:
@@ -230,7 +230,7 @@ def torque_at_its_limit(case: Case) -> TrackingCause | None:
     stiffer = [dict(each.numbers) for each in stiffened(scenario, (2.0, 4.0))]
     both = [{**pressure, **numbers} for pressure in pressures[-2:] for numbers in stiffer]
     remedies = [remedy(scenario, numbers) for numbers in (*pressures, *both)]
-    return TrackingCause(text, tuple(remedies), f"increase `{supply}`", is_beyond_reach=True)
+    return TrackingCause(text, tuple(remedies), f"increase `{supply}`")
 
 
 def stop_of(scenario: Scenario, angle: Floats) -> str:

@@ -18,7 +18,7 @@ from ppafo.simulation.tracking.rule import (
     only_switches,
 )
 from ppafo.simulation.tracking.settled import SettledPart, settled_parts
-from ppafo.simulation.tracking.shortfall import available_torque, shortfall
+from ppafo.simulation.tracking.shortfall import available_torque, misses_for_reach, shortfall
 
 _OF_WALK = ("torque_error", "requested_torque", "peak_torque", *WALK_PEAKS)
 """Metrics by which a walk is judged, in addition to the reversals of its command."""
@@ -105,6 +105,7 @@ def tracking_excess(
         last, worst = settled_parts(scenario, numbers, least)
         beyond, is_switched = shortfall(scenario), only_switches(scenario, scenario.law)
         found = [excess_of_part(part, is_switched, beyond) for part in (last, worst)]
+        explained = bool(scenario.beyond_reach) & misses_for_reach(scenario, (last, worst), turning)
     known = np.isfinite(numbers["settled_error"])
     # Without an earlier part its numbers are nan.
     largest = np.fmax(turning, np.fmax(*(part.largest for part in found)))
@@ -116,5 +117,5 @@ def tracking_excess(
         largest=np.where(known_verdict, largest, np.nan),
         oscillation=np.where(counted | known, np.fmax(turning, np.fmax(*swings)), np.nan),
         beyond_reach=beyond,
-        excused=(beyond > 0.0) & (largest > 1.0) & bool(scenario.beyond_reach),
+        excused=(beyond > 0.0) & (largest > 1.0) & explained,
     )

@@ -101,6 +101,8 @@ class SettledPart(NamedTuple):
     """True for a move in one direction to the largest reference, which the run does not see settle."""
     reference_range: float = 0.0
     """Range of initial value and reference for an angle [rad]; 0 for other quantities."""
+    reference_mean: float = 0.0
+    """Mean of the reference [SI]; 0 for a walk."""
     reference_deviation: float = 0.0
     """Standard deviation of the reference [SI]."""
     reference_periods: float = math.inf
@@ -355,6 +357,7 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
             "mean_lag": of["mean_lag"],
             "weight": np.where(rests, 1.0, np.maximum(of["returning"], 1.0 - motion**2)),
             "ends_on_ramp": ~rests & (of["returning"] <= _NO_RETURN) & is_at_peak,
+            "reference_mean": metrics["settled_begun"] + of["reference"],
             "reference_deviation": np.where(rests, 0.0, of["wave"]),
             "reference_periods": periods,
         }

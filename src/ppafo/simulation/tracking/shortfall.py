@@ -1,6 +1,11 @@
-"""Torque that an actuator gives at most, and what a reference requests beyond that."""
+"""Torque that an actuator gives at most, what a reference requests beyond that, and what is missed on purpose."""
+
+import math
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.engine.scheme.actuators import torque_of
 from ppafo.metrics.metric import Floats
@@ -9,9 +14,13 @@ from ppafo.model.controlled import TORQUE
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.rule import excess_of_part, only_switches
+from ppafo.simulation.tracking.settled import SettledPart
 
 _ANGLES = 9
 """Number of angles between the stops at which the torque of a moving joint is evaluated."""
+_PHASES = np.sin(np.linspace(0.0, 2.0 * math.pi, 32, endpoint=False))[:, None]
+"""Course of a moving reference about its mean, divided by its amplitude [-]."""
 
 
 def shortfall(scenario: Scenario) -> Floats:
@@ -40,3 +49,42 @@ def available_torque(scenario: Scenario) -> tuple[Floats, Floats]:
     if supply.is_vacuum:
         highest, lowest = lowest, highest
     return np.min(lowest, axis=0), np.max(highest, axis=0)
+
+
+def misses_for_reach(scenario: Scenario, parts: Iterable[SettledPart], turning: Floats | float) -> NDArray[np.bool_]:
+    """True for each run (runs,) that reach alone keeps from its reference: it gives what the actuator can give.
+
+    ``parts`` are the judged parts, ``turning`` is the number of command reversals divided by its limit.
+    """
+    lacking, switches = shortfall(scenario) > 0.0, only_switches(scenario, scenario.law)
+    if not lacking.any():
+        return lacking
+    reach = available_torque(scenario)
+    found = np.fmax.reduce([excess_of_part(_within_reach(part, *reach), switches).largest for part in parts])
+    return np.asarray(lacking & (np.fmax(found, turning) <= 1.0))
+
+
+def _within_reach(part: SettledPart, lowest: Floats, highest: Floats) -> SettledPart:
+    """Judged part with the errors that are left of a reference cut at the lowest and highest torque [N m].
+
+    A moving reference is taken for a wave of the same mean and deviation.
+    """
+    reference = part.reference_mean + math.sqrt(2.0) * np.asarray(part.reference_deviation) * _PHASES
+    cut = np.clip(reference, lowest, highest)
+    beyond = reference - cut
+    mean = part.mean_error + beyond.mean(axis=0)
+    deviation = np.maximum(part.error_deviation - beyond.std(axis=0), 0.0)
+    farthest = np.abs(beyond).max(axis=0)
+    left: dict[str, Any] = part._asdict() | {
+        "wanted_change": np.minimum(part.wanted_change, np.maximum(highest, -lowest)),
+        "rms_error": np.hypot(mean, deviation),
+        "mean_error": mean,
+        "error_deviation": deviation,
+        "error_range": np.maximum(part.error_range - np.ptp(beyond, axis=0), 0.0),
+        "largest_error": np.maximum(part.largest_error - farthest, 0.0),
+        # The error of a wave whose peaks are cut reverses more often than the wave.
+        "error_reversals": np.where(part.rests | (farthest == 0.0), part.error_reversals, 0.0),
+        "reference_deviation": cut.std(axis=0),
+        "samples": mean,
+    }
+    return SettledPart._make(np.broadcast_arrays(*left.values()))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ppafo.metrics.metric import controlled_in
+from ppafo.metrics.metric import controlled_in, extent
 from ppafo.metrics.settled import LARGEST_SHARE, SUSTAINED
 from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.profiles import profile_values
@@ -37,7 +37,7 @@ from ppafo.simulation.tracking.rule import (
     swing_limit,
 )
 from ppafo.simulation.tracking.settled import IN_PUSH_OFF, settled_walk, task_parts
-from ppafo.simulation.tracking.shortfall import available_torque, shortfall
+from ppafo.simulation.tracking.shortfall import available_torque, misses_for_reach, shortfall
 from ppafo.simulation.tracking.walk_causes import CAUSES_OF_WALK
 from ppafo.units.shown import in_units, units_in_force
 from ppafo.wording import override_text, without_exponent
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 _FEWEST_SAMPLES, _SAMPLES_ADVISED = 8, 100
 """Smallest number of samples of a recording for a verdict, and number of samples that a remedy gives it."""
-_UNLIMITED = 1.0e3
+_UNLIMITED = 1.0
 """Limit divided by the wanted change, from which it is none to speak of [-]."""
 _LEAST = 1.0e-9
 """Smallest weight of an error, and limit [SI], by which something is divided."""
@@ -65,17 +65,19 @@ NOTHING_TO_FOLLOW = (OPEN_LOOP, NO_REFERENCE)
 class Tracking:
     """Verdict on a run: whether its controlled quantity follows its reference.
 
-    ``follows`` is None for a run that is not judged, for the ``reason``; ``kind`` is the kind of failure of one that
-    does not follow, else "". ``criterion`` names the ``number`` that decided, with its ``limit``. ``said`` is the
-    sentence on a run that follows or is not judged.
+    ``follows`` is None for a run that is not judged, for the ``reason``; it is False, here and in every study, for a
+    run that misses its reference on purpose, too, which ``passes``. ``kind`` is the kind of failure of one that does
+    not follow, else "". ``criterion`` names the ``number`` that decided, with its ``limit``; both are None without it.
+    ``said`` is the sentence on a run that follows or is not judged.
 
     Of a run that does not follow, ``error`` is the RMS error of the judged part, ``wanted`` the wanted change,
     ``missing`` the mean error and ``moved`` the range of the value, all in SI of the ``controlled`` quantity. In the
     time ``per`` reversals are counted. ``cause`` is the cause, with ``advice``; ``remedies`` are the remedies,
     most promising first; ``others`` are further, less certain causes; ``tried`` is the result of tried remedies, and
-    ``mended`` the overrides with which the run follows. ``accepted`` is the scenario's reason for a reference beyond
-    reach, else "". ``at_rest`` is true if the reference stands still. ``since`` [s] is the start of the judged part,
-    below 0 for a walk, and ``until`` [s] its end, 0 for the end of the run.
+    ``mended`` the overrides with which the run follows. ``accepted`` is the scenario's reason for a torque beyond
+    reach, if that alone keeps the run from its reference, else "". ``at_rest`` is true if the reference stands still.
+    ``since`` [s] is the start of the judged part, below 0 for a walk, and ``until`` [s] its end, 0 for the end of the
+    run.
     """
 
     follows: bool | None
@@ -84,8 +86,8 @@ class Tracking:
     said: str = ""
     kind: Failure | Literal[""] = ""
     criterion: Criterion | Literal[""] = ""
-    number: float = 0.0
-    limit: float = 0.0
+    number: float | None = None
+    limit: float | None = None
     error: float = 0.0
     wanted: float = 0.0
     missing: float = 0.0
@@ -134,6 +136,8 @@ class Tracking:
     @in_units(lambda tracking: tracking.units)
     def found(self) -> str:
         """Failure with the number that decided and its limit, without cause and remedy."""
+        if self.number is None or self.limit is None:
+            return ""
         words, since = CONTROLLED[self.controlled].words, time_text(self.since, self.until)
         error, wanted, moved = (change_text(self.controlled, each) for each in (self.error, self.wanted, self.moved))
         plain_moved = moved.partition(" ")[0]
@@ -202,7 +206,7 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
     cause, *others = (each for each in found if each is not None)
     stride_time, overshoots = scenario.motion.stride_time, case.failure == "overshoots"
     criterion, number, limit = _decided(case, turning, rate)
-    peak_limit = scenario.controller.settings["largest_torque"] if overshoots and not is_task else settled.wanted_change
+    wanted = scenario.controller.settings["largest_torque"] if overshoots and not is_task else settled.wanted_change
     return Tracking(
         follows=False,
         controlled=scenario.controlled,
@@ -211,7 +215,7 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
         number=number,
         limit=limit,
         error=settled.rms_error,
-        wanted=peak_limit,
+        wanted=min(wanted, extent(case.recording)) if is_task else wanted,
         missing=settled.mean_error,
         moved=settled.peak if overshoots else settled.value_range,
         per="stride" if stride_time else "second",
@@ -219,7 +223,7 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
         advice=cause.advice,
         remedies=cause.remedies,
         others=tuple(other for other in others if other.remedies and other.text != cause.text),
-        accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
+        accepted=scenario.beyond_reach if case.is_for_reach else "",
         at_rest=bool(settled.rests) and not case.is_approaching,
         since=settled.start,
         until=settled.end,
@@ -366,7 +370,8 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
     if ratios[1].largest > max(1.0, float(excess.largest)):
         excess, settled = ratios[1], worst
     failure = failure_of_task(excess, turning)
-    case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
+    is_for_reach = bool(misses_for_reach(scenario, (last, worst), turning)[0])
+    case = Case(scenario, law, recording, settled, failure, is_for_reach)
     # No oscillation: an error at the cut peaks of a wave, which reverses more often than the wave, and a slow approach.
     if failure == "oscillates" and turning <= 1.0 and (cuts_wave(case) or case.is_approaching):
         case = case._replace(failure="does not follow")

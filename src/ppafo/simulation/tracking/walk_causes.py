@@ -9,17 +9,15 @@ from ppafo.metrics.switching import SHUT
 from ppafo.parameters.reach import supply_for
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
-from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation, small_valve
+from ppafo.simulation.tracking.causes import gains_of_another_device, open_share, oscillation
 from ppafo.simulation.tracking.load_causes import ONE_WAY, reach_at_samples, reach_text
 from ppafo.simulation.tracking.remedies import dead_band, level_text, remedy, rescaled_gains, sized_valves
 from ppafo.simulation.tracking.rule import LEAST_PEAK_WALK
 
 _OFTEN = 0.1
 """Fraction of the samples with a request that counts as often [-]."""
-_DEMAND = "the joint speed of this gait"
-"""Demand for which the valve of a walk may be too small."""
-_LARGER_VALVES = (2.0, 4.0, 8.0)
-"""Factors by which a valve is enlarged in a trial [-]."""
+_LARGER_VALVES = (2.0, 4.0, 8.0, 32.0, 128.0, 1000.0)
+"""Factors by which a valve is enlarged in a trial; the last one for a unit mistaken by 1000 [-]."""
 _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
 """Settings of a walking controller that request a torque in dorsiflexion."""
 
@@ -47,7 +45,7 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         unasked = {f"controller.{name}": 0.0 for name in _DORSIFLEXION if settings.get(name, 0.0) > 0.0}
         omission = (remedy(scenario, unasked),) if unasked else ()
         advice = "request no dorsiflexion torque, or add a spring that lifts the foot"
-        return TrackingCause(text, omission, advice, is_beyond_reach=True)
+        return TrackingCause(text, omission, advice)
     at = int(np.argmax(np.maximum(above, below)))
     asked, given = float(reference[places][at]), float(reaches[at, 1 if above[at] > 0.0 else 0])
     text = (
@@ -65,7 +63,7 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
     if min(least, scenario.controller.settings.get("largest_torque", 0.0)) > 0.0:
         remedies.append(remedy(scenario, {"controller.largest_torque": least}))
     advice = "increase `supply.pressure` or request less torque"
-    return TrackingCause(text, tuple(remedies), advice, is_beyond_reach=True)
+    return TrackingCause(text, tuple(remedies), advice)
 
 
 def _speed_of_gait(case: Case) -> TrackingCause:
@@ -93,6 +91,17 @@ def _dead_band_of_walk(case: Case) -> TrackingCause | None:
     return TrackingCause(text, rescaled_gains(scenario, case.law, (2.0, 4.0, 8.0)), advice)
 
 
+def _small_valve_of_walk(case: Case) -> TrackingCause | None:
+    """Cause: the valve of a walk is often fully open, and too small for the speed of the joint."""
+    share, settled = open_share(case), case.settled
+    # An oscillating loop, and on/off valves, are fully open for other reasons, unless they give too little.
+    lacks = settled.given_peak < LEAST_PEAK_WALK * settled.requested_peak
+    if share <= _OFTEN or ((case.oscillates or case.only_switches) and not lacks):
+        return None
+    text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for the speed of this gait"
+    return TrackingCause(text, sized_valves(case.scenario, _LARGER_VALVES), "use a larger valve")
+
+
 CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _request_beyond_reach,
     # Gains that make a walk oscillate, or a pair of valves whose step exceeds the torque limit.
@@ -100,10 +109,7 @@ CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
         oscillation(case) if case.oscillates or (case.failure == "overshoots" and case.only_switches) else None
     ),
     _dead_band_of_walk,
-    # An oscillating loop, and on/off valves, are fully open for other reasons.
-    lambda case: small_valve(
-        case, 1.0 if case.oscillates or case.only_switches else _OFTEN, _DEMAND, _LARGER_VALVES, "use a larger valve"
-    ),
+    _small_valve_of_walk,
     gains_of_another_device,
     _speed_of_gait,
 )
