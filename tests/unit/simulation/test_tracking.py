@@ -48,8 +48,6 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     assert told.accepted.startswith("above the 5.0 N m that 50 psi_g can hold")
     for changed in ("reference.level=6.1 N m", "supply.pressure=49 psi_g", "actuator.torque_constant=14 cm^3"):
         assert not simulate(TASK, [changed]).tracking.is_useless
-    again = load_scenario(TASK, ["reference.level=6.1 N m", "reference.beyond_reach=to see what is left"])
-    assert again.beyond_reach == "to see what is left"
     assert with_numbers(load_scenario(TASK), {"supply.pressure": 3.0e5}).beyond_reach == told.accepted
     # Gains that make the loop miss what it could reach are no purpose.
     assert simulate(TASK, ["reference.level=4 N m", "controller.proportional_gain=0.01"]).tracking.is_useless
@@ -196,6 +194,9 @@ KNEE = [
     ("scenario", "column", "values"),
     [
         ("torque-task-proportional", "reference.level", [3.0, 4.5, 6.0, 9.0]),
+        # On purpose is what the actuator cannot give, and not what the valve lets it give too late.
+        ("torque-task-proportional", "valve.area", [3e-9, 3e-8, 3e-7, 3e-6, 3.16e-5]),
+        ("wave", "valve.area", [3e-8, 3e-7, 3.16e-5]),
         ("torque-task-slow-valve", "controller.proportional_gain", [0.001, 0.3, 8.0]),
         ("torque-task-solenoid", "reference.level", [0.5, 4.0, 5.9, 7.0]),
         ("pressure-loop", "controller.proportional_gain", [1.0e-8, 1.0e-5]),
@@ -206,12 +207,20 @@ KNEE = [
     ],
 )
 def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: str, values: list[float]) -> None:
-    changed = {"sine": (TASK, SMALL_SINE), "knee": ("cylinder-servo", KNEE)}
+    changed = {
+        "sine": (TASK, SMALL_SINE),
+        "knee": ("cylinder-servo", KNEE),
+        "wave": (TASK, [*WAVE, "reference.amplitude=6 N m"]),
+    }
     base = load_scenario(*changed.get(scenario, (scenario, [])))
     columns = {column: np.array(values)}
     metered = run_ensemble(base, columns, with_companions([], base)).metrics
-    alone = [simulate(with_numbers(base, {column: value})).tracking.follows for value in values]
-    assert (excess(metered, base, columns).follows == 1.0).tolist() == alone
+    alone = [simulate(with_numbers(base, {column: value})).tracking for value in values]
+    judged = excess(metered, base, columns)
+    assert (judged.follows == 1.0).tolist() == [verdict.follows for verdict in alone]
+    assert judged.excused.tolist() == [bool(verdict.accepted) for verdict in alone]
+    if column == "valve.area":
+        assert judged.excused.tolist() == [value > 1.0e-6 for value in values]
 
 
 def test_valves_that_swing_by_more_than_their_limit_do_not_follow_in_a_run_or_an_ensemble() -> None:
@@ -373,7 +382,7 @@ def test_a_joint_that_reaches_a_stop_is_told_side_time_and_share_although_its_to
         assert simulate(scenario).warnings == ()
 
 
-@pytest.mark.parametrize("law", ["pid", "damped_proportional", "on_off", "sliding_mode"])
+@pytest.mark.parametrize("law", ["pid", "on_off"])
 def test_a_changed_sensor_that_the_controller_does_not_read_is_told_so(law: str) -> None:
     task, noise = [f"controller.kind={law}", "reference.level=3 N m", "run.duration=0.5 s"], "sensors.angle_noise=2 deg"
     quiet, noisy = simulate(TASK, task), simulate(TASK, [*task, noise])
@@ -428,47 +437,44 @@ def test_a_run_without_a_verdict_says_why_and_its_remedy_gives_one(changes: list
     assert re.match(r"the torque follows its reference; from [\d.]+ s on: RMS error ", again.tracking.sentence)
 
 
-LEVEL = "reference.level=3 N m"
+TOLERANT = ["reference.kind=ramp_hold", "reference.start_level=90 deg", "reference.level=92 deg"]
+TOLERANT += ["reference.ramp_time=0.1 s", "friction.static_torque=2 N m", "controller.tolerance=1 deg"]
+LEVEL, SLOW = "reference.level=3 N m", "torque-task-slow-valve"
+QUICK = ["controller.proportional_gain=1 1/(N m)", "controller.integral_gain=10 1/(N m s)", "run.duration=10 s"]
+POINTS = {"time_02": "0.2 s", "value_02": "0 N m", "time_03": "0.5 s", "value_03": "4 N m", "time_04": "0.8 s"}
+TRIANGLE = ["reference.kind=tabulated", "run.duration=2 s", "reference.period=10 s", "reference.level=0 N m"]
+TRIANGLE += [f"reference.{name}={text}" for name, text in POINTS.items()]
+TRIANGLE += ["reference.value_01=0 N m", "reference.value_04=0 N m"]
 
 
 @pytest.mark.parametrize(
     ("name", "changes", "cause", "remedy"),
     [
-        (
-            TASK,
-            [LEVEL, "supply.pressure=20 psi_g"],
-            "at 75 deg and 20 psi_g the actuator gives at most 2 N m",
-            "supply.pressure",
-        ),
-        (
-            TASK,
-            [LEVEL, "controller.rate=2 Hz"],
-            "the controller decides every 500 ms, only 2 times",
-            "controller.rate=20 Hz",
-        ),
+        (SLOW, [LEVEL, "supply.pressure=20 psi_g"], "20 psi_g the actuator gives at most 2 N m", "supply.pressure"),
+        (TASK, [LEVEL, "controller.rate=2 Hz"], "every 500 ms, only 2 times", "controller.rate=20 Hz"),
         ("pressure-loop", ["controller.rate=2 Hz"], "the controller decides every 500 ms", "controller.rate=200 Hz"),
         (TASK, [LEVEL, "sensors.delay=200 ms"], "(`sensors.delay = 0.2 s`)", "sensors.delay=20 ms"),
         (TASK, [LEVEL, "sensors.pressure_noise=5 bar_d"], "`sensors.pressure_noise", "sensors.pressure_noise"),
         ("cylinder-servo", ["sensors.delay=2 s"], "`sensors.delay = 2 s`", "sensors.delay=2 ms"),
+        ("cylinder-servo", ["sensors.angle_resolution=10 deg"], "`sensors.angle_resolution = 10", "angle_resolution"),
+        (TASK, [LEVEL, "valve.area=0.012 mm^2"], "it is too small for this task", "valve.area="),
+        (TASK, [*TRIANGLE, *QUICK[:2], "valve.area=0.3 mm^2"], "it is too small for this task", "valve.area=16 mm^2"),
+        (TASK, ["valve.area=0.003 mm^2"], "it is too small for this task", "valve.area=36 mm^2"),
         (
-            "cylinder-servo",
-            ["sensors.angle_resolution=10 deg"],
-            "`sensors.angle_resolution = 10 deg`",
-            "angle_resolution",
+            "torque-task-solenoid",
+            [
+                "controller.kind=on_off_dead_zone",
+                "controller.opening=0.77",
+                "reference.level=2.4 N m",
+                "valve.area=0.126 mm^2",
+            ],
+            "it is too small for this task",
+            "valve.area=",
         ),
-        (TASK, [LEVEL, "valve.area=0.012 mm^2"], "it is too small for this task", "valve.area=24 mm^2"),
-        (
-            TASK,
-            [LEVEL, "controller.proportional_gain=95 1/(N m)"],
-            "the gains do not suit this device",
-            "proportional_gain",
-        ),
-        (
-            TASK,
-            ["reference.level=3000 N m"],
-            "at 75 deg and 50 psi_g the actuator gives at most 5 N m",
-            "reference.level",
-        ),
+        ("cylinder-servo", TOLERANT, "controller.tolerance = 1 deg`", "controller.tolerance="),
+        ("solenoid", ["run.duration=6 s", "valve.area=0.0126 mm^2"], "too small for the speed", "valve.area=12.6 mm^2"),
+        (TASK, [LEVEL, "controller.proportional_gain=95 1/(N m)"], "gains do not suit this", "proportional_gain"),
+        (SLOW, ["reference.level=3000 N m"], "50 psi_g the actuator gives at most 5 N m", "reference.level"),
     ],
 )
 def test_a_wrong_set_up_is_told_its_cause_and_a_remedy_that_works(
@@ -481,7 +487,7 @@ def test_a_wrong_set_up_is_told_its_cause_and_a_remedy_that_works(
     assert remedy in verdict.tried
     assert verdict.mended
     given = dict(text.split("=", 1) for text in (*changes, *verdict.mended))
-    assert simulate(name, [f"{path}={text}" for path, text in given.items()]).tracking.follows
+    assert simulate(name, [f"{path}={text}" for path, text in given.items()]).tracking.passes
 
 
 def test_noise_that_turns_the_command_until_the_joint_rests_is_not_counted_as_oscillation() -> None:
@@ -519,7 +525,6 @@ def test_a_table_is_judged_by_its_pulses_and_not_by_its_last_rest(duration: str)
     assert excess(metered, once, columns).follows.tolist() == [0.0]
 
 
-QUICK = ["controller.proportional_gain=1 1/(N m)", "controller.integral_gain=10 1/(N m s)", "run.duration=10 s"]
 WAVE = ["reference.kind=sine", "reference.level=0 N m", "reference.frequency=0.2 Hz", *QUICK]
 """Torque task whose reference is a slow sine."""
 
