@@ -109,6 +109,11 @@ class ProfileKind:
     until_jump: Callable[[Any, float], float] | None = None
     period: Callable[[Any], float] | None = None
 
+    @property
+    def is_wave(self) -> bool:
+        """True for a wave without knots, of which no stretch is straight."""
+        return self.is_smooth and not self.is_monotone and self.until_jump is None
+
 
 class PythonController(Protocol):
     """Controller in Python, as any object with these methods; it is called once per sample."""

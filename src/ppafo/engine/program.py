@@ -289,8 +289,8 @@ class Program:
 
     @property
     def needs_parts(self) -> bool:
-        """True if a meter needs the rests and moves of the reference."""
-        return any(kind.needs_parts for kind in self.meters)
+        """True if a meter needs the parts of a reference that has more than one."""
+        return any(kind.needs_parts for kind in self.meters) and not self.reference.is_wave
 
     @property
     def is_parted(self) -> bool:

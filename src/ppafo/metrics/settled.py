@@ -1,8 +1,10 @@
-"""Parts of a reference, rests and moves, in a run without recording: numbers for the tracking verdict.
+"""Parts of a reference, slow stretches and moves, in a run without recording: numbers for the tracking verdict.
 
-Judged are the second half of each rest and the whole of each move; of a move at the start of a run, what follows once
-the value has met the reference, and of a reference that repeats, the second half of the run. The last part and the
-worst of the earlier ones are kept. These numbers are for verdicts only: no table and no study lists them.
+A stretch is straight, slow and no shorter than a tenth of a second; a sine is one move. Judged are the second half of
+each stretch and the whole of each move; of a move at the start of a run, what follows once the value has met the
+reference; of a reference that repeats, what follows a start-up in which it is met, and a time as long in which the
+value may settle. The error that is allowed at a sample is the same in both. The last part and the worst of the earlier
+ones are kept. These numbers are for verdicts only: no table and no study lists them.
 """
 
 import math
@@ -16,7 +18,7 @@ from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mea
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
 from ppafo.model.columns import choose, larger, smaller
 from ppafo.model.helping import PUSH_OFF
-from ppafo.signals.meter import REQUESTED, WALK, MeterKind, ReferenceSummary, Sample
+from ppafo.signals.meter import REQUESTED, SLOW_RATE, WALK, MeterKind, ReferenceSummary, Sample
 
 LARGEST_SHARE = 0.05
 """RMS error at rest divided by the wanted change, above which a law with gradual openings does not follow [-]."""
@@ -39,7 +41,7 @@ _TINY = 1.0e-300
 class PartSums(NamedTuple):
     """Sums over the judged samples of a part of the reference that begins with sample ``start``.
 
-    ``rests`` is 1 for a rest, 0 for a move. ``squares`` is the sum of squared errors, ``total`` the sum of errors,
+    ``rests`` is 1 for a slow stretch, 0 for a move. ``squares`` is the sum of squared errors, ``total`` that of errors,
     ``taken`` the number of samples, ``reference_squares`` and ``reference_total`` the sums for the reference less the
     initial value, ``lag_squares`` and ``lag_total`` those of the allowed lag, ``swing`` the reversal state of the
     error, ``lowest_error`` and ``highest_error`` its extremes. ``first`` and ``last`` are the reference before the part
@@ -70,14 +72,20 @@ def judged_share(first: Floats, last: Floats, path: Floats) -> Floats:
     return limited
 
 
+def stands(rests: Floats, path: Floats) -> Floats:
+    """1 for a slow stretch, and for a reference that does not move at all; 0 for a move."""
+    found: Floats = choose(path > 0.0, rests, 1.0)
+    return found
+
+
 def badness(part: PartSums, course: ReferenceSummary) -> float:
     """Squared ratio of the largest number of a part to its limit, by which the worst of the earlier parts is chosen."""
     way, taken = max(course.largest, _TINY), max(part.taken, 1.0)
     lag_squares, share = part.lag_squares / taken, LARGEST_SHARE * way
     allowed = share * share + 2.0 * share * part.lag_total / taken + lag_squares
     returns = min(RETURNING * (1.0 - abs(part.last - part.first) / max(part.path, _TINY)), 1.0)
-    ramp = 1.0 - lag_squares / (LARGEST_LAG * way * LARGEST_LAG * way)
-    weight = 1.0 if part.rests > 0.0 else max(returns, ramp)
+    quickness = part.path / (SLOW_RATE * way * taken * course.interval)
+    weight = 1.0 if part.rests > 0.0 else max(returns, 1.0 / max(quickness * quickness, 1.0))
     error = weight * weight * part.squares / taken / allowed
     turns = float(int(max(abs(part.swing.turns) - 1.0, 0.0))) / SUSTAINED
     # Of an angle at rest the range has a limit, too.
@@ -115,7 +123,7 @@ class SettledSums(NamedTuple):
     """State of the settled meter: present part of the reference, and the worst of the earlier ones.
 
     ``worst_badness`` is that of the latter, ``waits`` is 1 while the present rest is in its first half, ``lagged``
-    a moving reference with the allowed lag, ``met`` 1 once the value has met the reference, and ``command`` the
+    the reference with the allowed lag, ``met`` 1 once the value has met the reference, and ``command`` the
     reversals of the command in the last quarter of run or hold. ``begun`` is the initial controlled value,
     ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been at or below the reference,
     and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the reverse.
@@ -165,7 +173,7 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
         worst_badness=0.0,
         waits=0.0,
         lagged=reference,
-        met=1.0 if abs(error) <= LARGEST_SHARE * course.largest else 0.0,
+        met=1.0 if meets_in_time(course, sample) else 0.0,
         command=start_reversals(course, sample),
         begun=value,
         lowest=value,
@@ -177,10 +185,21 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
     )
 
 
-def allowed_lag(course: ReferenceSummary, lag: float, speed: float) -> float:
-    """Error allowed beside that at rest, for a reference ``lag`` ahead of a late one, and a joint's speed [rad/s]."""
+def allowed_lag(course: ReferenceSummary, lag: float, change: float, speed: float) -> float:
+    """Error allowed beside that at rest, for a reference ``lag`` ahead of a late one, and a joint's speed [rad/s].
+
+    ``change`` is the change of the reference up to the sample: what lagged before the reference came to rest is no
+    excuse. Twice its lag leaves room about the crest of a wave, where a late one moves on.
+    """
     of_joint = course.of_joint * LAG_OF_JOINT * abs(speed) * course.largest
-    return min(abs(lag) + of_joint, LARGEST_LAG * course.largest)
+    of_reference = min(abs(lag), 2.0 * LAG_TIME / course.interval * abs(change))
+    return min(of_reference + of_joint, LARGEST_LAG * course.largest)
+
+
+def meets_in_time(course: ReferenceSummary, sample: Sample) -> bool:
+    """Return whether a value is near its reference, and of a repeated one before the end of the start-up."""
+    is_early = course.start_up == 0.0 or sample.number < course.start_up
+    return is_early and abs(sample.value - sample.reference) <= LARGEST_SHARE * course.largest
 
 
 def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, lag: float) -> PartSums:
@@ -191,9 +210,10 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, lag:
     is_new = course.part_start != before.start or course.rests != before.rests
     twice, of_run = 2.0 * sample.number, course.samples - 1.0
     is_first = course.part_start == 0.0 and course.rests == 0.0
-    is_half = course.is_repeated > 0.0 and twice >= of_run and twice < of_run + 2.0
-    meets = state.met == 0.0 and abs(error) <= LARGEST_SHARE * course.largest and twice < of_run
-    anew = is_new or state.waits > 0.0 or (is_first and (is_half or meets))
+    judged_from = course.start_up * (2.0 if state.met > 0.0 else 1.0)
+    begins = course.start_up > 0.0 and sample.number >= judged_from and sample.number < judged_from + 1.0
+    meets = state.met == 0.0 and twice < of_run and meets_in_time(course, sample)
+    anew = is_new or state.waits > 0.0 or (is_first and (begins or meets))
     swing = next_swing(before.swing, error, OSCILLATION_THRESHOLD * course.largest)
     return PartSums(
         start=course.part_start,
@@ -231,15 +251,15 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     command = update_reversals(state.command, course, sample)
     met_upwards = 1.0 if state.met_upwards > 0.0 or error <= 0.0 else 0.0
     met_downwards = 1.0 if state.met_downwards > 0.0 or error >= 0.0 else 0.0
-    late = state.lagged + (sample.reference - state.lagged) * course.interval / (LAG_TIME + course.interval)
-    lagged = sample.reference if course.rests > 0.0 else late
-    lag = allowed_lag(course, sample.reference - lagged, sample.angular_velocity)
     before = state.part
+    lagged = state.lagged + (sample.reference - state.lagged) * course.interval / (LAG_TIME + course.interval)
+    lag = allowed_lag(course, sample.reference - lagged, sample.reference - before.last, sample.angular_velocity)
     ends = (course.part_start != before.start or course.rests != before.rests) and (
         before.rests > 0.0 or before.path > 0.0
     )
     # At the start of a run the value may be on its way yet.
-    is_begun = before.start > 0.0 or state.met > 0.0
+    is_late = course.start_up > 0.0 and sample.number > course.start_up + 1.0
+    is_begun = before.start > 0.0 or state.met > 0.0 or is_late
     found = badness(before, course)
     is_worse = ends and is_begun and found > state.worst_badness
     return SettledSums(
@@ -248,7 +268,7 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
         worst_badness=found if is_worse else state.worst_badness,
         waits=course.in_first_half,
         lagged=lagged,
-        met=1.0 if state.met > 0.0 or abs(error) <= LARGEST_SHARE * course.largest else 0.0,
+        met=1.0 if state.met > 0.0 or meets_in_time(course, sample) else 0.0,
         command=Reversals(command.way, command.task, 0.0 if in_last_half else command.turns),
         begun=state.begun,
         lowest=min(state.lowest, value),
@@ -303,13 +323,16 @@ _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
             ("lag", ("lag_squares", "taken"), root_mean),
             ("mean_lag", ("lag_total", "taken"), mean_of),
             ("returning", ("first", "last", "path"), judged_share),
-            ("rests", ("rests",), None),
+            ("rests", ("rests", "path"), stands),
+            ("path", ("path",), None),
+            ("taken", ("taken",), None),
         )
     },
     **{f"settled_{name}": _of_sums("", name) for name in ("begun", "lowest", "highest", "top", "bottom")},
     "settled_reversals": read_reversals,
     "settled_extent": ReadAt(("course.largest",)),
     "settled_last": ReadAt(("course.last",)),
+    "settled_interval": ReadAt(("course.interval",)),
 }
 SETTLED_METRICS = {
     name: MetricKind(name, "-", "for verdicts", (), None, read, (SETTLED,)) for name, read in _NUMBERS.items()

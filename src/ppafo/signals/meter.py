@@ -96,12 +96,13 @@ class ReferenceSummary(NamedTuple):
     ``last`` is the last value. ``largest`` is the largest distance over all samples from 0 for a torque, otherwise from
     the initial value of the controlled quantity. ``tolerance`` is the difference from the last value up to which the
     reference rests. ``hold_start`` is the number of the sample after the last one not at rest, ``samples`` the number
-    of samples. ``is_repeated`` is 1 for a reference that repeats within the run, else 0. ``interval`` is the time
-    between two samples [s], and ``of_joint`` 0 for an angle, 1 for a quantity that a moving joint disturbs.
+    of samples. ``start_up`` is the number of samples in which a value should meet a repeated reference, 0 for
+    another. ``interval`` is the time between two samples [s], and ``of_joint`` 0 for an angle, 1 for a quantity that a
+    moving joint disturbs.
 
-    The present part of the reference begins with sample ``part_start``; ``rests`` is 1 for a rest and 0 for a move, and
-    ``in_first_half`` is 1 in the first half of a rest. The reference is level from sample ``level_start`` on, and
-    ``previous`` is its value at the sample before.
+    The present part of the reference begins after sample ``part_start``; ``rests`` is 1 for a slow straight stretch and
+    0 for a move, and ``in_first_half`` is 1 in the first half of a stretch. The reference is straight from sample
+    ``line_start`` on, ``previous`` is its value at the sample before, and ``change`` its change up to that sample.
     """
 
     last: float
@@ -109,11 +110,12 @@ class ReferenceSummary(NamedTuple):
     tolerance: float
     hold_start: float
     samples: float
-    is_repeated: float = 0.0
+    start_up: float = 0.0
     interval: float = 0.0
     of_joint: float = 1.0
     previous: float = 0.0
-    level_start: float = 0.0
+    change: float = 1.0e300
+    line_start: float = 0.0
     part_start: float = 0.0
     rests: float = 0.0
     in_first_half: float = 0.0
@@ -121,10 +123,12 @@ class ReferenceSummary(NamedTuple):
 
 SAME_LEVEL = 1.0e-9
 """Largest difference of equal levels of a reference, relative to its largest value [-]."""
-LEVEL_RATE = 0.02
-"""Largest rate of a reference at rest, relative to its largest value [1/s]: of less, no loop is behind."""
-SHORTEST_REST, FEWEST_OF_REST = 1.0 / 9.0, 2.0
-"""Length of the shortest rest divided by the length of the move before it [-], and its smallest number of samples."""
+SLOW_RATE = 0.75
+"""Largest rate of a slow reference, relative to its largest value [1/s]: a lag behind it is within the largest one."""
+START_UP = 0.5
+"""Time for a value to meet a repeated reference [s], at most a quarter of the run; as long again it may settle."""
+SHORTEST_REST, SHORTEST_SHARE, FEWEST_OF_REST = 0.1, 0.1, 2.0
+"""Length of the shortest stretch [s] or, if that is less, divided by the run's [-]; and its least number of samples."""
 
 
 def is_away(reference: float, last: float, tolerance: float) -> bool:
@@ -139,41 +143,52 @@ def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary
     return course._replace(hold_start=sample.number + 1.0 if away else course.hold_start)
 
 
-def is_level(course: ReferenceSummary, reference: float, other: float, samples: float) -> bool:
-    """Return whether two values of a reference, a number of samples apart, are of one level."""
-    return abs(reference - other) <= LEVEL_RATE * course.largest * course.interval * samples
+def start_up_of(period: float, duration: float, is_wave: bool) -> float:
+    """Return the time for a value to meet a repeated reference [s]; 0 for a table that does not repeat."""
+    return min(START_UP, 0.25 * duration) if is_wave or period < duration else 0.0
 
 
-def shortest_rest(moved: float) -> float:
-    """Return the least number of samples of a rest after a move of some number of samples."""
-    return max(FEWEST_OF_REST, float(int(SHORTEST_REST * moved)) + 1.0)
+def is_straight(course: ReferenceSummary, change: float, later: float, samples: float) -> bool:
+    """Return whether a reference changes by ``later`` in some samples, as by ``change`` in one."""
+    return abs(later - change * samples) <= course.tolerance * samples
+
+
+def shortest_rest(course: ReferenceSummary) -> float:
+    """Return the least number of samples of a slow stretch."""
+    least = min(SHORTEST_REST / course.interval, SHORTEST_SHARE * course.samples)
+    return max(FEWEST_OF_REST, float(int(least)) + 1.0)
 
 
 def looked_at(course: ReferenceSummary, sample: Sample) -> float:
     """Return the number of the later sample whose reference tells what the present sample is part of.
 
-    That is the end of the shortest rest that would be one, or of a rest of which the present sample is in the middle.
+    That is the end of the shortest stretch that would be one, or of a stretch of which the present sample is in the
+    middle.
     """
-    goes_on = is_level(course, sample.reference, course.previous, 1.0)
-    start = course.level_start if goes_on else sample.number
-    middle = 2.0 * sample.number - start + 1.0
-    return middle if goes_on and course.rests > 0.0 else start + shortest_rest(start - course.part_start)
+    goes_on = is_straight(course, course.change, sample.reference - course.previous, 1.0)
+    middle = 2.0 * sample.number - course.line_start + 1.0
+    return middle if goes_on and course.rests > 0.0 else sample.number - 1.0 + shortest_rest(course)
 
 
 def advance_part(course: ReferenceSummary, sample: Sample, later: float, reference: float) -> ReferenceSummary:
     """Update the present part of the reference with a sample, and with the ``reference`` of sample ``later``."""
-    goes_on = is_level(course, sample.reference, course.previous, 1.0)
-    level_start = course.level_start if goes_on else sample.number
-    lasts = later <= course.samples - 1.0 and is_level(course, sample.reference, reference, later - sample.number)
+    change = sample.reference - course.previous
+    goes_on = is_straight(course, course.change, change, 1.0)
+    line_start = course.line_start if goes_on else sample.number - 1.0
+    is_slow = abs(change) <= SLOW_RATE * course.largest * course.interval
+    lasts = later <= course.samples - 1.0 and is_straight(
+        course, change, reference - sample.reference, later - sample.number
+    )
     rested = course.rests > 0.0
-    begins = goes_on and not rested and lasts
+    begins = is_slow and lasts and not goes_on
     ends = rested and not goes_on
     return course._replace(
         previous=sample.reference,
-        level_start=level_start,
-        part_start=level_start if begins or ends else course.part_start,
+        change=change,
+        line_start=line_start,
+        part_start=line_start if begins or ends else course.part_start,
         rests=1.0 if begins or (rested and goes_on) else 0.0,
-        in_first_half=1.0 if goes_on and lasts else 0.0,
+        in_first_half=1.0 if lasts and (begins or (rested and goes_on)) else 0.0,
     )
 
 

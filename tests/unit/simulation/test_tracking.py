@@ -288,7 +288,7 @@ def test_a_judged_part_without_a_peak_gives_no_verdict_and_a_slower_trial_is_lon
     ]
     short = simulate(TASK, changes)
     assert (short.tracking.follows, short.tracking.reason) == (None, "too short")
-    assert "the second half of the run has only 0.15 periods of the reference" in short.tracking.sentence
+    assert "the judged part has only 0.2 periods of the reference" in short.tracking.sentence
     longer = simulate(TASK, [*changes, "run.duration=40 s"])
     assert longer.tracking.follows
     assert longer.tracking.sentence.startswith("the torque follows its reference")
@@ -301,8 +301,7 @@ def test_a_judged_part_without_a_peak_gives_no_verdict_and_a_slower_trial_is_lon
     late = load_scenario("cylinder-servo", LATE_SINE)
     verdict = tried(late, simulate(late).tracking)
     assert verdict.fails
-    given = dict(text.split("=") for text in verdict.mended)
-    assert float(given["run.duration"].split()[0]) * float(given["reference.frequency"].split()[0]) >= 1.99
+    assert simulate("cylinder-servo", [*LATE_SINE[1:], *verdict.mended]).tracking.follows
 
 
 def test_a_smooth_wave_of_a_torque_has_a_limit_on_its_largest_error() -> None:
@@ -544,7 +543,7 @@ def test_the_criterion_that_decided_is_named_with_its_value_and_its_limit_on_bot
     assert verdict.number == pytest.approx(0.08 * most, rel=1e-6)
     assert verdict.limit == pytest.approx(0.05 * 1.08 * most, rel=1e-3)
     assert "does not follow its reference: the reference exceeds the largest available torque by 0.4" in verdict.found
-    assert " N m (0.27 N m allowed) from 5 s on" in verdict.found
+    assert " N m (0.27 N m allowed) from 1 s on" in verdict.found
 
 
 def test_a_command_may_turn_ten_times_a_second_and_twice_for_each_turn_of_the_reference() -> None:

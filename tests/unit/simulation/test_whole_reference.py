@@ -84,6 +84,37 @@ def test_no_limit_jumps_where_an_amplitude_passes_zero(path: str) -> None:
     assert np.max(np.abs(np.diff(limits))) < 0.15 * limits[10]
 
 
+def sine(amplitude: float, frequency: float) -> list[str]:
+    """Overrides of a sine about 3 N m."""
+    named = {"kind": "sine", "level": "3 N m", "amplitude": f"{amplitude} N m", "frequency": f"{frequency} Hz"}
+    return [f"reference.{name}={value}" for name, value in named.items()]
+
+
+@pytest.mark.parametrize(
+    ("references", "largest"),
+    [
+        ([sine(0.01 * number, 2.0) for number in range(16)], 0.09),
+        ([sine(0.6, 0.4 + 0.1 * number) for number in range(24)], 0.09),
+        ([table((0.0, 0.0), (0.3, 3.0), (3.0, 3.0 - 0.02 * number)) for number in range(16)], 0.03),
+    ],
+    ids=["amplitude", "frequency", "slope"],
+)
+def test_limits_move_in_small_steps_with_amplitude_frequency_and_slope(
+    references: list[list[str]], largest: float
+) -> None:
+    judged = [simulate(load_scenario(TASK, reference)).tracking for reference in references]
+    assert all(verdict.follows for verdict in judged)
+    limits = np.array([verdict.limit for verdict in judged if verdict.criterion == "RMS error"])
+    assert limits.size == len(judged)
+    assert np.max(np.abs(np.diff(np.log(limits)))) < largest
+
+
+def test_a_wave_that_is_met_late_does_not_follow() -> None:
+    slow = [*sine(0.2, 2.0), "run.duration=2 s", "valve.area=2 mm^2"]
+    verdict = simulate(load_scenario(TASK, slow)).tracking
+    assert (verdict.follows, verdict.since) == (False, 0.5)
+
+
 def test_a_verdict_is_one_of_three_states_and_a_check_passes_only_where_it_follows_or_nothing_is_followed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -28,6 +28,7 @@ from ppafo.signals.meter import (
     advance_part,
     is_away,
     looked_at,
+    start_up_of,
 )
 
 NO_FOOT = FootSample(**dict.fromkeys(FootSample._fields, 0.0))
@@ -144,16 +145,16 @@ def begin_reference_summary(parts: Program, lane: Lane, interval: float, last_in
     first, last = reference_of_sample(parts, lane, 0, interval), reference_of_sample(parts, lane, last_index, interval)
     origin = reference_origin(parts, lane)
     largest = max(abs(first - origin), abs(last - origin))
-    is_repeated = 0.0
+    start_up, duration = 0.0, last_index * interval * lane.timing.step
     if parts.reference.period is not None:
-        is_repeated = 1.0 if parts.reference.period(lane.reference) < last_index * interval * lane.timing.step else 0.0
+        start_up = start_up_of(parts.reference.period(lane.reference), duration, parts.reference.is_wave)
     lane.course = ReferenceSummary(
         last=last,
         largest=largest,
         tolerance=SAME_LEVEL * largest,
         hold_start=0.0,
         samples=last_index + 1.0,
-        is_repeated=is_repeated,
+        start_up=start_up / (interval * lane.timing.step),
         interval=interval * lane.timing.step,
         of_joint=0.0 if parts.controlled == ANGLE else 1.0,
         previous=first,

@@ -1,7 +1,7 @@
 """Judged parts of a run: record of the numbers of one, measured from a recording or taken from metrics.
 
-The reference of a task is cut into rests and moves, and judged are the last one and the worst of the earlier ones. In a
-walk, the judged part is all samples with a requested torque.
+The reference of a task is cut into slow stretches and moves (``metrics.settled``), and judged are the last one and the
+worst of the earlier ones. In a walk, the judged part is all samples with a requested torque.
 """
 
 import math
@@ -34,7 +34,7 @@ from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.helping import PUSH_OFF
 from ppafo.parameters.reach import torque_reach
 from ppafo.signals import Recording
-from ppafo.signals.meter import LEVEL_RATE, SAME_LEVEL, ReferenceSummary, shortest_rest
+from ppafo.signals.meter import SAME_LEVEL, SLOW_RATE, ReferenceSummary, shortest_rest, start_up_of
 from ppafo.simulation.profiles import limits_of, profile_bounds, profile_parameters, profile_values
 from ppafo.simulation.scenario import Scenario
 
@@ -46,6 +46,8 @@ SMALLEST_SIZE = 5.0e-4
 """Smallest wanted change if the range is 0, in typical sizes of the quantity (``ControlledQuantity.size``)."""
 _NO_RETURN = 1.0e-9
 """Share of a reference's path that leads back, up to which it is a ramp [-]."""
+_LONG_RAMP = 0.5
+"""Share of the way of a reference from which its last part, in one direction, is a ramp that does not end [-]."""
 _TINY = 1.0e-300
 """Divisor in place of 0."""
 
@@ -173,11 +175,15 @@ def task_parts(scenario: Scenario, recording: Recording) -> tuple[SettledPart, S
     """
     reference, value = followed(recording)
     course = _course(scenario, recording)
-    parts = [_sums_of(part, course, recording) for part in reference_parts(reference, course)]
-    *earlier, (last, samples, _) = parts
-    met = np.abs(value - reference) <= LARGEST_SHARE * course.largest
+    is_wave, lag = PROFILES[scenario.reference.kind].is_wave, _allowed_lag(course, recording)
+    whole = [ReferencePart(0, len(recording) - 1, 0, rests=False)]
+    parts = whole if is_wave else reference_parts(reference, course)
+    *earlier, (last, samples, _) = [_sums_of(part, course, recording, lag) for part in parts]
+    earlier = [each for each in earlier if each[0].rests or each[0].path > 0.0]
     # At the start of a run the value may be on its way yet.
-    earlier = [each for each in earlier if each[0].start > 0.0 or met[: each[2][1] + 1].any()]
+    first_met = _first_met(value - reference, course)
+    on_its_way = min(first_met, course.start_up or first_met)
+    earlier = [each for each in earlier if each[0].start > 0.0 or each[2][1] > on_its_way or each[2][1] == first_met]
     worst = max(earlier, key=lambda each: badness(each[0], course), default=None)
     hold = int(max(course.hold_start, 0.0)) if course.hold_start < course.samples - 1.0 else 0
     last_quarter, span = slice((hold + 3 * len(recording)) // 4, None), recording.time[samples]
@@ -222,9 +228,8 @@ def _single(part: SettledPart) -> SettledPart:
 def _course(scenario: Scenario, recording: Recording) -> ReferenceSummary:
     """Summary of a recorded reference, as a run without recording has it at its end."""
     reference, count = reference_of(recording), len(recording)
-    period = PROFILES[scenario.reference.kind].period
     duration = float(recording.time[-1] - recording.time[0])
-    is_repeated = period is not None and period(profile_parameters(scenario.reference)) < duration
+    interval = duration / (count - 1)
     largest, start = extent(recording), hold_start(recording)
     return ReferenceSummary(
         last=float(reference[-1]),
@@ -232,15 +237,23 @@ def _course(scenario: Scenario, recording: Recording) -> ReferenceSummary:
         tolerance=SAME_LEVEL * largest,
         hold_start=float(count - 1 if start is None else start),
         samples=float(count),
-        is_repeated=float(is_repeated),
-        interval=duration / (count - 1),
+        start_up=_start_up(scenario, duration) / interval,
+        interval=interval,
         of_joint=0.0 if scenario.controlled == ANGLE else 1.0,
         previous=float(reference[0]),
     )
 
 
+def _start_up(scenario: Scenario, duration: float) -> float:
+    """Time for a value to meet a repeated reference [s], 0 for another; of several runs that of the first."""
+    profile, choice = PROFILES[scenario.reference.kind], scenario.reference
+    single = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
+    period = None if profile.period is None else profile.period(profile_parameters(single))
+    return 0.0 if period is None else start_up_of(period, duration, profile.is_wave)
+
+
 class ReferencePart(NamedTuple):
-    """Rest or move of a reference: first and last sample, and the first one that is judged."""
+    """Stretch or move of a reference: the sample after which it begins, its last one, and the first that is judged."""
 
     first: int
     last: int
@@ -249,52 +262,59 @@ class ReferencePart(NamedTuple):
 
 
 def reference_parts(reference: Floats, course: ReferenceSummary) -> list[ReferencePart]:
-    """Rests and moves of a reference in turn, as ``signals.meter.advance_part`` finds them sample by sample."""
-    count, slack = reference.size, LEVEL_RATE * course.largest * course.interval
-    level = np.concatenate([[False], np.abs(np.diff(reference)) <= slack, [False]])
-    begins, after = np.flatnonzero(level[1:] & ~level[:-1]), np.flatnonzero(level[:-1] & ~level[1:]) + 1
-    parts, start = [], 0
-    for begin, end in zip(begins.tolist(), after.tolist(), strict=True):
-        ahead = begin + int(shortest_rest(float(begin - start)))
-        if ahead >= count or abs(reference[ahead] - reference[begin + 1]) > slack * (ahead - begin - 1):
-            continue
+    """Stretches and moves of a reference, as ``signals.meter.advance_part`` finds them sample by sample."""
+    end, change, parts, start = reference.size - 1, np.diff(reference), list[ReferencePart](), 0
+    begins = np.flatnonzero(np.concatenate([[True], np.abs(np.diff(change)) > course.tolerance]))
+    ends = np.append(begins[1:], end)
+    is_slow = np.abs(change[begins]) <= SLOW_RATE * course.largest * course.interval
+
+    def is_on_line(index: Any, later: Any) -> Any:
+        ahead = reference[np.minimum(later, end)] - reference[index] - change[index - 1] * (later - index)
+        return (later <= end) & (np.abs(ahead) <= course.tolerance * (later - index))
+
+    is_stretch = is_slow & is_on_line(begins + 1, begins + int(shortest_rest(course)))
+    for begin, last in zip(begins[is_stretch].tolist(), ends[is_stretch].tolist(), strict=True):
         if begin > start:
-            parts.append(ReferencePart(start, begin, start, rests=False))
-        within = np.arange(begin + 1, end)
-        later = 2 * within - begin + 1
-        seen = later < count
-        waits = np.zeros(within.size, dtype=bool)
-        waits[seen] = np.abs(reference[later[seen]] - reference[within[seen]]) <= slack * (later - within)[seen]
+            parts.append(ReferencePart(start, begin, start + (start > 0), rests=False))
+        within = np.arange(begin + 1, last + 1)
+        waits = is_on_line(within, 2 * within - begin + 1)
         waits[0] = True
-        parts.append(ReferencePart(begin, end - 1, int(within[np.flatnonzero(waits)[-1]]) + 1, rests=True))
-        start = end
-    if start < count:
-        parts.append(ReferencePart(start, count - 1, start, rests=False))
-    return [part._replace(judged=min(part.judged, part.last)) for part in parts]
+        parts.append(ReferencePart(begin, last, min(int(within[np.flatnonzero(waits)[-1]]) + 1, last), rests=True))
+        start = last
+    if start < end:
+        parts.append(ReferencePart(start, end, start + (start > 0), rests=False))
+    return parts
+
+
+def _first_met(error: Floats, course: ReferenceSummary) -> float:
+    """Number of the first sample with a value near its reference, in time for a repeated one; inf without any."""
+    met = np.abs(error[: math.ceil(course.start_up) or None]) <= LARGEST_SHARE * course.largest
+    return float(np.argmax(met)) if met.any() else math.inf
+
+
+def _allowed_lag(course: ReferenceSummary, recording: Recording) -> Floats:
+    """Error allowed at each sample beside that at rest, as ``allowed_lag`` of the settled meter (samples,)."""
+    reference, share = reference_of(recording), course.interval / (LAG_TIME + course.interval)
+    late = np.array(list(accumulate(reference.tolist(), lambda late, now: late + (now - late) * share)))
+    change = np.abs(np.diff(reference, prepend=reference[0]))
+    of_reference = np.minimum(np.abs(reference - late), 2.0 * LAG_TIME / course.interval * change)
+    of_joint = course.of_joint * LAG_OF_JOINT * np.abs(recording["angular_velocity"]) * course.largest
+    return np.minimum(of_reference + of_joint, LARGEST_LAG * course.largest)
 
 
 def _sums_of(
-    part: ReferencePart, course: ReferenceSummary, recording: Recording
+    part: ReferencePart, course: ReferenceSummary, recording: Recording, lag: Floats
 ) -> tuple[PartSums, slice, tuple[int, int]]:
     """Sums over a part of a recorded reference, its judged samples, and its first and last sample."""
     reference, value = followed(recording)
     error, judged, half = value - reference, part.judged, course.samples - 1.0
     if part.first == 0 and not part.rests:
-        met = np.abs(error) <= LARGEST_SHARE * course.largest
-        first_met = int(np.argmax(met))
-        judged = first_met if met[first_met] and 2.0 * first_met < half else 0
-        judged = math.ceil(0.5 * half) if course.is_repeated and 0.5 * half <= part.last else judged
-        judged = judged if judged <= part.last else 0
+        first_met = _first_met(error, course)
+        met = int(first_met) if 2.0 * first_met < half else 0
+        judged = math.ceil(course.start_up * (2.0 if first_met < math.inf else 1.0)) or met
+        judged = next((each for each in (judged, met) if each <= part.last), 0)
     samples = slice(judged, part.last + 1)
-    share, moves = course.interval / (LAG_TIME + course.interval), reference[part.first : part.last + 1].tolist()
-    # Behind a move, which begins with the level before it.
-    before = max(part.first - 1, 0)
-    late = list(accumulate(moves, lambda late, now: late + (now - late) * share, initial=float(reference[before])))[1:]
-    behind = np.zeros(len(moves)) if part.rests else reference[part.first : part.last + 1] - late
-    speeds = recording["angular_velocity"][samples]
-    of_joint = course.of_joint * LAG_OF_JOINT * np.abs(speeds) * course.largest
-    lag = np.minimum(np.abs(behind[judged - part.first :]) + of_joint, LARGEST_LAG * course.largest)
-    way, error = reference[samples] - value[0], error[samples]
+    way, error, lag = reference[samples] - value[0], error[samples], lag[samples]
     sums = PartSums(
         start=float(part.first),
         rests=float(part.rests),
@@ -308,9 +328,9 @@ def _sums_of(
         swing=Swing(0.0, 1.0 + reversals(error, OSCILLATION_THRESHOLD * course.largest), 0.0),
         lowest_error=float(error.min()),
         highest_error=float(error.max()),
-        first=float(reference[before]),
+        first=float(reference[part.first]),
         last=float(reference[part.last]),
-        path=float(np.sum(np.abs(np.diff(reference[before : part.last + 1])))),
+        path=float(np.sum(np.abs(np.diff(reference[part.first : part.last + 1])))),
     )
     return sums, samples, (part.first, part.last)
 
@@ -337,13 +357,26 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
         "is_reference_smooth": profile.is_smooth,
     }
 
-    def part(prefix: str, periods: Any) -> SettledPart:
+    # Of a sine only: another reference may have a part of its period alone on purpose, such as the swing of a stride.
+    frequency = scenario.reference.settings.get("frequency")
+
+    def part(prefix: str) -> SettledPart:
         of = {name.removeprefix(f"{prefix}_"): number for name, number in metrics.items() if name.startswith(prefix)}
         rms, mean, turns, rests = of["error"], of["missing"], of["turns"], of["rests"] > 0.0
+        time = of["taken"] * metrics["settled_interval"]
+        periods = math.inf if frequency is None else time * frequency
         # The error of a loop that lags reverses, too: of an earlier move nobody knows how often.
-        of_lag = 0.0 if np.all(rests) else _reversals_of_lag(scenario, first(wanted)) if prefix == "settled" else turns
+        of_lag = (
+            0.0
+            if np.all(rests)
+            else _reversals_of_lag(scenario, first(wanted), periods)
+            if prefix == "settled"
+            else turns
+        )
         turns = turns - np.where(rests, 0.0, of_lag)
         motion = np.minimum(of["lag"] / (LARGEST_LAG * np.maximum(change, _TINY)), 1.0)
+        slow = SLOW_RATE * change * time / np.maximum(of["path"], _TINY)
+        is_ramp = (of["path"] > _LONG_RAMP * change) & (of["returning"] <= _NO_RETURN)
         numbers: dict[str, Any] = {
             "rms_error": rms,
             "mean_error": mean,
@@ -355,37 +388,28 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
             "motion": motion,
             "lag": of["lag"],
             "mean_lag": of["mean_lag"],
-            "weight": np.where(rests, 1.0, np.maximum(of["returning"], 1.0 - motion**2)),
-            "ends_on_ramp": ~rests & (of["returning"] <= _NO_RETURN) & is_at_peak,
+            "weight": np.where(rests, 1.0, np.maximum(of["returning"], np.minimum(slow, 1.0) ** 2)),
+            "ends_on_ramp": is_ramp & is_at_peak,
             "reference_mean": metrics["settled_begun"] + of["reference"],
             "reference_deviation": np.where(rests, 0.0, of["wave"]),
             "reference_periods": periods,
         }
         return SettledPart(samples=slice(None), **numbers, **common)
 
-    return part("settled", _settled_periods(scenario)), part("worst", math.inf)
+    return part("settled"), part("worst")
 
 
-def _settled_periods(scenario: Scenario) -> Any:
-    """Periods of a sine in the second half of a run [-], inf for another reference; an array (runs,) if it varies.
-
-    A table may have a part of its period alone on purpose, such as the swing of a stride.
-    """
-    frequency = scenario.reference.settings.get("frequency")
-    return math.inf if frequency is None else 0.5 * np.asarray(scenario.run.duration) * frequency
-
-
-def _reversals_of_lag(scenario: Scenario, wanted: float) -> Any:
-    """Reversals of the error of a loop that lags, in the second half of a run: of the reference, or of its rate.
+def _reversals_of_lag(scenario: Scenario, wanted: float, periods: Any) -> Any:
+    """Reversals of the error of a loop that lags, in the judged part of a run: of the reference, or of its rate.
 
     Twice a period of a sine, an array (runs,) if it varies; of another reference those of the first run hold for all.
     """
-    periods = _settled_periods(scenario)
     if np.isfinite(periods).all():
         return np.ceil(2.0 * periods)
     choice, duration = scenario.reference, float(first(scenario.run.duration))
     single = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
-    times = np.arange(0.5 * duration, duration, float(first(scenario.run.output_interval)))
+    start = 2.0 * _start_up(scenario, duration) or 0.5 * duration
+    times = np.arange(start, duration, float(first(scenario.run.output_interval)))
     values, rate, _ = profile_values(single, times)
     of_rate = reversals(rate, OSCILLATION_THRESHOLD * float(np.max(np.abs(rate))))
     return max(reversals(values, OSCILLATION_THRESHOLD * wanted), of_rate)

@@ -263,7 +263,7 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
         if settled.ends_on_ramp:
             said = _undecided_text(scenario, f"the run ends on the ramp of its reference, {left}")
         else:
-            short = f"the second half of the run has only {settled.reference_periods:.2g} periods of the reference"
+            short = f"the judged part has only {settled.reference_periods:.2g} periods of the reference"
             duration = 2.0 * scenario.run.duration / settled.reference_periods
             longer = override_text([f"run.duration={duration:.3g} s"])
             said = f"no verdict on the {controlled.words}: {short}, {left}; not tried: {longer} should give one"
