@@ -299,7 +299,8 @@ def _allowed_lag(course: ReferenceSummary, recording: Recording) -> Floats:
     change = np.abs(np.diff(reference, prepend=reference[0]))
     of_reference = np.minimum(np.abs(reference - late), 2.0 * LAG_TIME / course.interval * change)
     of_joint = course.of_joint * LAG_OF_JOINT * np.abs(recording["angular_velocity"]) * course.largest
-    return np.minimum(of_reference + of_joint, LARGEST_LAG * course.largest)
+    allowed: Floats = np.minimum(of_reference + of_joint, LARGEST_LAG * course.largest)
+    return allowed
 
 
 def _sums_of(
