@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ppafo.simulation.tracking import Tracking
     from ppafo.simulation.tracking.remedies import Remedy
 
-MOST_TRIED = 16
+MOST_TRIED = 18
 """Largest number of remedies simulated for a verdict."""
 _STRIDES_TRIED = 8.0
 """Number of strides in which the remedies of a walk are compared; one that suffices there is simulated to the end."""

@@ -386,7 +386,9 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
     found = {path: number for path, number in flaws.items() if number > 0.0}
     if not found:
         return None
-    remedies = [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
+    # Gains are changed with less effort than sensors.
+    remedies = [*rescaled_gains(scenario, case.law, (0.5,))] if _DELAY in found else []
+    remedies += [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
     told = [f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in found.items()]
     late = f"the measured {CONTROLLED[scenario.controlled].words} comes late ({told.pop(0)})" if _DELAY in found else ""
     others = f"the sensors are not accurate enough for the controlled quantity ({', '.join(told)})" if told else ""
