@@ -19,10 +19,12 @@ from ppafo.parameters.overrides import over, read_overrides
 from ppafo.plugins import Plugins, name_plugins, plugin_words
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation.declaration import OF_A_VANE
-from ppafo.simulation.motion_kind import is_walk
+from ppafo.simulation.motion_kind import MOTIONS, is_walk
 from ppafo.simulation.overrides import over_layer, override_document
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import known_names
+
+_OF_WALKS = {"gait", "wearer", "bottle"}
 
 
 def list_all_scenarios() -> tuple[str, ...]:
@@ -115,7 +117,9 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *,
 
 def _layout(document: Mapping[str, Any]) -> of_vanes.Layout:
     """Return the file layout of a document, by its kind of motion."""
-    if not is_walk(kind_at(document, "motion")):
+    kind = kind_at(document, "motion")
+    # A motion that is not known is of a walk where the file has a key of walks alone.
+    if not is_walk(kind) and (kind in MOTIONS or not _OF_WALKS & document.keys()):
         return of_vanes.VANE
     from ppafo.walking.loading import WALKING
 

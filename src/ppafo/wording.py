@@ -51,9 +51,18 @@ def percentage(fraction: float, digits: int) -> str:
 
 def said_missing(names: Sequence[str]) -> str:
     """Format a statement on missing items: ``'a', 'b' and 'c' are missing``."""
-    quoted = [f"'{name}'" for name in names]
+    quoted = [f"'{name}'" for name in folded(names)]
     listed = " and ".join(filter(None, (", ".join(quoted[:-1]), quoted[-1])))
-    return f"{listed} is missing" if len(quoted) == 1 else f"{listed} are missing"
+    return f"{listed} is missing" if len(names) == 1 else f"{listed} are missing"
+
+
+def folded(names: Iterable[str]) -> list[str]:
+    """Return names with one item for more than three numbered ones: ``time_01 ... time_20``."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(name.rstrip("0123456789"), []).append(name)
+    ends = ([f"{group[0]} ... {group[-1]}"] if len(group) > 3 else group for group in groups.values())
+    return [name for group in ends for name in group]
 
 
 _OF_DATA_SHEETS: Mapping[str, tuple[str, str]] = {
@@ -74,10 +83,10 @@ def name_in_data_sheets(word: str) -> str:
     return _SPELT_OTHERWISE.get(word.lower(), word.lower())
 
 
-def nearest_name(name: str, allowed: Iterable[str]) -> str:
+def nearest_name(name: str, allowed: Iterable[str], likeness: float = 0.6) -> str:
     """Return a hint such as ``, did you mean 'angle'?`` for an unknown name; empty if no name is near.
 
-    A text that resembles no allowed name may be one word of a name: its first, or any other.
+    A text that resembles no allowed name by ``likeness`` may be one word of a name: its first, or any other.
     """
     word, known = str(name), list(allowed)
     before, dot, last = word.rpartition(".")
@@ -86,7 +95,7 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
         too = f", with '{before}{dot}critical_ratio' 0.3" if meant == "sonic_conductance" else ""
         return f", which is '{before}{dot}{meant}'{conversion}{too}"
     # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
-    near = difflib.get_close_matches(word, known, n=max(len(known), 1), cutoff=0.6)
+    near = difflib.get_close_matches(word, known, n=max(len(known), 1), cutoff=likeness)
     # A section that both have makes names alike that have nothing else in common.
     ends = [name.rpartition(".") for name in near]
     near = ["".join(end) for end in ends if not dot or end[0] != before or _likeness(last, end[2]) >= 0.5]
@@ -94,6 +103,8 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
         # Of names that are as near, the one that begins like it: 'time_02' and not 'time_31' for 'time_01'.
         alike = [name for name in known if name in near and _likeness(name, word) == _likeness(near[0], word)]
         near = [max(alike, key=lambda name: len(commonprefix([name, word])))]  # noqa: RUF071 - of names, no paths
+        # Of numbered names that of the same number: 'time_02' and not 'time_20' for 'time_2'.
+        near = [name for name in known if _without_zeros(name) == _without_zeros(word)] or near
     else:
         # A word at the beginning of a name, else anywhere in it, as ``rms`` is in ``rms_error``.
         words = [(re.split(r"[^0-9a-z]+", name.lower()), name) for name in known]
@@ -107,6 +118,10 @@ def known_names(name: str, known: Iterable[str]) -> str:
     """Return the end of a refusal of an unknown name: the nearest known name, and all known names."""
     names = list(known)
     return f"{nearest_name(name, names)}; available: {', '.join(names) or 'none'}"
+
+
+def _without_zeros(name: str) -> str:
+    return re.sub(r"(?<!\d)0+(?=\d)", "", name)
 
 
 def _likeness(name: str, word: str) -> float:

@@ -6,7 +6,9 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticKnownError
 
-from ppafo.documents.problems import all_problems
+from ppafo.documents.faults import line_of, refuse
+from ppafo.documents.problems import faults_of
+from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import SCHEMA, TomlKind, label
 from ppafo.errors import PpafoError
 
@@ -35,15 +37,18 @@ Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 def read_model(kind: TomlKind, model: type[Model], name_or_path: str | Path) -> tuple[Model, str]:
     """Load and validate a file by bundled name or path. Returns the model and the label used in messages."""
     file = label(str(name_or_path))
-    return validate(model, kind.parse(kind.read(name_or_path), file), file, kind.error), file
+    content = kind.read(name_or_path)
+    return validate(model, kind.parse(content, file), file, kind.error, content), file
 
 
-def validate(model: type[Model], document: object, file: str, refusal: type[PpafoError]) -> Model:
-    """Validate a document as a model. Raises ``refusal`` with all problems if the layout differs."""
+def validate(model: type[Model], document: object, file: str, refusal: type[PpafoError], content: bytes = b"") -> Model:
+    """Validate a document as a model. Raises ``refusal`` with all problems, by line of the ``content`` of its file."""
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        raise refusal(f"{file}: {all_problems(error.errors(include_url=False), model)}") from error
+        faults = faults_of(error.errors(include_url=False), model)
+    text = decoded(content)
+    return refuse(faults, file, refusal, lambda path: line_of(text, path))
 
 
 def make_schema(model: type[BaseModel], title: str) -> dict[str, Any]:

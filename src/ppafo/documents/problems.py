@@ -1,4 +1,4 @@
-"""Problems of a document as one-line text: key, value, allowed values and nearest name."""
+"""Problems of a document that a model refuses, by path: key, value, allowed values and nearest name."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from pydantic_core import ErrorDetails
 
 from ppafo.documents.toml_text import LONGEST_VALUE, NAME, NAME_RULE, quote
 from ppafo.plugins import nearest_kind
-from ppafo.wording import nearest_name, one_line, said_missing
+from ppafo.wording import nearest_name, one_line
 
 LABEL = r"^[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?$"
 """Pattern of a display name: one line of text without leading or trailing space."""
@@ -19,21 +19,19 @@ _TEXT_RULES = {
     LABEL: "must be one line of text without leading or trailing spaces",
 }
 """Message endings for a text that does not match a pattern, by pattern."""
-_MAXIMUM_PROBLEMS = 5
 _MAXIMUM_TABLES = 3
 """Largest number of tables named in a message as containing an unknown key."""
 _MISSING = {"missing": "", "union_tag_not_found": ".kind"}
 """Suffix of the path of a missing key, by problem type."""
 
 
-def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
-    """Return all problems in one line: unknown keys first, then wrong values, then missing keys.
+def faults_of(details: list[ErrorDetails], model: type[BaseModel]) -> dict[str, str]:
+    """Return all problems by path, "" for a gap.
 
-    For a value that matches none of several types only the first reason is given. The number of problems is limited.
+    For a value that matches none of several types only the first reason is given.
     """
     containers = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
-    missing: list[str] = []
-    problems: dict[str, tuple[_Key, ErrorDetails]] = {}
+    faults: dict[str, str] = {}
     for detail in details:
         # A table or list that is wrong because of a value in it has the problem of this value.
         if detail["loc"] in containers:
@@ -43,19 +41,10 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
             # Of a table that is missing its required keys are named, which the next refusal would ask for.
             fields = key.value_type.model_fields if _is_model(key.value_type) else {}
             required = [f"{key.path}.{name}" for name, field in fields.items() if field.is_required()]
-            missing += required or [f"{key.path}{_MISSING[detail['type']]}"]
+            faults |= dict.fromkeys(required or [f"{key.path}{_MISSING[detail['type']]}"], "")
         else:
-            problems.setdefault(key.path, (key, detail))
-    ordered = sorted(problems.values(), key=lambda problem: problem[1]["type"] != "extra_forbidden")
-    messages = [_message(key, detail, model) for key, detail in ordered[:_MAXIMUM_PROBLEMS]]
-    # Unknown keys of one table have the same allowed keys, which the last of them lists.
-    ends = [message.partition("; allowed here: ")[2] for message in messages[1:]]
-    messages = [text.removesuffix(f"; allowed here: {end}") for text, end in zip(messages, [*ends, ""], strict=False)]
-    if len(ordered) > _MAXIMUM_PROBLEMS:
-        messages.append(f"and {len(ordered) - _MAXIMUM_PROBLEMS} more like these")
-    if missing:
-        messages.append(said_missing(list(dict.fromkeys(missing))))
-    return "; ".join(messages)
+            faults.setdefault(key.path, _message(key, detail, model))
+    return faults
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +61,8 @@ def _key_at(location: Iterable[int | str], model: type[BaseModel]) -> _Key:
     names: list[str] = []
     table: Any = model
     value_type: Any = model
-    for name in map(str, location):
+    # Of a list the first item is number 1.
+    for name in (str(part + 1 if isinstance(part, int) else part) for part in location):
         tables = [item for item in _tables_in(value_type) if "kind" in item.model_fields]
         if tables:
             kinds = {get_args(item.model_fields["kind"].annotation)[0]: item for item in tables}
@@ -124,6 +114,11 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
             kind = detail["ctx"]["tag"]
             words = _allowed_words(kind, detail["ctx"]["expected_tags"], nearest_kind)
             return f"{key.path}.kind = {quote(kind)} is not known{words}"
+        case "int_type" | "int_from_float" | "float_type" | "bool_type":
+            form = {"float": "a number", "bool": "true or false"}.get(
+                detail["type"].partition("_")[0], "a whole number"
+            )
+            return f"{assignment} must be {form}{', without quotation marks' * isinstance(detail['input'], str)}"
         case "string_pattern_mismatch":
             return f"{assignment} {_TEXT_RULES.get(detail['ctx']['pattern'], _TEXT_RULES[NAME])}"
         case "string_type":

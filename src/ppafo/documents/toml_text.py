@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from datetime import date, time
 from functools import lru_cache
 from importlib.resources.abc import Traversable
 from os.path import isfile
@@ -36,6 +37,10 @@ _DEEP_KEY = re.compile(
     rf"(?:^[ \t]*+\[{{0,2}}+|[{{,])[ \t]*+(?>{_PART}\.[ \t]*+){{{MAXIMUM_LEVELS}}}", re.ASCII | re.MULTILINE
 )
 """Pattern of a key with too many dots, for which parsing time grows at least quadratically."""
+_KEY = re.compile(r"""\s*(\[{1,2}[^]#]+\]{1,2}|[\w."' -]+?)(?:\s*=|(?<=\]))""")
+"""Header of a table, or key of a value."""
+_SIGNS = {"scenario": {"device", "controller"}, "parameter set": {"default_valve", "valves"}}
+"""Keys that only files of a kind have, by the noun of the kind."""
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _TOO_DEEP = f"has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are enough"
 
@@ -82,7 +87,11 @@ class TomlKind:
             remedy = f"; give {' or '.join(inside)}" if inside else other
             raise self.error(f"{label(name)}: cannot be read: {reason(error)}{remedy}") from error
         except (OSError, ValueError) as error:
-            raise self.error(f"{label(name)}: cannot be read: {reason(error)}{self._remedy(name)}") from error
+            names = (
+                [file.name for file in path.parent.glob(f"*{_SUFFIX}")] if isinstance(error, FileNotFoundError) else []
+            )
+            hint = nearest_name(path.name, names)
+            raise self.error(f"{label(name)}: cannot be read: {reason(error)}{hint}{self._remedy(name)}") from error
 
     def _remedy(self, file: str) -> str:
         """Return the remedy for a stored result or a file of another kind; empty for a .toml file."""
@@ -114,16 +123,29 @@ class TomlKind:
             # A path of Windows in double quotation marks.
             is_escape = any(word in str(error) for word in ("\\", "escape", "hex"))
             remedy = "; write a path with / or in single quotation marks, 'C:\\data\\run.csv'" * is_escape
-            raise self.error(f"{file}: is not valid TOML: {one_line(error)}{remedy}{self._remedy(file)}") from error
+            said = _twice(text, str(error)) or f"is not valid TOML: {one_line(error)}{remedy}{self._remedy(file)}"
+            raise self.error(f"{file}: {said}") from error
         except (RecursionError, ValueError) as error:
             raise self.error(f"{file}: is not usable TOML: it is nested too deeply, or a number is too long") from error
         self.check_depth(document, file)
+        for other, keys in _SIGNS.items():
+            if self.noun not in (other, "scenario", "walk") and keys <= document.keys():
+                raise self.error(f"{file}: is a {other}, not a {self.noun}")
         return document
 
     def check_depth(self, document: Mapping[str, Any], file: str) -> None:
         """Raise an error for tables nested too deeply; ``file`` is the label in messages."""
         if is_nested_too_deeply(document):
             raise self.error(f"{file}: {_TOO_DEEP}")
+
+
+def _twice(text: str, error: str) -> str:
+    """Return the message on a key or table that a file gives twice; empty for another ``error`` of the parser."""
+    found = re.search(r"\bCannot .*\(at (?:line (\d+)|end)", error)
+    lines = text.split("\n")[: int(found[1] or 10**9)] if found else []
+    # The parser is at the end of a value, which may have several lines.
+    keys = ((number, _KEY.match(line)) for number, line in reversed([*enumerate(lines, 1)]))
+    return next((f"line {number}: {one_line(key[1])} is given twice; omit one" for number, key in keys if key), "")
 
 
 @lru_cache(maxsize=16)
@@ -174,7 +196,19 @@ def label(file: str) -> str:
     return name if len(name) <= _LONGEST_LABEL else f"{name[:_KEPT_AT_EACH_END]}...{name[-_KEPT_AT_EACH_END:]}"
 
 
+def _spelt(value: object) -> str:
+    """Spell a value as in a file: ``true``, ``2020-01-01``, a list or table of such values."""
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key} = {_spelt(item)}' for key, item in value.items())}}}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_spelt, value))}]"
+    # Python takes a date and time for a date.
+    return (
+        str(value).lower() if isinstance(value, bool) else str(value) if isinstance(value, date | time) else repr(value)
+    )
+
+
 def quote(value: object) -> str:
     """Quote a value for a message, shortened to one line."""
-    quoted = one_line(repr(value))
+    quoted = one_line(_spelt(value))
     return quoted if len(quoted) <= LONGEST_VALUE else f"{quoted[:LONGEST_VALUE]}..."

@@ -72,7 +72,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
 
     Raises IdentificationError for an invalid file.
     """
-    problem = validate(ProblemFile, _FILE.parse(content, file), file, IdentificationError)
+    problem = validate(ProblemFile, _FILE.parse(content, file), file, IdentificationError, content)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]; give at least one")

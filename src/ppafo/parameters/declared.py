@@ -10,18 +10,18 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
-from functools import lru_cache
 from typing import Any, get_args, get_type_hints
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.faults import line_of, refuse
 from ppafo.documents.toml_text import NAME, NAME_RULE, SCHEMA, quote
-from ppafo.errors import KindError, PpafoError, UnitError, raise_noted
+from ppafo.errors import KindError, PpafoError, UnitError
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import is_within, range_rule
 from ppafo.plugins import nearest_kind
 from ppafo.units import format_quantity, parse_quantity, split_quantity
 from ppafo.units.shown import shown_unit
-from ppafo.wording import nearest_name, one_line, said_missing
+from ppafo.wording import folded, nearest_name, one_line
 
 KIND = "kind"
 """Key of a section that names its component, such as a controller, and so decides the other keys of the section."""
@@ -39,13 +39,9 @@ RULES = {
     JOINT_WORDS: "must consist of lower-case letters and blanks, at most 40",
 }
 """Message endings for a text that does not match a pattern, by pattern."""
-_MAXIMUM_FAULTS = 5
 _MAXIMUM_TABLES = 3
 """Largest number of tables named in a message as containing an unknown key."""
 _FORMS: Mapping[type, str] = {str: "a text in quotation marks", bool: "true or false", dict: "a table of texts"}
-_LINE = re.compile(r"\s*(?:(\[{1,2})\s*([^]#]+?)\s*\]|([\w.\"' -]+?)\s*=)")
-"""Header of a table, or key of a value."""
-_LONG_TEXT = re.compile(r"\"\"\".*?\"\"\"|'''.*?'''", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,32 +178,6 @@ def _form(quantity: Quantity, number: float) -> str:
     return f"a text with its unit, for example '{format_quantity(number, shown_unit(quantity.unit))}'"
 
 
-def line_of(text: str, path: str) -> str:
-    """Return the place of a path in the text of a file, ``line 12: ``, else that of its table; empty without a text."""
-    lines = _lines_in(text) if text else {}
-    while path and path not in lines:
-        path = path.rpartition(".")[0]
-    return f"line {lines[path]}: " if path else ""
-
-
-@lru_cache(maxsize=4)
-def _lines_in(text: str) -> dict[str, int]:
-    """Return the number of the line of each path in the text of a file; of a list of tables each has its number."""
-    lines, table = dict[str, int](), ""
-    for number, line in enumerate(_LONG_TEXT.sub(lambda found: "\n" * found[0].count("\n"), text).split("\n"), 1):
-        if (found := _LINE.match(line)) is None:
-            continue
-        name = re.sub(r"[\"'\s]", "", found[2] or found[3])
-        if found[1]:
-            table = name
-        if found[1] == "[[":
-            count = 0
-            while (table := f"{name}.{count}") in lines:
-                count += 1
-        lines.setdefault(table if found[1] else _joined(table, name), number)
-    return lines
-
-
 def is_required(field: Field) -> bool:
     """Return whether a field must be given wherever its table is."""
     if isinstance(field, Quantity):
@@ -228,8 +198,8 @@ class FieldLayout:
         inner = {name: _joined(path, name) for name in self.names.get(path, ())}
         is_decided = KIND in inner and (KIND in table or is_required(self.fields[inner[KIND]]))
         if is_decided and (fault := self._of_value(inner[KIND], self.fields[inner[KIND]], table.get(KIND, ""))):
-            # Of an unknown kind no other key is known.
             yield inner[KIND], fault if KIND in table else ""
+            yield from self._of_unknown_kind(table, path, inner)
             return
         field = self.fields.get(path)
         keys = field.keys if isinstance(field, InnerTable) else ""
@@ -241,11 +211,22 @@ class FieldLayout:
                 yield at, f"unknown key '{at}'{self._hint(str(name), list(inner))}"
             else:
                 yield from self._inside(inner[name], value)
-        unknown = table.keys() - inner.keys()
-        for name in inner.keys() - table.keys():
-            # A key that is there under a wrong name is one mistake, not two.
-            if not any(f"did you mean '{name}'" in nearest_name(str(key), inner) for key in unknown):
-                yield from self._gaps(inner[name])
+        for name, at in inner.items():
+            if name not in table:
+                yield from self._gaps(at)
+
+    def _of_unknown_kind(
+        self, table: Mapping[str, Any], path: str, inner: Mapping[str, str]
+    ) -> Iterator[tuple[str, str]]:
+        """Yield the faults of a table without a known kind: of the keys that it has for every kind."""
+        outer, _, name = path.rpartition(".")
+        is_named = isinstance(parent := self.fields.get(outer), InnerTable) and parent.keys
+        for key, value in table.items():
+            if key in inner and key != KIND:
+                yield from self._inside(inner[key], value)
+            elif is_named and isinstance(value, Mapping) and KIND in value:
+                joined = f"[{outer}.{name}-{one_line(key)}]"
+                yield _joined(path, one_line(key)), f"[{path}.{one_line(key)}]: a name has no dot; write {joined}"
 
     def _inside(self, path: str, value: Any) -> Iterator[tuple[str, str]]:
         field = self.fields.get(path, InnerTable())
@@ -257,7 +238,7 @@ class FieldLayout:
             yield path, f"{path} = {quote(value)} must be a table{keys}"
         elif isinstance(field, Many) and isinstance(value, list | tuple) and field.least <= len(value) <= field.most:
             of = field.of
-            for number, item in enumerate(value):
+            for number, item in enumerate(value, 1):
                 at = f"{path}.{number}"
                 if isinstance(of, Quantity | Words):
                     yield from ((at, fault) for fault in [self._of_value(at, of, item)] if fault)
@@ -302,7 +283,9 @@ class FieldLayout:
             if not isinstance(value, bool | float | list | dict) and value in known:
                 return ""
             names, is_kind = [str(name) for name in field.allowed], path.rpartition(".")[2] == KIND
-            hint = (nearest_kind if is_kind else nearest_name)(str(value), names)
+            # All are listed: a word that is only somewhat alike says less.
+            hint = nearest_kind(str(value), names) if is_kind else nearest_name(str(value), names, 0.75)
+            hint = ", without quotation marks" if str(value) in names else hint
             return f"{given} is not {'known' if is_kind else 'allowed'}{hint}; allowed: {', '.join(names)}"
         if not isinstance(value, field.form):
             return f"{given} must be {_FORMS[field.form]}{': ' * bool(field.summary)}{field.summary}"
@@ -320,7 +303,7 @@ class FieldLayout:
         ]
         is_elsewhere = 0 < len(tables) <= _MAXIMUM_TABLES
         hint = f", which is a key of {' and '.join(tables)}" if is_elsewhere else nearest_name(name, here)
-        return f"{hint}; allowed here: {', '.join(here)}"
+        return f"{hint}; allowed here: {', '.join(folded(here))}"
 
 
 def layout_of(fields: Fields, reads_numbers: bool = True) -> FieldLayout:
@@ -340,17 +323,8 @@ def check_keys(
     document: Mapping[str, Any], fields: Fields, place: str, error: type[PpafoError], text: str = ""
 ) -> None:
     """Raise ``error`` with all that is wrong in a document; messages start with ``place``."""
-    refuse(dict(layout_of(fields).faults(document)), place, error, lambda path: line_of(text, path))
-
-
-def refuse(faults: Mapping[str, str], place: str, error: type[PpafoError], line: Callable[[str], str]) -> None:
-    """Raise ``error`` with faults by path, "" for a gap; ``line`` returns the place of a path in the file."""
-    found = [error(f"{place}: {line(path)}{fault}") for path, fault in faults.items() if fault]
-    gaps = [path for path, fault in faults.items() if not fault]
-    wrong = found[:_MAXIMUM_FAULTS]
-    if len(found) > _MAXIMUM_FAULTS:
-        wrong.append(error(f"{place}: and {len(found) - _MAXIMUM_FAULTS} more like these"))
-    raise_noted([*wrong, *([error(f"{place}: {said_missing(gaps)}")] if gaps else [])])
+    if faults := dict(layout_of(fields).faults(document)):
+        refuse(faults, place, error, lambda path: line_of(text, path))
 
 
 def schema_of(title: str, *declares: Declare) -> dict[str, Any]:

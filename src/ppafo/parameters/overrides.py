@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.errors import ParameterError, PpafoError, UnitError, refused_as
+from ppafo.errors import ParameterError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
@@ -69,9 +69,12 @@ def split_override(override: str, error: type[PpafoError] = ParameterError) -> O
 
 
 def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterError) -> tuple[Override, ...]:
-    """Parse texts as overrides in their order. Raises ``error`` for the first invalid text in sorted order."""
-    in_order = tuple(texts)
-    read = {text: split_override(text, error) for text in sorted(in_order)}
+    """Parse texts as overrides in their order. Raises ``error`` for all invalid texts, in sorted order."""
+    in_order, wrong, read = tuple(texts), list[PpafoError](), dict[str, Override]()
+    for text in sorted(in_order):
+        with noted_in(wrong):
+            read[text] = split_override(text, error)
+    raise_noted(wrong)
     return tuple(read[text] for text in in_order)
 
 
@@ -216,8 +219,11 @@ def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], v
     # A gas brings numbers, and gauge pressures count from the atmosphere, so these two come first.
     first = [path for path in (SPECIES_PATH, ATMOSPHERE_PATH) if path in overrides_by_path]
     every = {**{path: overrides_by_path[path] for path in first}, **overrides_by_path, **followers}
+    wrong: list[PpafoError] = []
     for path, text in every.items():
-        parameter_set = _CHANGES.get(path, _with_number)(parameter_set, path, text)
+        with noted_in(wrong):
+            parameter_set = _CHANGES.get(path, _with_number)(parameter_set, path, text)
+    raise_noted(wrong)
     # Who gives a pressure in bar reads pressures in bar; a program gives numbers in SI, and reads nothing.
     typed = {
         path: parameter_set.numbers[path]
@@ -265,6 +271,8 @@ def _nearest_value(override: Override, allowed: Sequence[str]) -> str:
             f": no effect '{name}'{known_names(name, EFFECTS.loaded())}; your own needs an entry point 'ppafo.effects' "
             "of an installed package, not of the current folder"
         )
+    if section in ("valve", "valves") and override.typed.endswith(".kind"):
+        return "; a set has the kinds of its valves: choose another valve of the set, or change a copy of its file"
     section = f"{section}.{name}" if section == SECTION else section
     # Compared without their section, which all values in it have in common and which makes strangers look alike.
     near = [known.removeprefix(f"{section}.") for known in allowed if known.startswith(f"{section}.")]

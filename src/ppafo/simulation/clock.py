@@ -37,13 +37,13 @@ def read_clock(reading: DocumentReader) -> RunTimes:
     Raises ScenarioError for contradictory times, and for too many steps.
     """
     duration = reading.number(_DURATION_PATH, _DURATION)
-    until = f"{_DURATION_PATH} = {shown_text(duration, 's')}"
+    until = f"{_DURATION_PATH} = {reading.written(_DURATION_PATH)}"
     if value_at(reading.document, _RATE_PATH) is not None:
         period = 1.0 / reading.number(_RATE_PATH, RATE)
-        given = f"the period of {_RATE_PATH} = {value_at(reading.document, _RATE_PATH)} ({1.0e3 * period:.6g} ms)"
+        given = f"the period of {_RATE_PATH} = {reading.written(_RATE_PATH)} ({1.0e3 * period:.6g} ms)"
     elif value_at(reading.document, _PERIOD_PATH) is not None:
         period = reading.number(_PERIOD_PATH, PERIOD)
-        given = f"{_PERIOD_PATH} = {shown_text(period, 's')}"
+        given = f"{_PERIOD_PATH} = {reading.written(_PERIOD_PATH)}"
     else:
         raise ScenarioError(f"{reading.file}: '{_RATE_PATH}' is missing: give for example rate = '1 kHz', or a period")
     has_output = value_at(reading.document, _OUTPUT_PATH) is not None
@@ -61,7 +61,7 @@ def read_clock(reading: DocumentReader) -> RunTimes:
         if output < step * (1.0 - _RELATIVE):
             raise reading.refusal(
                 _OUTPUT_PATH,
-                f"must not be below {_STEP_PATH} = {shown_text(step, 's')}; reduce the step or record less often",
+                f"must not be below {_STEP_PATH} = {shown_text(step, 's', unit='s')}; reduce the step or record less",
             )
         _not_above(reading, _OUTPUT_PATH, output, duration, until)
         count = duration / output
@@ -71,13 +71,13 @@ def read_clock(reading: DocumentReader) -> RunTimes:
     if duration / used > MAXIMUM_STEPS:
         raise reading.refusal(
             _DURATION_PATH,
-            f"with a step of {shown_text(used, 's')} the run has {duration / used:.3g} steps, at most "
+            f"with a step of {shown_text(used, 's', unit='s')} the run has {duration / used:.3g} steps, at most "
             f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or increase {_STEP_PATH}",
         )
     if duration / output > MAXIMUM_OUTPUTS:
         raise reading.refusal(
             _DURATION_PATH,
-            f"recorded every {shown_text(output, 's')} the run has {duration / output:.3g} samples, at most "
+            f"recorded every {shown_text(output, 's', unit='s')} the run has {duration / output:.3g} samples, at most "
             f"{MAXIMUM_OUTPUTS:.0e} are allowed: increase {_OUTPUT_PATH}",
         )
     return RunTimes(duration, used, output, period)

@@ -32,7 +32,7 @@ from ppafo.parameters.declared import (
 )
 from ppafo.parameters.parameter_set import Entry
 from ppafo.simulation.document import controlled_in
-from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, MotionSection, is_walk
+from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, MotionSection, is_walk
 from ppafo.simulation.scenario import (
     FreeMotion,
     GasModel,
@@ -141,9 +141,8 @@ def declared(document: Mapping[str, Any], motion: MotionSection | None = None) -
 
 def _motions() -> tuple[str, ...]:
     """Return the motions of a vane alone: all of this package, and loaded ones of other packages."""
-    # A walk is not loaded for the list.
     others = (name for name, kind in MOTIONS.loaded().items() if kind.section is not None)
-    return tuple(dict.fromkeys((*VANE_MOTIONS, *others, WALK)))
+    return tuple(dict.fromkeys((*VANE_MOTIONS, *others)))
 
 
 def named(catalogue: Kinds[Any], document: Mapping[str, Any], section: str) -> Any:

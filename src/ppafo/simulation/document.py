@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.faults import line_of
 from ppafo.documents.toml_text import quote
 from ppafo.errors import PpafoError, ScenarioError, UnitError, noted_in, raise_noted
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet
-from ppafo.parameters.declared import line_of, number_in, value_at
+from ppafo.parameters.declared import number_in, value_at
 from ppafo.parameters.overrides import Override
 from ppafo.units import SI
 from ppafo.wording import one_line
@@ -55,10 +56,13 @@ class DocumentReader:
 
     def quote(self, path: str) -> str:
         """Return file, key and value as given."""
-        value = value_at(self.document, path)
         if path in self.overridden:
-            return f"{self.file}: override {path}={one_line(value).removesuffix(f' {SI}')}"
-        return f"{self.file}: {line_of(self.text, path)}{path} = {quote(value)}"
+            return f"{self.file}: override {path}={self.written(path)}"
+        return f"{self.file}: {line_of(self.text, path)}{path} = {quote(value_at(self.document, path))}"
+
+    def written(self, path: str) -> str:
+        """Return the value at a path as given."""
+        return one_line(value_at(self.document, path)).removesuffix(f" {SI}")
 
     def refusal(self, path: str, reason: str) -> ScenarioError:
         """Return the error for an unusable value at a path, with the reason."""

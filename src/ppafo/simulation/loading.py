@@ -7,15 +7,17 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from ppafo.documents.faults import line_of, refuse
 from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import KindError, ScenarioError, refused_as
+from ppafo.errors import KindError, ScenarioError, noted_in, raise_noted, refused_as
 from ppafo.parameters import ParameterSet
-from ppafo.parameters.declared import KIND, Content, layout_of, line_of, refuse, value_at
+from ppafo.parameters.declared import KIND, Content, layout_of, value_at
 from ppafo.parameters.overrides import FORMS, Override, either, in_two_forms, read_overrides
 from ppafo.simulation.building import build_scenario
 from ppafo.simulation.declaration import OF_A_VANE
 from ppafo.simulation.document import DocumentReader, ScenarioRequest
+from ppafo.simulation.hardware import read_hardware
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.overrides import OverriddenDocument, override_document
 from ppafo.simulation.scenario import Origin, Scenario
@@ -134,14 +136,14 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     file, content = request.file, layout.content
     # What is wrong in the file itself is said as such; what it lacks an override may give.
     _check_layout(request.content, request, content, may_have_gaps=bool(request.overrides))
-    try:
-        changed = override_document(request.content, request.overrides, file, content)
-    except ScenarioError:
+    changed = override_document(request.content, request.overrides, file, content)
+    if wrong := list(changed.wrong):
         # A kind that is not known has no values: where one is given, it is the mistake.
-        kinds = [override for override in request.overrides if override.typed.endswith(".kind")]
-        chosen = override_document(request.content, kinds, file, content)
-        _check_layout(chosen.document, request, content, of_kinds_alone=True)
-        raise
+        _check_layout(changed.document, request, content, of_kinds_alone=True)
+        with noted_in(wrong):
+            if value_at(changed.document, "device.set") is not None:
+                read_hardware(DocumentReader(file, changed.document), request, changed.device)
+        raise_noted(wrong)
     if request.overrides:
         _check_layout(changed.document, request, content)
     paths = [f"{section}.{name}" for section in FORMS for name in value_at(changed.document, section) or ()]
@@ -171,9 +173,6 @@ def _check_layout(
     with refused_as(ScenarioError, file, KindError):
         fields = content.declare(document)
     found = dict(layout_of(fields, reads_numbers=False).faults(document))
-    if found.get("motion.kind"):
-        # Another motion may be of another file: nothing else is known.
-        raise ScenarioError(f"{file}: {place('motion.kind')}{found['motion.kind']}")
     gaps = [path for path, fault in found.items() if not fault]
     faults = [path for path, fault in found.items() if fault and (not of_kinds_alone or path.endswith(f".{KIND}"))]
     if not faults and (may_have_gaps or of_kinds_alone or not gaps):

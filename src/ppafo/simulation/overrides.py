@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ppafo.errors import KindError, ScenarioError, refused_as
+from ppafo.errors import KindError, PpafoError, ScenarioError, noted_in, refused_as
 from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
@@ -33,13 +33,15 @@ _SAMPLING = ("rate", "period")
 class OverriddenDocument:
     """Document with its own overrides applied at ``paths``, and the overrides of the device, not yet applied.
 
-    ``kept`` is a sentence on the numbers of the document that a newly chosen ``kind`` keeps, else "".
+    ``kept`` is a sentence on the numbers of the document that a newly chosen ``kind`` keeps, else "". ``wrong`` are the
+    refusals of overrides that were not applied.
     """
 
     document: dict[str, Any]
     paths: frozenset[str]
     device: tuple[Override, ...]
     kept: str
+    wrong: tuple[PpafoError, ...]
 
 
 def override_document(
@@ -49,8 +51,8 @@ def override_document(
 
     Naming another kind of motion, controller or profile drops the settings of the document that only the old
     kind has; giving a rate drops its period, and vice versa. A gain on the torque, or one of 0, may omit its unit.
-    Raises ScenarioError for a path that is neither declared nor of the device, and for an override that another one
-    makes useless.
+    A path that is neither declared nor of the device is among what is ``wrong``. Raises ScenarioError for an override
+    that another one makes useless.
     """
     override_at = override_set(overrides, ScenarioError, content.same)
     if _VALVE in override_at:
@@ -63,17 +65,18 @@ def override_document(
     own = {path: override for path, override in override_at.items() if path not in of_device}
     remaining = _choose_kinds(changed, own, file, content)
     known = content.paths(changed) if own else ()
-    for path in own:
-        if path not in known:
-            raise _unknown(own, path, (*known, *content.same), file)
+    wrong: list[PpafoError] = [_unknown(own, path, (*known, *content.same), file) for path in own if path not in known]
     for path in remaining:
+        if path not in known:
+            continue
         if path in content.appended:
             section, path_in_section = content.appended[path]
             changed.setdefault(section, {}).setdefault("overrides", []).append(f"{path_in_section}={own[path].text}")
         else:
-            _set(changed, path, own[path].text, file, content)
+            with noted_in(wrong):
+                _set(changed, path, own[path].text, file, content)
     kept = _kept_text(document, changed, own, content)
-    return OverriddenDocument(changed, frozenset(own), tuple(of_device.values()), kept)
+    return OverriddenDocument(changed, frozenset(own), tuple(of_device.values()), kept, tuple(wrong))
 
 
 def _unknown(own: Mapping[str, Override], path: str, known: tuple[str, ...], file: str) -> ScenarioError:

@@ -149,7 +149,7 @@ def _load(
         # Files omit the kind of a table with the key `same_as`.
         if isinstance(table, dict) and "same_as" in table:
             table.setdefault("kind", "same_as")
-    parsed = validate(declared.StudyFile, document, source.file, StudyError)
+    parsed = validate(declared.StudyFile, document, source.file, StudyError, source.text)
     sampling = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
     with refused_as(StudyError, source.file, StudyError):
         if changes:
@@ -164,7 +164,7 @@ def _load(
             )
         if sampling:
             document["sample"] |= sampling
-    parsed = validate(declared.StudyFile, document, source.file, StudyError)
+    parsed = validate(declared.StudyFile, document, source.file, StudyError, source.text)
     with refused_as(StudyError, source.file, StudyError):
         return _build(parsed, document, source, changes)
 

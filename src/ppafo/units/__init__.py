@@ -30,7 +30,7 @@ from ppafo.units.spelling import split_pressure_kind as split_pressure_kind
 SI = "SI"
 """Unit of a number that is in SI units already, for any quantity; written by programs."""
 LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
-KINDS = {"g": "gauge pressure", "a": "absolute pressure", "d": "pressure difference"}
+KINDS = {"g": "a gauge pressure", "a": "an absolute pressure", "d": "a pressure difference"}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"([+-]?\d+),(\d+)(?![\d,.])", re.ASCII)
@@ -136,7 +136,7 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
             ways = f"{unit}_g for gauge or {unit}_a for absolute" if si_unit == LEVEL else f"{unit}_d for a difference"
             raise UnitError(f"'{unit}' needs the kind of pressure: write {ways}")
         if (given.kind == "d") != (si_unit == DIFFERENCE):
-            raise UnitError(f"'{unit}' is a {KINDS[given.kind]}, {needed}")
+            raise UnitError(f"'{unit}' is {KINDS[given.kind]}, {needed}")
     offset = DECIMALS.divide(DECIMALS.subtract(given.offset, wanted.offset), wanted.scale)
     return DECIMALS.divide(given.scale, wanted.scale), offset, given.kind == "g" and si_unit == LEVEL
 
@@ -147,7 +147,8 @@ def _read(unit: str, si_unit: str | None = None) -> ParsedUnit:
         return read_unit(unit)
     except UnknownUnitError as error:
         name, known = error.name, sorted(names())
-        near = [each for each in known if each.lower() == name.lower()]
+        # Written in capitals, 'MM' is more often a small unit than a large one.
+        near = sorted((each for each in known if each.lower() == name.lower()), key=lambda each: not each.islower())
         if si_unit is not None:
             # nm for N m: a force has a capital letter.
             near += [as_product(name.capitalize()), f"deg{name}", *difflib.get_close_matches(name, known, 12)]

@@ -83,7 +83,7 @@ def test_a_name_of_a_valve_may_have_capitals() -> None:
 
 def test_a_mistake_inside_a_list_is_found_by_its_number() -> None:
     message = problem_of(SMALL.replace("\n[actuator", '\naccepted = [{ finding = "x", reson = "y" }]\n[actuator', 1))
-    assert "unknown key 'accepted.0.reson', did you mean 'reason'?" in message
+    assert "unknown key 'accepted.1.reson', did you mean 'reason'?" in message
 
 
 AREA = 'area = { value = 12.6, unit = "mm^2", origin = "datasheet", source = "page 2" }'

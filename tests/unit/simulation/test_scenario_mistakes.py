@@ -123,7 +123,7 @@ def test_what_is_missing_is_named(line: str, missing: str) -> None:
         ('"75 deg"', '"75"', "an angle is needed, for example '75 deg'"),
         ('"75 deg"', '"75 degg"', "'degg' is not a known unit, did you mean 'deg'?"),
         ('"75 deg"', '"warm"', "does not start with a number"),
-        ('"75 deg"', "true", "motion.angle = True: must be a text with its unit"),
+        ('"75 deg"', "true", "motion.angle = true: must be a text with its unit"),
         ('"75 deg"', "1979-05-27", "must be a text with its unit"),
         ('"75 deg"', '"1e400 deg"', "not a finite number"),
         ('"0.095 1/(N m)"', "0.095", "for example '0.095 1/(N m)'"),

@@ -345,7 +345,7 @@ def load_design(problem: str | Path, *, profile: str | Path | None = None, plugi
     file, folder = label(str(problem)), Path(problem).parent
     with at_fault("problem"):
         content = FILE.read(problem)
-    document = validate(SizingFile, FILE.parse(content, file), file, StudyError)
+    document = validate(SizingFile, FILE.parse(content, file), file, StudyError, content)
     wrong, valves, bottles = list[PpafoError](), list[CandidateValve](), list[Bottle]()
     atmosphere, largest, pressures = STANDARD_ATMOSPHERE, 1.0, []
     with noted_in(wrong):

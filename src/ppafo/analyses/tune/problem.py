@@ -304,7 +304,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
     """
     name_plugins(plugins)
     document, source = read_source(TUNING, tuning)
-    parsed = validate(TuningFile, document, source.file, StudyError)
+    parsed = validate(TuningFile, document, source.file, StudyError, source.text)
     with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):
         scenario = load_scenario(placed(parsed.scenario, source.folder), parsed.overrides)
         scenario = reloaded(scenario, overrides) if overrides else scenario
