@@ -274,3 +274,36 @@ def test_wrong_values_of_several_tables_are_in_one_refusal() -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario("torque-task-proportional", changes)
     assert [change in part for change, part in zip(changes, caught.value.parts, strict=True)] == [True] * 4
+
+
+@pytest.mark.parametrize(
+    ("changes", "overrides", "said"),
+    [
+        (
+            {"duration =": "durration =", '"locked"': '"lockd"', '"pid"': '"pdi"'},
+            (),
+            ["line 10: unknown key 'run.durration', did you mean 'duration'?", "did you mean 'locked'?", "mean 'pid'?"],
+        ),
+        (
+            {},
+            ("reference.levle=1 N m", "motion.angel=3 deg", "supply.presure=3 psi_g"),
+            ["did you mean 'reference.level'?", "did you mean 'motion.angle'?", "did you mean 'supply.pressure'?"],
+        ),
+        ({"schema_version = 1": 'schema_version = "1"'}, (), ["line 2: ", "without quotation marks; allowed: 1"]),
+        ({"[run]": '[run]\nduration = "2 s"'}, (), ["line 11: duration is given twice"]),
+        ({'"ramp_hold"': '"tabulated"', "level =": "time_2 ="}, (), ["did you mean 'time_02'?"]),
+    ],
+)
+def test_all_mistakes_are_named_with_their_lines(
+    tmp_path: Path, changes: dict[str, str], overrides: tuple[str, ...], said: list[str]
+) -> None:
+    text = TEXT
+    for old, new in changes.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    path = tmp_path / "own.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(PpafoError) as refused:
+        load_scenario(path, overrides)
+    for words in said:
+        assert words in str(refused.value)
