@@ -313,8 +313,8 @@ def test_the_published_schema_knows_every_procedure() -> None:
         (f"{STATIC}{MAPPED}channels.time.column = 0\n", "columns.rig.channels.time.column"),
         (f"{STATIC}{MAPPED}channels.time.column = 1.5\n", "columns.rig.channels.time.column"),
         (f"{STATIC}{MAPPED}delimiter = 'pipe'\n", "allowed: comma, semicolon, tab, whitespace"),
-        (STATIC.replace('["static.csv"]', '"static.csv"'), "procedure.0"),
-        (STATIC.replace('["static.csv"]', "[]"), "procedure.0"),
+        (STATIC.replace('["static.csv"]', '"static.csv"'), "procedure.1"),
+        (STATIC.replace('["static.csv"]', "[]"), "procedure.1"),
     ],
 )
 def test_a_mistake_is_one_line_that_says_where(solved: Solve, text: str, message: str) -> None:
