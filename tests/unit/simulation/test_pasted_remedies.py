@@ -25,7 +25,7 @@ STUCK = ["friction.static_torque=2 N m", "friction.dynamic_torque=1 N m", "run.d
 LEARNS_NOTHING = ["controller.static_torque=0 N m", "controller.load_time=0 s", "controller.friction_torque=0 N m"]
 NO_INTEGRAL = ["controller.integral_gain=0 1/(N m s)", "reference.level=4 N m"]
 REMEDIES = {
-    "supply": ("torque-task-proportional", ["reference.level=9 N m"]),
+    "supply": ("torque-task-slow-valve", ["reference.level=9 N m"]),
     "gain": ("torque-task-proportional", ["controller.proportional_gain=0.001 1/(N m)", *NO_INTEGRAL]),
     "duration": (
         "torque-task-proportional",
@@ -88,9 +88,10 @@ def test_a_run_prints_its_remedy_in_both_forms_at_the_end_of_its_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    main(["simulate", "torque-task-proportional", "--set", "reference.level=9 N m"])
+    main(["simulate", "torque-task-slow-valve", "--set", "reference.level=9 N m"])
     said = capsys.readouterr().out
     (command,) = re.findall(r"^Command with the remedy\n(ppafo simulate .*)$", said, re.MULTILINE)
-    assert '[device]\nset = "ppafo2011"\nvalve = "proportional"\noverrides = ["supply.pressure=' in said
+    (tables,) = re.findall(r'^set = "ppafo2011"\nvalve = "proportional"\noverrides = (.*)$', said, re.MULTILINE)
+    assert '"supply.pressure=94.5 psi_g"' in tables
     assert main(shlex.split(command)[1:]) == 0
     assert "the torque follows its reference" in capsys.readouterr().out
