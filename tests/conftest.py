@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from ppafo import plugins
 from ppafo.analyses.reproduce.solve import Reproduction, reproduce_paper
 from ppafo.engine.cache import kept
 from ppafo.simulation.loading import load_scenario
@@ -36,6 +37,13 @@ def _unwatched(run: Callable[..., ModuleType]) -> Callable[..., ModuleType]:
             sys.settrace(tracer)
 
     return call
+
+
+@pytest.fixture(autouse=True)
+def own_plugins(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the plug-ins that a test names, also for its child processes, to that test."""
+    monkeypatch.setattr(plugins, "_named", dict(plugins._named))
+    monkeypatch.setenv(plugins.VARIABLE, os.environ.get(plugins.VARIABLE, ""))
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ import ppafo
 from ppafo import plugins
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import DataError, PpafoError
 from ppafo.metrics import METRICS
 from tests.contract.test_hostile_documents import LOADERS
@@ -67,6 +68,7 @@ import builtins
 builtins.evil_was_run = True
 from dataclasses import replace
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 KIND = replace(CONTROLLERS["on_off"], name="evil")
 """
 
@@ -88,8 +90,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.delenv(plugins.VARIABLE, raising=False)
     yield tmp_path
     sys.modules.pop("evil", None)
-    if "evil:KIND" in set(CONTROLLERS):
-        del CONTROLLERS["evil:KIND"]
+    for catalogue in (CONTROLLERS, WALKING_CONTROLLERS):
+        if "evil:KIND" in set(catalogue):
+            del catalogue["evil:KIND"]
     assert not is_run()
 
 

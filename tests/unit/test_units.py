@@ -83,15 +83,10 @@ def test_a_bare_pressure_is_refused_with_the_ways_to_say_it_that_fit(unit: str) 
         parse_quantity(f"50 {unit}", "Pa_d")
 
 
-def test_a_difference_is_refused_for_a_level() -> None:
-    with pytest.raises(UnitError, match="'psi_d' is a pressure difference, a pressure level is needed"):
-        parse_quantity("50 psi_d", "Pa_a")
-
-
-@pytest.mark.parametrize("unit", ["psi_g", "psi_a"])
-def test_a_level_is_refused_for_a_difference(unit: str) -> None:
-    with pytest.raises(UnitError, match="a pressure difference is needed"):
-        parse_quantity(f"50 {unit}", "Pa_d")
+@pytest.mark.parametrize(("unit", "si_unit", "needed"), [("psi_d", "Pa_a", "level"), ("psi_g", "Pa_d", "difference")])
+def test_levels_and_differences_of_pressure_are_kept_apart(unit: str, si_unit: str, needed: str) -> None:
+    with pytest.raises(UnitError, match=f"'{unit}' is a .*, a pressure {needed} is needed"):
+        parse_quantity(f"50 {unit}", si_unit)
 
 
 @pytest.mark.parametrize("text", ["4 kg_g", "1 N m/psi_g", "1 m_a"])
@@ -123,7 +118,7 @@ def test_numbers_that_are_not_finite_are_refused_in_both_directions(value: float
 
 
 @pytest.mark.parametrize(
-    "unit", ["m)", "2 m", "m^", "m//s", "m/s kg", "mm0", "m;s", "(" * 50 + "m" + ")" * 50, "m" * 99]
+    "unit", ["m)", "2 m", "m^", "m//s", "m/s kg", "mm0", "m;s", "mm^0", "m/s^-0", "(" * 50 + "m" + ")" * 50, "m" * 99]
 )
 def test_what_is_not_written_like_a_unit_is_refused(unit: str) -> None:
     with pytest.raises(UnitError, match="is not a unit"):
@@ -319,13 +314,6 @@ def test_every_unit_is_defined_as_in_the_list_that_pint_brings() -> None:
     for unit in set(UNITS) - {"degC", "degF"}:
         theirs = registry.Quantity(of_pint.get(unit, unit)).to_base_units()
         assert float(product(unit).scale) == pytest.approx(theirs.magnitude, rel=1e-15), unit
-
-
-@pytest.mark.parametrize("unit", ["mm^0", "degC^0", "percent^0", "m/s^0", "m^-0"])
-@pytest.mark.parametrize("si_unit", ["", "m", "K"])
-def test_unit_to_the_power_of_zero_is_no_unit(unit: str, si_unit: str) -> None:
-    with pytest.raises(UnitError, match="is not a unit; write a unit like"):
-        parse_quantity(f"1 {unit}", si_unit)
 
 
 FACTORS = ["m", "mm", "s", "K", "degC", "mdegC", "deg", "psi", "psi_g", "%", "N", "1", "", "kkg", "lbf", "Pa_d"]

@@ -205,7 +205,7 @@ def test_what_the_new_set_keeps_beside_values_fitted_with_it_is_said(both: Ident
 
 def test_a_key_of_the_wrong_type_is_said_with_what_it_means(solve: Solve) -> None:
     with pytest.raises(
-        PpafoError, match=r"locked = True must be a text in quotation marks: angle at which .* '75 deg'"
+        PpafoError, match=r"locked = true must be a text in quotation marks: angle at which .* '75 deg'"
     ):
         solve(FIT.replace('scenario = "step-response"', "locked = true"))
 
@@ -310,7 +310,7 @@ def test_the_published_schema_has_the_section() -> None:
         (FIT.replace("scenario =", "scenaro ="), "did you mean 'scenario'"),
         (FIT.replace('"step-response"', '"step-respons"'), "step-respons"),
         (FIT.replace("step.csv", "nowhere.csv"), "nowhere.csv"),
-        (FIT.replace('"step"', '"Step 1"'), "trajectory.experiments.0.label"),
+        (FIT.replace('"step"', '"Step 1"'), "trajectory.experiments.1.label"),
         (FIT.replace("foot_plate.inertia", "foot_plate.inertial"), "did you mean 'foot_plate.inertia'"),
         (FIT.replace("2 g m^2", "2 g m"), "parameter 'foot_plate.inertia': low = '2 g m': unit 'g m' does not fit"),
         (
@@ -343,8 +343,8 @@ def test_the_published_schema_has_the_section() -> None:
         (f"{FIT}{SLOW}interval = '0 s'\n", "candidate 'slow': interval = '0 s' must be from 1e-06 to"),
         (f"{FIT}{SLOW}interval = '9 s'\n", "candidate 'slow': interval = '9 s' must be from 1e-06 to"),
         (FIT.replace("50 g m^2", "2 g m^2"), "foot_plate.inertia: low = 0.002 must be below high = 0.002"),
-        (FIT.replace(PARAMETERS, "parameters = []"), "problem.toml: trajectory.parameters"),
-        (f"[trajectory]\nexperiments = []\n{PARAMETERS}", "problem.toml: trajectory.experiments"),
+        (FIT.replace(PARAMETERS, "parameters = []"), "problem.toml: line 5: trajectory.parameters"),
+        (f"[trajectory]\nexperiments = []\n{PARAMETERS}", "problem.toml: line 5: trajectory.experiments"),
         (
             FIT.replace("[trajectory]", "[trajectory]\nprofiles = ['foot_plate.inertia']"),
             "unknown key 'trajectory.profiles'; allowed here: parameters, experiments",
