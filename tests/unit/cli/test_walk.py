@@ -63,7 +63,7 @@ def test_a_walk_prints_its_table_and_where_the_files_are(ran: tuple[Path, list[s
         "the device helps in push-off but not in swing, against the same walk without it: 1.65 J of net work in "
         "push-off (positive work 7.3 % of the healthy ankle's), ankle 9.04 deg from the healthy one (20.1 deg without)"
     )
-    assert lines[3].split() == ["with", "without", "healthy"]
+    assert lines[4].split() == ["with", "without", "healthy"]
     work = next(line for line in lines if line.startswith("Positive work on the wearer in push-off (J)")).split()
     assert float(work[-3]) > 0.5
     assert float(work[-2]) == 0.0
