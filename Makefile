@@ -21,7 +21,7 @@ validation: $(READY)
 test: check
 	$(TESTS) -m "not long"
 
-# What `make test` leaves out. Continuous integration runs half of it after each change: PART=I/2 is the I-th of two parts
+# What `make test` leaves out. Continuous integration runs a third of it after each change: PART=I/3 is the I-th of three parts
 # of about equal cost.
 PART ?= 0/1
 test-long: $(READY)

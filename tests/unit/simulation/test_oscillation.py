@@ -65,7 +65,7 @@ def test_simulate_says_it_before_the_numbers_in_text_page_and_data_and_a_check_e
     assert at == sorted(at)
     assert "oscillates: " in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert main([*words, "--check", "--json"]) == 1
-    assert json.loads(capsys.readouterr().out)["tracking"]["per"] == "second of the whole run"
+    assert json.loads(capsys.readouterr().out)["tracking"]["per"] == "second"
 
 
 def test_a_walk_says_it_and_meters_count_what_its_recording_shows() -> None:

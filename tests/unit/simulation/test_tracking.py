@@ -195,7 +195,7 @@ KNEE = [
     [
         ("torque-task-proportional", "reference.level", [3.0, 4.5, 6.0, 9.0]),
         # On purpose is what the actuator cannot give, and not what the valve lets it give too late.
-        ("torque-task-proportional", "valve.area", [3e-9, 3e-8, 3e-7, 3e-6, 3.16e-5]),
+        ("torque-task-proportional", "valve.area", [3e-9, 3e-8, 3e-7, 1e-5, 3.16e-5]),
         ("wave", "valve.area", [3e-8, 3e-7, 3.16e-5]),
         ("torque-task-slow-valve", "controller.proportional_gain", [0.001, 0.3, 8.0]),
         ("torque-task-solenoid", "reference.level", [0.5, 4.0, 5.9, 7.0]),
