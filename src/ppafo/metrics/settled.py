@@ -94,29 +94,9 @@ def badness(part: PartSums, course: ReferenceSummary) -> float:
     return max(error, swing) if part.rests > 0.0 else error
 
 
-def chosen_part(is_worse: bool, part: PartSums, other: PartSums) -> PartSums:
-    """Return a part if it is worse, else the other one."""
-    return PartSums(
-        start=part.start if is_worse else other.start,
-        rests=part.rests if is_worse else other.rests,
-        squares=part.squares if is_worse else other.squares,
-        total=part.total if is_worse else other.total,
-        taken=part.taken if is_worse else other.taken,
-        reference_squares=part.reference_squares if is_worse else other.reference_squares,
-        reference_total=part.reference_total if is_worse else other.reference_total,
-        lag_squares=part.lag_squares if is_worse else other.lag_squares,
-        lag_total=part.lag_total if is_worse else other.lag_total,
-        swing=Swing(
-            part.swing.play if is_worse else other.swing.play,
-            part.swing.turns if is_worse else other.swing.turns,
-            part.swing.highest if is_worse else other.swing.highest,
-        ),
-        lowest_error=part.lowest_error if is_worse else other.lowest_error,
-        highest_error=part.highest_error if is_worse else other.highest_error,
-        first=part.first if is_worse else other.first,
-        last=part.last if is_worse else other.last,
-        path=part.path if is_worse else other.path,
-    )
+def is_new_part(before: PartSums, course: ReferenceSummary) -> bool:
+    """Return whether the present part of the reference is another one than that of the sample before."""
+    return course.part_start != before.start or course.rests != before.rests
 
 
 class SettledSums(NamedTuple):
@@ -167,9 +147,7 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
             last=reference,
             path=0.0,
         ),
-        worst=PartSums(
-            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, Swing(0.0, UNDECIDED, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0
-        ),
+        worst=PartSums(),
         worst_badness=0.0,
         waits=0.0,
         lagged=reference,
@@ -207,7 +185,7 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, lag:
     before, error, reference = state.part, sample.value - sample.reference, sample.reference
     # From the initial value, or the square of a pressure would hide its change.
     ahead = reference - state.begun
-    is_new = course.part_start != before.start or course.rests != before.rests
+    is_new = is_new_part(before, course)
     twice, of_run = 2.0 * sample.number, course.samples - 1.0
     is_first = course.part_start == 0.0 and course.rests == 0.0
     judged_from = course.start_up * (2.0 if state.met > 0.0 else 1.0)
@@ -254,9 +232,7 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     before = state.part
     lagged = state.lagged + (sample.reference - state.lagged) * course.interval / (LAG_TIME + course.interval)
     lag = allowed_lag(course, sample.reference - lagged, sample.reference - before.last, sample.angular_velocity)
-    ends = (course.part_start != before.start or course.rests != before.rests) and (
-        before.rests > 0.0 or before.path > 0.0
-    )
+    ends = is_new_part(before, course) and (before.rests > 0.0 or before.path > 0.0)
     # At the start of a run the value may be on its way yet.
     is_late = course.start_up > 0.0 and sample.number > course.start_up + 1.0
     is_begun = before.start > 0.0 or state.met > 0.0 or is_late
@@ -264,7 +240,7 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     is_worse = ends and is_begun and found > state.worst_badness
     return SettledSums(
         part=next_part(state, course, sample, lag),
-        worst=chosen_part(is_worse, before, state.worst),
+        worst=before if is_worse else state.worst,
         worst_badness=found if is_worse else state.worst_badness,
         waits=course.in_first_half,
         lagged=lagged,

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
+from ppafo.engine.in_python import over_samples
 from ppafo.metrics.command import Reversals, command_reversals, requested_samples
 from ppafo.metrics.metric import Floats, Readings, controlled_in, extent, followed, hold_start, reference_of
 from ppafo.metrics.settled import (
-    LAG_OF_JOINT,
     LAG_TIME,
     LARGEST_LAG,
     LARGEST_SHARE,
@@ -26,6 +26,7 @@ from ppafo.metrics.settled import (
     SUSTAINED,
     PartSums,
     SettledSums,
+    allowed_lag,
     badness,
 )
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, Swing, reversals
@@ -293,14 +294,12 @@ def _first_met(error: Floats, course: ReferenceSummary) -> float:
 
 
 def _allowed_lag(course: ReferenceSummary, recording: Recording) -> Floats:
-    """Error allowed at each sample beside that at rest, as ``allowed_lag`` of the settled meter (samples,)."""
+    """Error allowed at each sample beside that at rest [SI] (samples,), by the function of the settled meter."""
     reference, share = reference_of(recording), course.interval / (LAG_TIME + course.interval)
     late = np.array(list(accumulate(reference.tolist(), lambda late, now: late + (now - late) * share)))
-    change = np.abs(np.diff(reference, prepend=reference[0]))
-    of_reference = np.minimum(np.abs(reference - late), 2.0 * LAG_TIME / course.interval * change)
-    of_joint = course.of_joint * LAG_OF_JOINT * np.abs(recording["angular_velocity"]) * course.largest
-    allowed: Floats = np.minimum(of_reference + of_joint, LARGEST_LAG * course.largest)
-    return allowed
+    change = np.diff(reference, prepend=reference[0])
+    lag = over_samples(allowed_lag, course, reference - late, change, recording["angular_velocity"])
+    return np.broadcast_to(np.asarray(lag), reference.shape)
 
 
 def _sums_of(
