@@ -1,17 +1,18 @@
 """Faults of a document by path: refusal of all of them, with the line of each in the text of the file."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import NoReturn
 
+from ppafo.documents.toml_text import KEY_LINE, quote
 from ppafo.errors import PpafoError, raise_noted
-from ppafo.wording import said_missing
+from ppafo.wording import folded, nearest_name, said_missing
 
 _MAXIMUM_FAULTS = 5
 _MEANT = re.compile(r"^unknown key .*, did you mean '(\w+)'\?")
-_LINE = re.compile(r"\s*(?:(\[{1,2})\s*([^]#]+?)\s*\]|([\w.\"' -]+?)\s*=)")
-"""Header of a table, or key of a value."""
+_MAXIMUM_TABLES = 3
+"""Largest number of tables named in a message as containing an unknown key."""
 _LONG_TEXT = re.compile(r"\"\"\".*?\"\"\"|'''.*?'''", re.DOTALL)
 
 
@@ -32,6 +33,20 @@ def refuse(faults: Mapping[str, str], place: str, error: type[PpafoError], line:
     raise AssertionError("without a fault there is nothing to refuse")
 
 
+def unknown_key(path: str, name: str, tables: Sequence[str], here: Sequence[str]) -> str:
+    """Return the fault of an unknown key: the ``tables`` that have it, else the nearest of those allowed ``here``."""
+    named = [f"[{table}]" if table else "the top of the file" for table in tables]
+    is_elsewhere = 0 < len(named) <= _MAXIMUM_TABLES
+    hint = f", which is a key of {' and '.join(named)}" if is_elsewhere else nearest_name(name, here)
+    return f"unknown key '{path}'{hint}; allowed here: {', '.join(folded(here))}"
+
+
+def no_table(path: str, value: object, required: Sequence[str]) -> str:
+    """Return the fault of a value where a table with ``required`` keys belongs."""
+    keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{path}]"
+    return f"{path} = {quote(value)} must be a table{keys}"
+
+
 def line_of(text: str, path: str) -> str:
     """Return the place of a path in the text of a file, ``line 12: ``, else that of its table; empty without a text."""
     lines = _lines_in(text) if text else {}
@@ -45,14 +60,14 @@ def _lines_in(text: str) -> dict[str, int]:
     """Return the number of the line of each path in the text of a file; of a list of tables each has its number."""
     lines, table = dict[str, int](), ""
     for number, line in enumerate(_LONG_TEXT.sub(lambda found: "\n" * found[0].count("\n"), text).split("\n"), 1):
-        if (found := _LINE.match(line)) is None:
+        if (found := KEY_LINE.match(line)) is None:
             continue
-        name = re.sub(r"[\"'\s]", "", found[2] or found[3])
-        if found[1]:
+        name = re.sub(r"[\"'\s]", "", found["table"] or found["name"])
+        if found["table"]:
             table = name
-        if found[1] == "[[":
+        if found["opens"] == "[[":
             count = 1
             while (table := f"{name}.{count}") in lines:
                 count += 1
-        lines.setdefault(table if found[1] else f"{table}.{name}".lstrip("."), number)
+        lines.setdefault(table if found["table"] else f"{table}.{name}".lstrip("."), number)
     return lines

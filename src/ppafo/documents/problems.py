@@ -8,6 +8,7 @@ from typing import Annotated, Any, TypeGuard, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
+from ppafo.documents.faults import no_table, unknown_key
 from ppafo.documents.toml_text import LONGEST_VALUE, NAME, NAME_RULE, quote
 from ppafo.plugins import nearest_kind
 from ppafo.wording import nearest_name, one_line
@@ -19,8 +20,6 @@ _TEXT_RULES = {
     LABEL: "must be one line of text without leading or trailing spaces",
 }
 """Message endings for a text that does not match a pattern, by pattern."""
-_MAXIMUM_TABLES = 3
-"""Largest number of tables named in a message as containing an unknown key."""
 _MISSING = {"missing": "", "union_tag_not_found": ".kind"}
 """Suffix of the path of a missing key, by problem type."""
 
@@ -102,11 +101,8 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
     assignment = f"{key.path} = {quote(detail['input'])}"
     match detail["type"]:
         case "extra_forbidden":
-            allowed, name = list(key.table.model_fields), key.path.rpartition(".")[2]
-            tables = _tables_with(name, model)
-            is_elsewhere = 0 < len(tables) <= _MAXIMUM_TABLES
-            hint = f", which is a key of {' and '.join(tables)}" if is_elsewhere else nearest_name(name, allowed)
-            return f"unknown key '{key.path}'{hint}; allowed here: {', '.join(allowed)}"
+            name = key.path.rpartition(".")[2]
+            return unknown_key(key.path, name, _tables_with(name, model), list(key.table.model_fields))
         case "literal_error":
             words = detail["ctx"]["expected"].replace(" or ", ",")
             return f"{assignment} is not allowed{_allowed_words(detail['input'], words)}"
@@ -128,9 +124,7 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
         case "model_type" | "model_attributes_type" | "dict_type":
             fields = key.value_type.model_fields if _is_model(key.value_type) else {}
             required = [name for name, field in fields.items() if field.is_required()]
-            plural = "s" if len(required) > 1 else ""
-            content = f" with the key{plural} {', '.join(required)}" if required else f", [{key.path}]"
-            return f"{assignment} must be a table{content}"
+            return no_table(key.path, detail["input"], required)
     # "Input should be less than 5" becomes "must be less than 5".
     _, separator, requirement = detail["msg"].partition(" should ")
     requirement = requirement if separator else f"be {detail['msg']}"
@@ -144,7 +138,7 @@ def _allowed_words(word: object, allowed: str, nearest: Callable[[str, list[str]
 
 
 def _tables_with(name: str, model: type[BaseModel]) -> list[str]:
-    """Return the names of the tables that have a key, outer tables first, without tables in lists."""
+    """Return the paths of the tables that have a key, outer tables first, without tables in lists."""
     paths: list[str] = []
     seen = set()
     level: list[tuple[str, type[BaseModel]]] = [("", model)]
@@ -156,7 +150,7 @@ def _tables_with(name: str, model: type[BaseModel]) -> list[str]:
                 continue
             seen.add((path, table))
             if name in table.model_fields:
-                paths.append(f"[{path}]" if path else "the top of the file")
+                paths.append(path)
             for key, field in table.model_fields.items():
                 tables = [field.annotation] if _is_model(field.annotation) else _tables_in(field.annotation)
                 inner += [(f"{path}.{key}".strip("."), inner_table) for inner_table in tables]

@@ -37,8 +37,10 @@ _DEEP_KEY = re.compile(
     rf"(?:^[ \t]*+\[{{0,2}}+|[{{,])[ \t]*+(?>{_PART}\.[ \t]*+){{{MAXIMUM_LEVELS}}}", re.ASCII | re.MULTILINE
 )
 """Pattern of a key with too many dots, for which parsing time grows at least quadratically."""
-_KEY = re.compile(r"""\s*(\[{1,2}[^]#]+\]{1,2}|[\w."' -]+?)(?:\s*=|(?<=\]))""")
-"""Header of a table, or key of a value."""
+KEY_LINE = re.compile(
+    r"""\s*(?P<key>(?P<opens>\[{1,2})\s*(?P<table>[^]#]+?)\s*\]{1,2}|(?P<name>[\w."' -]+?)(?=\s*=))"""
+)
+"""Header of a table, or key of a value, at the begin of a line."""
 _SIGNS = {"scenario": {"device", "controller"}, "parameter set": {"default_valve", "valves"}}
 """Keys that only files of a kind have, by the noun of the kind."""
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -144,8 +146,8 @@ def _twice(text: str, error: str) -> str:
     found = re.search(r"\bCannot .*\(at (?:line (\d+)|end)", error)
     lines = text.split("\n")[: int(found[1] or 10**9)] if found else []
     # The parser is at the end of a value, which may have several lines.
-    keys = ((number, _KEY.match(line)) for number, line in reversed([*enumerate(lines, 1)]))
-    return next((f"line {number}: {one_line(key[1])} is given twice; omit one" for number, key in keys if key), "")
+    keys = ((number, KEY_LINE.match(line)) for number, line in reversed([*enumerate(lines, 1)]))
+    return next((f"line {number}: {one_line(key['key'])} is given twice; omit one" for number, key in keys if key), "")
 
 
 @lru_cache(maxsize=16)

@@ -13,7 +13,7 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any, get_args, get_type_hints
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.faults import line_of, refuse
+from ppafo.documents.faults import line_of, no_table, refuse, unknown_key
 from ppafo.documents.toml_text import NAME, NAME_RULE, SCHEMA, quote
 from ppafo.errors import KindError, PpafoError, UnitError
 from ppafo.model.declaration import Quantity
@@ -21,7 +21,7 @@ from ppafo.parameters.declaration import is_within, range_rule
 from ppafo.plugins import nearest_kind
 from ppafo.units import format_quantity, parse_quantity, split_quantity
 from ppafo.units.shown import shown_unit
-from ppafo.wording import folded, nearest_name, one_line
+from ppafo.wording import nearest_name, one_line
 
 KIND = "kind"
 """Key of a section that names its component, such as a controller, and so decides the other keys of the section."""
@@ -39,8 +39,6 @@ RULES = {
     JOINT_WORDS: "must consist of lower-case letters and blanks, at most 40",
 }
 """Message endings for a text that does not match a pattern, by pattern."""
-_MAXIMUM_TABLES = 3
-"""Largest number of tables named in a message as containing an unknown key."""
 _FORMS: Mapping[type, str] = {str: "a text in quotation marks", bool: "true or false", dict: "a table of texts"}
 
 
@@ -208,7 +206,8 @@ class FieldLayout:
             if keys and not re.fullmatch(keys, str(name)):
                 yield at, f"{path}: the name {quote(name)} {RULES[keys]}"
             elif name not in inner:
-                yield at, f"unknown key '{at}'{self._hint(str(name), list(inner))}"
+                tables = [each for each, names in self.names.items() if str(name) in names]
+                yield at, unknown_key(at, str(name), tables, list(inner))
             else:
                 yield from self._inside(inner[name], value)
         for name, at in inner.items():
@@ -234,8 +233,7 @@ class FieldLayout:
             yield from self.faults(value, path)
         elif isinstance(field, InnerTable):
             required = [gap.rpartition(".")[2] for gap, _ in self._gaps(path, is_given=True)]
-            keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{path}]"
-            yield path, f"{path} = {quote(value)} must be a table{keys}"
+            yield path, no_table(path, value, required)
         elif isinstance(field, Many) and isinstance(value, list | tuple) and field.least <= len(value) <= field.most:
             of = field.of
             for number, item in enumerate(value, 1):
@@ -295,15 +293,6 @@ class FieldLayout:
         if field.pattern and not re.fullmatch(field.pattern, value):
             return f"{given} {RULES[field.pattern]}"
         return f"{given} must not be empty" if field.required and field.is_filled and value == "" else ""
-
-    def _hint(self, name: str, here: list[str]) -> str:
-        """Return the hint on an unknown key: the tables that have it, else the nearest key of its own table."""
-        tables = [
-            f"[{table}]" if table else "the top of the file" for table, names in self.names.items() if name in names
-        ]
-        is_elsewhere = 0 < len(tables) <= _MAXIMUM_TABLES
-        hint = f", which is a key of {' and '.join(tables)}" if is_elsewhere else nearest_name(name, here)
-        return f"{hint}; allowed here: {', '.join(folded(here))}"
 
 
 def layout_of(fields: Fields, reads_numbers: bool = True) -> FieldLayout:
