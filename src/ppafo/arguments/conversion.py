@@ -26,7 +26,7 @@ _QUOTED.maxstring = _QUOTED.maxother = 60
 
 def shown(value: Any) -> str:
     """Return a value as quoted in a message: shortened, or the name of its class."""
-    with contextlib.suppress(Exception):  # an object of others may raise when it is asked for its class
+    with contextlib.suppress(Exception):  # the class attribute of a foreign object may raise anything
         if isinstance(value, str | bytes | int | float | complex | Path | list | tuple | dict | set | None):
             return _QUOTED.repr(value)
     return f"<{type(value).__name__}>"

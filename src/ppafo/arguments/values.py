@@ -126,7 +126,7 @@ class AcceptedValues(NamedTuple):
         except PpafoError as error:
             # An error of one of several values names this value.
             raise ArgumentError(str(error) if str(error).startswith(name) else f"{name}: {error}") from None
-        except Exception as error:  # what an object of others does when it is asked for its length is anybody's guess
+        except Exception as error:  # the length of a foreign object may raise anything
             cause = None if isinstance(error, ValueError | TypeError) else error
             raise ArgumentError(f"{name}={shown(value)}: must be {self.what}") from cause
 

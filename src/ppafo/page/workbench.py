@@ -43,7 +43,7 @@ FIRST = (
     *("controller.period", "controller.proportional_gain", "controller.largest_torque", "controller.command"),
     *("motion.angle", "wearer.body_mass"),
 )
-"""Settings shown first unless others are asked for."""
+"""Settings shown first by default."""
 _HIDDEN = ("run.step", "run.output_interval", "run.tolerance", "sensors.seed")
 _LONGER = 4.0
 """Longest run on a page, as a multiple of its duration as written: a browser waits for a run."""

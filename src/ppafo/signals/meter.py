@@ -159,8 +159,8 @@ def shortest_rest(course: ReferenceSummary) -> float:
     return max(FEWEST_OF_REST, float(int(least)) + 1.0)
 
 
-def looked_at(course: ReferenceSummary, sample: Sample) -> float:
-    """Return the number of the later sample whose reference tells what the present sample is part of.
+def deciding_sample(course: ReferenceSummary, sample: Sample) -> float:
+    """Return the number of the later sample whose reference decides whether the present one is in a slow stretch.
 
     That is the end of the shortest stretch that would be one, or of a stretch of which the present sample is in the
     middle.

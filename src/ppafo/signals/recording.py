@@ -420,7 +420,7 @@ def _read_only(values: ArrayLike, unit: str) -> Floats:
         copy = _numbers(values, unit)
     except PpafoError:
         raise
-    except Exception as error:  # what an object of others does when it is asked for an array is anybody's guess
+    except Exception as error:  # a foreign object may raise anything
         raise DataError(f"the values of a channel must be numbers: {one_line(error)}") from error
     if copy.ndim != 1:
         raise DataError(f"the values of a channel must be one-dimensional, not an array of {copy.ndim} dimensions")

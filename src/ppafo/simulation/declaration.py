@@ -116,12 +116,14 @@ def declared(document: Mapping[str, Any], motion: MotionSection | None = None) -
     motion = motion or section_of(document)
     law = named(CONTROLLERS, document, "controller")
     named(PROFILES, document, "reference")
+    # Loaded motions of other packages move a vane alone, too.
+    others = (name for name, kind in MOTIONS.loaded().items() if kind.section is not None)
     return {
         **HEAD,
         "run": InnerTable("times of the run, and its accuracy", True),
         **numbers("run", (*RUN, ACCURACY)),
         "motion": InnerTable("motion of the vane", True),
-        "motion.kind": Words("", True, _motions()),
+        "motion.kind": Words("", True, tuple(dict.fromkeys((*VANE_MOTIONS, *others)))),
         **({} if motion is None else motion_fields(motion, document)),
         "initial": InnerTable("state of the gas at the start; atmosphere unless given"),
         **numbers("initial", INITIAL),
@@ -137,12 +139,6 @@ def declared(document: Mapping[str, Any], motion: MotionSection | None = None) -
         **numbers("sensors", (*SENSORS, SEED)),
         **tail(document),
     }
-
-
-def _motions() -> tuple[str, ...]:
-    """Return the motions of a vane alone: all of this package, and loaded ones of other packages."""
-    others = (name for name, kind in MOTIONS.loaded().items() if kind.section is not None)
-    return tuple(dict.fromkeys((*VANE_MOTIONS, *others)))
 
 
 def named(catalogue: Kinds[Any], document: Mapping[str, Any], section: str) -> Any:

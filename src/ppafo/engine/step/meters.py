@@ -26,8 +26,8 @@ from ppafo.signals.meter import (
     StrideSample,
     advance_course,
     advance_part,
+    deciding_sample,
     is_away,
-    looked_at,
     start_up_of,
 )
 
@@ -196,7 +196,7 @@ def update_meters(parts: Program, lane: Lane, elapsed: float, index: int, interv
     """Update every meter with one more sample; meters of motion keep their first state for a locked vane."""
     sample_with_summary(parts, lane, elapsed, index, interval)
     if parts.needs_parts:
-        later = looked_at(lane.course, lane.sample)
+        later = deciding_sample(lane.course, lane.sample)
         reference = reference_at(parts, lane, later * interval * lane.timing.step)
         lane.course = advance_part(lane.course, lane.sample, later, reference)
     for group, kind in parts.meter_groups.items():

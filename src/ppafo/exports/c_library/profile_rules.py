@@ -13,6 +13,9 @@ from ppafo.model.actuators.kind import Range
 from ppafo.model.controlled import Ends
 from ppafo.simulation.profiles import excursion, widened
 
+KNOTS = {"reference": "reference.time_02", "path": "motion.profile.time_02", "shank": "motion.shank.time_02"}
+"""Path of the time of the second knot of a profile, by the group of its settings."""
+
 
 def fault_of_knots(profile: TabulatedProfile, second: float) -> float:
     """Return the place of the time of a knot that is not in order, from that of the second knot; 0 for none."""
@@ -29,12 +32,9 @@ def first_fault(found: float, further: float) -> float:
 def check_knots(parts: Preparation, lane: PreparedLane, settings: Any) -> None:  # noqa: ARG001
     """Set the fault of the knots of reference, prescribed angle and shank."""
     lane.fault = 0.0
-    if "reference.time_02" in parts.places:
-        lane.fault = first_fault(lane.fault, fault_of_knots(lane.reference, parts.place_of("reference.time_02")))
-    if "motion.profile.time_02" in parts.places:
-        lane.fault = first_fault(lane.fault, fault_of_knots(lane.path, parts.place_of("motion.profile.time_02")))
-    if "motion.shank.time_02" in parts.places:
-        lane.fault = first_fault(lane.fault, fault_of_knots(lane.shank, parts.place_of("motion.shank.time_02")))
+    for group, second in KNOTS.items():
+        if second in parts.places:
+            lane.fault = first_fault(lane.fault, fault_of_knots(lane[group], parts.place_of(second)))
 
 
 def check_courses(parts: Preparation, lane: PreparedLane, settings: Any) -> None:

@@ -279,7 +279,7 @@ def _small_valve(case: Case) -> TrackingCause | None:
     scenario, settled, share = case.scenario, case.settled, open_share(case)
     if share <= (_MOSTLY if settled.rests or case.oscillates else _PARTLY) or case.is_for_reach:
         return None
-    # What has moved tells how much larger a valve gives the wanted change in the same time.
+    # A valve larger by wanted over reached change gives the wanted change in the same time.
     missing = min(settled.wanted_change / max(settled.value_range, _TINY), _LARGEST_FACTOR)
     factors = sorted({3.0, 10.0, *(times * max(missing, 1.0) for times in _LARGER_VALVES)} - {1.0})
     larger = sized_valves(scenario, factors)

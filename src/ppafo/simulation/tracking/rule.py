@@ -254,7 +254,7 @@ def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | flo
     is_still = (share > LARGEST_SHARE) & (settled.value_range <= SMALLEST_MOVE * wanted)
     standstill = np.where(is_still, share / LARGEST_SHARE, 0.0)
     # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error. The
-    # mean error of a wave does not show its peaks, and a ramp may not have asked for them yet.
+    # mean error of a wave hides its peaks, and a ramp may end before them.
     missing = np.where(settled.rests, mean_error, np.maximum(mean_error, beyond))
     is_beyond = (np.asarray(beyond) > 0.0) & ~np.asarray(settled.ends_on_ramp)
     reach = np.where(is_beyond, missing / (LARGEST_SHARE * wanted), 0.0)

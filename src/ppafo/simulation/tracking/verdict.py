@@ -1,8 +1,9 @@
 """Verdict on a run: whether it follows its reference, the cause of a failure, and remedies that were tried."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -142,10 +143,12 @@ class Tracking:
         error, wanted, moved = (change_text(self.controlled, each) for each in (self.error, self.wanted, self.moved))
         plain_moved = moved.partition(" ")[0]
         if self.criterion == "reversals":
-            often, most = (without_exponent(each, ".3g") for each in _distinct(self.number, self.limit))
+            rounded = _distinct(lambda each, digits: float(f"{each:.{digits}g}"), self.number, self.limit)
+            often, most = (without_exponent(each, ".3g") for each in rounded)
             allowed = f"{often} reversals a {self.per} ({most} allowed)"
             return f"the {words} loop oscillates: {allowed}, RMS error {error} (requested {wanted}){since}"
-        number, limit = _error_and_limit(self.controlled, self.number, self.limit)
+        with_unit = partial(change_text, self.controlled)
+        number, limit = _distinct(with_unit, self.number, self.limit)
         if self.kind == "does not move":
             return (
                 f"the {words} loop does not move: {plain_moved} of the requested {wanted}{since * (self.until > 0.0)}"
@@ -159,22 +162,16 @@ class Tracking:
         is_constant = abs(self.missing) > max(0.9 * self.error, self.limit)
         if is_constant and self.at_rest and self.criterion in ("RMS error", "mean error"):
             side = "below" if self.missing < 0.0 else "above"
-            missing, allowed = _error_and_limit(self.controlled, abs(self.missing), self.limit)
+            missing, allowed = _distinct(with_unit, abs(self.missing), self.limit)
             begins = f"{since.strip()} " if self.until > 0.0 else ""
             return f"{begins}the {words} stays {missing} {side} its reference ({allowed} allowed)"
         criterion = CRITERION_TEXTS.get(self.criterion, self.criterion)
         return f"the {words} does not follow its reference: {criterion} {number} ({limit} allowed){since}"
 
 
-def _distinct(number: float, limit: float) -> tuple[float, float]:
-    """Number and limit, rounded to three digits, or to as many as distinguish the two."""
-    pairs = [(float(f"{number:.{count}g}"), float(f"{limit:.{count}g}")) for count in range(3, 17)]
-    return next((pair for pair in pairs if pair[0] != pair[1]), pairs[0])
-
-
-def _error_and_limit(controlled: str, error: float, limit: float) -> tuple[str, str]:
-    """Error and limit with their unit, in three digits, or in as many as distinguish the two."""
-    pairs = [(change_text(controlled, error, count), change_text(controlled, limit, count)) for count in range(3, 17)]
+def _distinct(form: Callable[[float, int], Any], number: float, limit: float) -> tuple[Any, Any]:
+    """Number and limit by ``form`` in three digits, or in as many as distinguish the two."""
+    pairs = [(form(number, digits), form(limit, digits)) for digits in range(3, 17)]
     return next((pair for pair in pairs if pair[0] != pair[1]), pairs[0])
 
 
@@ -277,7 +274,7 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
         # The limit of on/off valves is several times wider, so the swing is reported beside the error.
         is_widened = case.only_switches and scenario.follows_reference and each == "RMS error"
         reason = ", because the valves are either open or shut" if is_widened else ""
-        error_text, limit_text = _error_and_limit(controlled.name, error, limit)
+        error_text, limit_text = _distinct(partial(change_text, controlled.name), error, limit)
         if each == "swing" and case.only_switches:
             error_text += f", {100.0 * error / settled.wanted_change:.0f} % of the requested change"
         is_limited = limit < _UNLIMITED * settled.wanted_change
