@@ -33,9 +33,7 @@ from ppafo.identification.trajectory import (
     fit,
     tolerance_parameters,
 )
-from ppafo.identification.trajectory.experiment import FITTED_CHANNELS
-from ppafo.identification.trajectory.numbers import number_at
-from ppafo.identification.trajectory.problem import numbers_of
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, number_at, numbers_of
 from ppafo.identification.trajectory.runs import Floats, numbers_in, prepare, signals_of
 from ppafo.identification.trajectory.tolerances import stated_by
 from ppafo.parameters.loading import load_parameter_set

@@ -24,8 +24,8 @@ from ppafo.exports.c_library.library import c_identifier
 from ppafo.exports.fmu.interface import closed_loop
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
-from ppafo.identification.trajectory.numbers import declaration_of
-from ppafo.identification.trajectory.numbers import with_numbers as with_fitted
+from ppafo.identification.trajectory.experiment import declaration_of
+from ppafo.identification.trajectory.experiment import with_numbers as with_fitted
 from ppafo.model.catalog import EFFECTS
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import json_schema, parse_parameter_set

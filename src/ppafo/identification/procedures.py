@@ -15,23 +15,20 @@ from pydantic import Field
 
 from ppafo.documents.models import StrictTable, Text
 from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
-from ppafo.identification.bench.chamber_decay import CHANNELS as CHAMBER_PRESSURES
-from ppafo.identification.bench.checks import check_channels
-from ppafo.identification.bench.decay import ANGLE
 from ppafo.identification.bench.flow import GasAt, Law
-from ppafo.identification.bench.free_decay import free_decay
+from ppafo.identification.bench.free_decay import ANGLE, free_decay
+from ppafo.identification.bench.law import BenchResult
 from ppafo.identification.bench.open_valve_flow import CHANNELS as OPEN_VALVE_CHANNELS
 from ppafo.identification.bench.open_valve_flow import open_valve_flow
-from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.bench.static_torque import static_torque
-from ppafo.identification.bench.torque_readings import FORCE, TORQUE
+from ppafo.identification.bench.readings import check_channels
+from ppafo.identification.bench.static_torque import FORCE, TORQUE, static_torque
 from ppafo.identification.bench.valve_map import CHANNELS as VALVE_MAP_CHANNELS
 from ppafo.identification.bench.valve_map import valve_map
+from ppafo.identification.bench.vane_leak import CHANNELS as CHAMBER_PRESSURES
 from ppafo.identification.bench.vane_leak import GAP, vane_leak
-from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import RecordingSource
-from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.identification.tolerances import DEFAULTS, Columns, Confidence, Tolerances, positive_in, quantity_in
 from ppafo.identification.unit_check import with_tried_units
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE

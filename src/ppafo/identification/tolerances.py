@@ -19,13 +19,10 @@ from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS
 from ppafo.units import parse_quantity
 
 Sensed = Literal["zero", "gain"]
-
 GAS_TEMPERATURE, GAS_LAW = 15.0, 0.01
 """Default limits of the gas temperature error [K] and of the relative departure from the ideal gas law [-]."""
-
 LAG_OF_PRESSURE = 0.02
 """Default limit of the time constant of a pressure sensor with its tube and filter [s]."""
-
 HELD = {
     "gas.molar_mass": GAS_LAW,
     "gas.heat_capacity_ratio": 0.02,
@@ -46,12 +43,28 @@ HELD = {
     "valve.sonic_conductance": 0.1,
 }
 """Default relative limits [-] of parameters without a stated uncertainty; ``valve`` is the chosen valve."""
-
 _OTHER_SETTING = 0.1
 """Default relative limit [-] of all other parameters, such as settings of valves and effects."""
-
 _LARGEST_FRACTION = 0.5
 """Largest relative limit [-] that may be stated; beyond it a sensor is broken rather than inaccurate."""
+_UNITS = {
+    "load": "1",
+    "supply": "Pa_d",
+    "zero_of_angle": "rad",
+    "zero_of_pressure": "Pa_d",
+    "gain": "1",
+    "lag": "s",
+    "start_of_angle": "rad",
+    "start_of_pressure": "Pa_d",
+    "gas_temperature": "K",
+    "gas_law": "1",
+    "stribeck_velocity": "rad/s",
+    "zero_of_flow": "1",
+    "friction": "1",
+    "held": "1",
+}
+Columns = Annotated[Text | None, Field(description="name of a column map; default: units in the header of the file")]
+Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals; default 0.95")]
 
 
 class BenchSection(StrictTable):
@@ -173,23 +186,6 @@ class Tolerances:
 DEFAULTS = Tolerances()
 """Tolerances of a bench without a table [bench]."""
 
-_UNITS = {
-    "load": "1",
-    "supply": "Pa_d",
-    "zero_of_angle": "rad",
-    "zero_of_pressure": "Pa_d",
-    "gain": "1",
-    "lag": "s",
-    "start_of_angle": "rad",
-    "start_of_pressure": "Pa_d",
-    "gas_temperature": "K",
-    "gas_law": "1",
-    "stribeck_velocity": "rad/s",
-    "zero_of_flow": "1",
-    "friction": "1",
-    "held": "1",
-}
-
 
 def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
     """Return the tolerances of a table [SI], or the defaults. Raises IdentificationError for a negative limit."""
@@ -214,3 +210,33 @@ def quantity_of(where: str, text: str, unit: str, atmosphere: float = STANDARD_A
     """
     with refused_as(IdentificationError, f"{where} = '{text}'", UnitError):
         return parse_quantity(text, unit, atmosphere)
+
+
+def quantity_in(
+    table: StrictTable,
+    key: str,
+    unit: str,
+    where: str,
+    low: float = -math.inf,
+    high: float = math.inf,
+    atmosphere: float = STANDARD_ATMOSPHERE,
+) -> float | None:
+    """Return the value of a key in ``unit``, None if the key is absent; ``where`` is the prefix of messages.
+
+    Raises IdentificationError if the text does not fit the unit or the number is not from ``low`` to ``high``.
+    """
+    text = getattr(table, key)
+    if text is None:
+        return None
+    value = quantity_of(f"{where}: {key}", text, unit, atmosphere)
+    if not low <= value <= high:
+        raise IdentificationError(f"{where}: {key} = {text!r} must be from {low:g} to {high:g} {unit}")
+    return value
+
+
+def positive_in(table: StrictTable, key: str, unit: str, where: str) -> float | None:
+    """Return the positive value of a key in ``unit``, None if absent. Raises IdentificationError unless above zero."""
+    value = quantity_in(table, key, unit, where)
+    if value is not None and value <= 0.0:
+        raise IdentificationError(f"{where}: {key} = {getattr(table, key)!r} must be above zero")
+    return value

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.bench.law import BenchResult
 from ppafo.identification.estimate import WRONG_UNIT
 from ppafo.identification.source import RecordingSource
 from ppafo.parameters.parameter_set import ParameterSet, number_in_si

@@ -2,8 +2,7 @@
 
 import math
 
-from ppafo.identification.conflict import SHAPE, SMOOTH, STATED
-from ppafo.identification.fit import Fit
+from ppafo.identification.fit import SHAPE, SMOOTH, STATED, Fit
 from ppafo.units import split_pressure_kind
 from ppafo.units.shown import shown_unit, shown_value
 from ppafo.wording import percentage

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ppafo.identification.bench.chamber_decay import pressures_of_fall
 from ppafo.identification.bench.flow import GasAt, Opening, OpeningSizes, orifice_shape
 from ppafo.identification.bench.valve_map import area_of_command, spool_of
+from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.source import RecordingSource
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats

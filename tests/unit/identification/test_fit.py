@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.conflict import SMOOTH
-from ppafo.identification.fit import Fit, fit
+from ppafo.identification.fit import SMOOTH, Fit, fit
+from ppafo.identification.least_squares import FitVariable, ResidualBlock
 from ppafo.identification.noise import Noise, burg, noise_of, whiten
-from ppafo.identification.residuals import FitVariable, ResidualBlock
 from ppafo.signals.recording import Floats
 
 _COUNT = 300

@@ -8,7 +8,7 @@ import pytest
 from ppafo.analyses.identify.answer import Identification, finding_of
 from ppafo.analyses.identify.question import identify
 from ppafo.errors import DataError, IdentificationError
-from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.bench.law import BenchResult
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.unit_check import with_tried_units

@@ -10,7 +10,7 @@ import numpy as np
 
 from ppafo.documents.json_text import fields_of, plain
 from ppafo.errors import DataError
-from ppafo.identification.bench.result import BenchResult, bench_figure, figure_3
+from ppafo.identification.bench.law import BenchResult, bench_figure, figure_3
 from ppafo.identification.estimate import WRONG_UNIT, Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of

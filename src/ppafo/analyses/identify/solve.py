@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from ppafo.analyses.identify.answer import Identification
 from ppafo.errors import IdentificationError, PpafoError, noted_in, raise_noted
-from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.bench.law import BenchResult
 from ppafo.identification.new_set import with_estimates
-from ppafo.identification.problem import DeviceProblem, ProblemFile
+from ppafo.identification.problem import DeviceProblem, ExperimentSection, ProblemFile
 from ppafo.identification.procedures import (
     PROCEDURES,
     FlowProblem,
@@ -21,7 +21,6 @@ from ppafo.identification.procedures import (
 )
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, source_of
 from ppafo.identification.tolerances import Tolerances, tolerances_of
-from ppafo.identification.trajectory.layout import ExperimentSection
 from ppafo.identification.trajectory.section import SectionContext, solve_section
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.loading import list_sets, load_parameter_set

@@ -24,7 +24,7 @@ from ppafo.analyses.reproduce.solve import (
 from ppafo.analyses.reproduce.step_response import SupplyLevels
 from ppafo.analyses.reproduce.torque_task import WITHIN_REACH, holding_torque, reading_rows, result_on_u
 from ppafo.documents.json_text import fields_of
-from ppafo.identification.bench.result import figure_3
+from ppafo.identification.bench.law import figure_3
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report.display_units import metric_level

@@ -21,10 +21,9 @@ from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import PooledReadings, Values, solve, sought, tolerance, within
-from ppafo.identification.bench.result import ReportedNumber
+from ppafo.identification.bench.law import PooledReadings, ReportedNumber, Values, solve, sought, tolerance, within
 from ppafo.identification.fit import Fit
-from ppafo.identification.residuals import FitVariable
+from ppafo.identification.least_squares import FitVariable
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.checks import check_moves, check_not_clipped, check_sources
 from ppafo.identification.bench.flow import (
     LAW_NAMES,
     NEXT_LAW,
@@ -28,9 +27,14 @@ from ppafo.identification.bench.flow import (
     shown_flow,
     solve_flow,
 )
-from ppafo.identification.bench.law import PooledReadings, recordings_of
-from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
-from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, meter_readings
+from ppafo.identification.bench.law import BenchResult, PooledReadings, ReportedNumber, recordings_of, result_of
+from ppafo.identification.bench.readings import (
+    check_moves,
+    check_no_wrong_reading,
+    check_not_clipped,
+    check_sources,
+    meter_readings,
+)
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.gas import critical_pressure_ratio

@@ -16,13 +16,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.checks import check_sources
 from ppafo.identification.bench.flow import ZERO, GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
-from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought
-from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
-from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, meter_readings
-from ppafo.identification.conflict import SHAPE, Conflict
-from ppafo.identification.residuals import FitVariable
+from ppafo.identification.bench.law import (
+    BenchResult,
+    PooledReadings,
+    ReportedNumber,
+    Values,
+    recordings_of,
+    result_of,
+    solve,
+    sought,
+)
+from ppafo.identification.bench.readings import check_no_wrong_reading, check_sources, meter_readings
+from ppafo.identification.fit import SHAPE, Conflict
+from ppafo.identification.least_squares import FitVariable
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.valves.proportional import spool_position

@@ -14,24 +14,16 @@ gain common to both sensors does not change the rate at which D falls.
 import math
 from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.chamber_decay import (
-    CHANNELS,
-    MINIMUM_SAMPLES,
-    PROCEDURE,
-    ChamberDecay,
-    chamber_decay,
-    pressures_of_fall,
-)
-from ppafo.identification.bench.checks import check_moves, check_not_clipped, check_sources
 from ppafo.identification.bench.flow import (
     CRITICAL_RATIOS,
     GAS_LAW,
     LAW_NAMES,
+    NEXT_LAW,
     PRODUCT_ONLY,
     TEMPERATURE,
     GasAt,
@@ -45,20 +37,70 @@ from ppafo.identification.bench.flow import (
     reported_parts,
     solve_flow,
 )
-from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, tolerance, within
-from ppafo.identification.bench.leak_laws import RIVALS, LawFit, next_law, with_rival
-from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
-from ppafo.identification.bench.wrong_readings import check_no_wrong_reading, meter_readings, without_wrong_samples
-from ppafo.identification.residuals import FitVariable
-from ppafo.identification.source import RecordingSource, pool
+from ppafo.identification.bench.law import (
+    BenchResult,
+    PooledReadings,
+    ReportedNumber,
+    Values,
+    recordings_of,
+    result_of,
+    solve,
+    sought,
+    tolerance,
+    within,
+)
+from ppafo.identification.bench.readings import (
+    check_moves,
+    check_no_gap,
+    check_no_wrong_reading,
+    check_not_clipped,
+    check_sources,
+    meter_readings,
+    without_wrong_samples,
+)
+from ppafo.identification.fit import Fit
+from ppafo.identification.least_squares import FitVariable
+from ppafo.identification.source import RecordingSource, pool, window
 from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances
+from ppafo.identification.wording import in_shown_unit, interval_texts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
+from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.wording import count_of
 
+PROCEDURE = "vane-leak"
+CHANNELS = ("pressure_1", "pressure_2")
+MINIMUM_SAMPLES = 20
+"""Least number of samples of a decay."""
+EDGE = 20
+"""Largest number of samples averaged at an end of a record for a start value, at most a tenth of the record."""
+STANDS_STILL = 0.02
+"""Largest ratio of the pressure changes of both chambers [-] at which the steadier chamber counts as a room."""
+_EQUAL = 0.01
+"""Pressure difference relative to the initial difference [-] below which a decay ends."""
+_POINTS = 400
+"""Number of pressure differences at which the time of a fall is computed."""
+_LOWEST = 1.0e-3
+"""Final pressure difference of a computed fall, relative to the initial difference [-]."""
+_LEAST_DIFFERENCE = 1.0
+"""Least initial pressure difference of a computed fall [Pa]."""
+_LEAST_RATE = 1.0e-300
+"""Least rate of a computed fall [Pa/s], so that the pressures of tight chambers stay finite."""
+RIVALS: dict[Law, Law] = {"both": "iso6358", "iso6358": "both"}
+"""Law that a fitted law is compared with, by law."""
+_CLEAR = math.log(100.0)
+"""Difference of log-likelihoods [-] from which one law explains readings clearly better.
+
+Both laws have equally many unknowns, so that no penalty differs. With the right law fitted, another law is 100 times as
+likely in at most 1 of 100 recordings (Markov's inequality), as a conflict is at the level of its tests.
+"""
+_AT_BOUND = 1.0e-3
+"""Distance of a critical ratio from its bounds [-] up to which it is at its bound."""
+_SYMBOLS = {"sonic_conductance": "C", "critical_ratio": "b", "coefficient": "c"}
+"""Symbols of the quantities that a sentence states, by last part of the path."""
 _FEWEST_STEADY = 8
 """Least number of readings of steady flow."""
 GAP = "effects.laminar_leak.coefficient"
@@ -73,6 +115,242 @@ _SHARP = 0.6
 _Laws = tuple[tuple[Opening, ReportedNumber], ...]
 """Chosen law and its rival, if it has one, each with its reported size."""
 _REMEDY = "{}, or give a start and an end; gas may leak elsewhere, or exchange heat with the walls"
+# Closed chambers.
+
+_RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
+"""Names of the variables for V_1/V_2 [-], relative error of the volume [-], and logarithm of tau, scaled [-]."""
+_START, _RELAXED_BY = "start of {}, decay {}", "relaxation of {}, decay {}"
+"""Names of the variables for initial pressure [Pa] and relative error r after filling [-], by channel and decay."""
+_RELAXED, _MOST_RELAXED = 5.0, 0.02
+"""Usual ratio of recording length to relaxation time [-], and largest relative pressure error from relaxation [-]."""
+_LEAST_PRESSURE = 1.0
+"""Least initial pressure, least scale and least standard deviation of an initial pressure [Pa]."""
+_UNIT_VOLUME = 1.0
+"""Volume [m^3] in place of an unknown one: the fitted size is then the size divided by the volume."""
+_SCATTER_OF_CHANGE, _LEAST_CHANGE = 0.01, 1.0e-9
+"""Least pressure change for a start value: as a fraction of the noise of a tight chamber [-], and absolute [Pa]."""
+
+
+class ChamberDecay(NamedTuple):
+    """Decay of the pressures in two closed chambers.
+
+    ``time`` is in s; ``first`` and ``second`` are the pressures [Pa] of the fuller chamber and the other; ``fuller`` is
+    the number of the fuller chamber, 1 or 2; ``number`` is the number of the decay.
+    """
+
+    time: Floats
+    first: Floats
+    second: Floats
+    fuller: int
+    number: int
+
+    @property
+    def edge(self) -> int:
+        """Number of samples averaged at an end of the decay."""
+        return max(1, min(EDGE, self.time.size // 10))
+
+    @property
+    def changes(self) -> tuple[float, float]:
+        """Fall of the pressure in the fuller chamber, and rise in the other chamber [Pa]."""
+        edge = self.edge
+        fall, rise = (float(np.mean(each[-edge:]) - np.mean(each[:edge])) for each in (self.first, self.second))
+        return -fall, rise
+
+    @property
+    def room(self) -> int | None:
+        """Index of the constant pressure, 0 for the fuller chamber and 1 for the other; None if both change."""
+        fall, rise = (abs(change) for change in self.changes)
+        if rise <= STANDS_STILL * fall:
+            return 1
+        return 0 if fall <= STANDS_STILL * rise else None
+
+    @property
+    def changing(self) -> int:
+        """Index of the changing pressure that determines the leak: 0 for the fuller chamber, 1 for the other."""
+        return 1 if self.room == 0 else 0
+
+    @property
+    def sensors(self) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
+        """Channels of the fuller and the other chamber, with their pressures [Pa]."""
+        return (f"pressure_{self.fuller}", self.first), (f"pressure_{3 - self.fuller}", self.second)
+
+    @property
+    def fitted(self) -> list[tuple[str, Floats]]:
+        """Fitted channels with their pressures [Pa]; the constant pressure of a room is not fitted."""
+        return [sensor for side, sensor in enumerate(self.sensors) if side != self.room]
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Pressure difference at the start and at the end [Pa], each from a straight line through the edge samples.
+
+        A mean over the edge instead would underestimate the fall.
+        """
+        edge, difference = self.edge, self.first - self.second
+        if edge < 2:
+            return float(difference[0]), float(difference[-1])
+        start = np.polyfit(self.time[:edge] - self.time[0], difference[:edge], 1)[1]
+        end = np.polyfit(self.time[-edge:] - self.time[-1], difference[-edge:], 1)[1]
+        return float(start), float(end)
+
+
+def chamber_decay(source: RecordingSource, start: float | None, end: float | None, number: int) -> ChamberDecay:
+    """Return the decay between two times [s] of a recording, until the pressures are nearly equal.
+
+    ``number`` is the number of the decay. Raises IdentificationError for a saturated sensor or too few samples.
+    """
+    part = window(source.recording, start, end)
+    skipped = check_no_gap(source, PROCEDURE, part)
+    for name in CHANNELS:
+        for plateau in plateaus(part[name]):
+            # Later plateaus may be the resolution of the sensor, as the pressure hardly falls any more.
+            if plateau.first < EDGE and stands_out(part[name], plateau):
+                raise IdentificationError(
+                    f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
+                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and changes only afterwards: "
+                    "the sensor is saturated, or the chamber was not yet closed; give a start after this sample"
+                )
+    decay = ChamberDecay(part.time, part["pressure_1"], part["pressure_2"], fuller=1, number=number)
+    if not np.mean((decay.first - decay.second)[: decay.edge]) > 0.0:
+        decay = decay._replace(first=decay.second, second=decay.first, fuller=2)
+    difference = decay.first - decay.second
+    # Between nearly equal pressures, the zero errors of the sensors outweigh the difference.
+    low = np.flatnonzero(difference < _EQUAL * float(np.mean(difference[: decay.edge])))
+    count = int(low[0]) if low.size else difference.size
+    if count < MINIMUM_SAMPLES:
+        raise IdentificationError(
+            f"{source.name}: {PROCEDURE}: only {count} samples lie between the start and equal pressures, but "
+            f"{MINIMUM_SAMPLES} are needed; record at a higher sample rate, or give a start at which the pressures "
+            "differ"
+        )
+    time = decay.time[:count] - decay.time[0]
+    return decay._replace(time=time, first=decay.first[:count], second=decay.second[:count])
+
+
+def pressures_of_fall(
+    opening: Opening, sizes: OpeningSizes, first: float, second: float, ratio: float, rate: float, times: Floats
+) -> tuple[Floats, Floats]:
+    """Return both pressures [Pa] at times [s] while gas leaks between closed chambers.
+
+        D' = -(1 + r) k g(P_1, P_2),   P_2 = P_2(0) + (D(0) - D) r / (1 + r),   P_1 = P_2 + D
+
+    follows from the mass balance of both chambers with equation (3) at constant temperature. The time at which D is
+    reached is the integral of D / D' over ln D, by the trapezoidal rule.
+
+    Arguments:
+        opening, sizes: law g [kg/s] of the leak, equations (6), (7), and its sizes
+        first, second: initial absolute pressures P_1(0), P_2(0) [Pa] of the fuller chamber and the other
+        ratio: r = V_1 / V_2 [-], 0 if the second chamber is a room, infinite if the first one is
+        rate: k = R T / V_1 [Pa/kg], or R T / V_2 if the first chamber is a room
+        times: times since the start [s]
+    """
+    start = max(first - second, _LEAST_DIFFERENCE)
+    share_of_rise, both_chambers = (1.0, 1.0) if math.isinf(ratio) else (ratio / (1.0 + ratio), 1.0 + ratio)
+    # A laminar leak falls exponentially, so that equal steps of ln D are equal steps of time.
+    logs = np.linspace(0.0, -math.log(_LOWEST), _POINTS)
+    difference = start * np.exp(-logs)
+    lower = second + share_of_rise * (start - difference)
+    flow = opening.flow(sizes, lower + difference, lower)
+    time_per_log = difference / np.maximum(both_chambers * rate * flow, _LEAST_RATE)
+    steps = 0.5 * (time_per_log[1:] + time_per_log[:-1]) * np.diff(logs)
+    fall_times = np.concatenate(([0.0], np.cumsum(steps)))
+    remaining = np.exp(np.interp(times, fall_times, np.log(difference)))
+    lower = second + share_of_rise * (start - remaining)
+    return lower + remaining, lower
+
+
+class LawFit(NamedTuple):
+    """Fit of a flow law to the readings of a leak.
+
+    ``opening`` is the law, ``reported`` are its quantities, ``fitted`` is the fit and ``model`` the fitted readings
+    [unit of the readings]. ``has_both_regimes`` is True for readings with choked and subsonic flow.
+    """
+
+    opening: Opening
+    reported: list[ReportedNumber]
+    fitted: Fit
+    model: Floats
+    has_both_regimes: bool
+
+    @property
+    def is_sound(self) -> bool:
+        """True if no readings contradict the law and they determine the critical ratio, if it is sought."""
+        if not self.opening.has_sought_ratio:
+            return self.fitted.conflict is None
+        ratio, (_, low, high) = self.fitted.by_name[self.reported[-1].path], CRITICAL_RATIOS
+        return self.fitted.conflict is None and self.has_both_regimes and low + _AT_BOUND < ratio < high - _AT_BOUND
+
+    @property
+    def has_gap(self) -> bool:
+        """True for a laminar gap whose interval does not begin at zero."""
+        row = [number.name for number in self.fitted.numbers].index(self.reported[-1].path)
+        return self.opening.law == "both" and float(self.fitted.low[row]) > 0.0
+
+    @property
+    def text(self) -> str:
+        """Law with its quantities, ``law = 'iso6358' (C = 4.0e-03 L/(s bar), b = 0.40)``."""
+        names, quantities = [number.name for number in self.fitted.numbers], list[str]()
+        for number in self.reported:
+            name = number.path.rpartition(".")[2]
+            symbol = _SYMBOLS.get(name.removesuffix("_over_volume"))
+            if symbol is not None:
+                row = names.index(number.path)
+                ends = (float(values[row]) for values in (self.fitted.values, self.fitted.low, self.fitted.high))
+                (value, unit), (low, _), (high, _) = (in_shown_unit(each, number.unit) for each in ends)
+                symbol = f"{symbol}/V" if name.endswith("_over_volume") else symbol
+                text = "0" if symbol[0] == "c" and not self.has_gap else interval_texts(value, low, high)[0]
+                quantities.append(f"{symbol} = {text} {unit}".rstrip(" -"))
+        return f"law = '{self.opening.law}' ({', '.join(quantities)})"
+
+
+def next_law(chosen: LawFit, rival: LawFit | None) -> str:
+    """Return the remedy for readings that the chosen law does not fit; None for a law without a rival."""
+    if rival is None:
+        # An orifice in the form of the set, with its critical ratio.
+        return NEXT_LAW["orifice" if chosen.opening.law == "iso6358" else chosen.opening.law]
+    if rival.is_sound and rival.fitted.log_likelihood > chosen.fitted.log_likelihood - _CLEAR:
+        return f"try law = '{rival.opening.law}'"
+    return "neither ISO 6358 nor an orifice beside a laminar gap explains the readings"
+
+
+def with_rival(result: BenchResult, chosen: LawFit, rival: LawFit, remedy: str) -> BenchResult:
+    """Return the result of the chosen law, with the verdicts that its rival allows.
+
+    If the rival explains the readings clearly better, that is a conflict. If neither does, a remark says so, and values
+    that depend on whether there is a gap hold for this model only. ``remedy`` is the advice where no law fits.
+    """
+    advantage = rival.fitted.log_likelihood - chosen.fitted.log_likelihood
+    with_gap = rival if chosen.opening.has_sought_ratio else chosen
+    has_leak = any(estimate.is_usable and estimate.value > 0.0 for estimate in result.estimates)
+    if advantage >= _CLEAR:
+        better = (
+            f"{rival.text} explains the readings better than law = '{chosen.opening.law}' (log-likelihood higher by "
+            f"{advantage:.1f})"
+        )
+        advice = f"{better}; give law = '{rival.opening.law}'"
+        unexplained = result.conflict or f"{better}, but not all of them; {remedy}"
+        result = replace(result, conflict=advice if rival.is_sound else unexplained)
+    elif (
+        advantage <= -_CLEAR
+        or not has_leak
+        or result.conflict
+        or rival.fitted.conflict is not None
+        # Without a gap, an orifice with the set's b is ISO 6358 with another b.
+        or (with_gap.opening.critical_ratio is not None and not with_gap.has_gap)
+    ):
+        return result
+    else:
+        remark = (
+            f"the readings do not tell law = '{chosen.opening.law}' from {rival.text}: the log-likelihoods differ by "
+            f"{abs(advantage):.1f}, less than {_CLEAR:.1f}; less noise, or more pressures, may tell them apart"
+        )
+        result = replace(result, remarks=(*result.remarks, remark))
+        # Without a gap, both laws are an orifice.
+        if not with_gap.has_gap:
+            return result
+    estimates = [
+        replace(item, verdict="holds for this model only") if item.is_identified else item for item in result.estimates
+    ]
+    return replace(result, estimates=tuple(estimates))
 
 
 def vane_leak(
@@ -219,22 +497,6 @@ def _result(
     remedy = _REMEDY.format(next_law(chosen, rival))
     result = result_of(PROCEDURE, sources, chosen.fitted, chosen.reported, summary, panels, remedy, remarks, scatter)
     return result if rival is None else with_rival(result, chosen, rival, remedy)
-
-
-# Closed chambers.
-
-_RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
-"""Names of the variables for V_1/V_2 [-], relative error of the volume [-], and logarithm of tau, scaled [-]."""
-_START, _RELAXED_BY = "start of {}, decay {}", "relaxation of {}, decay {}"
-"""Names of the variables for initial pressure [Pa] and relative error r after filling [-], by channel and decay."""
-_RELAXED, _MOST_RELAXED = 5.0, 0.02
-"""Usual ratio of recording length to relaxation time [-], and largest relative pressure error from relaxation [-]."""
-_LEAST_PRESSURE = 1.0
-"""Least initial pressure, least scale and least standard deviation of an initial pressure [Pa]."""
-_UNIT_VOLUME = 1.0
-"""Volume [m^3] in place of an unknown one: the fitted size is then the size divided by the volume."""
-_SCATTER_OF_CHANGE, _LEAST_CHANGE = 0.01, 1.0e-9
-"""Least pressure change for a start value: as a fraction of the noise of a tight chamber [-], and absolute [Pa]."""
 
 
 def _closed_leak(

@@ -6,11 +6,15 @@ problem file.
 """
 
 from ppafo.identification.tolerances import Tolerances
-from ppafo.identification.trajectory.expected import CandidateExperiment, ExpectedBenefit, expected_information
-from ppafo.identification.trajectory.experiment import FittedExperiment
-from ppafo.identification.trajectory.fitting import ChannelFit, TrajectoryFit, fit
-from ppafo.identification.trajectory.numbers import FreeParameter
-from ppafo.identification.trajectory.problem import TrajectoryProblem
+from ppafo.identification.trajectory.experiment import FittedExperiment, FreeParameter, TrajectoryProblem
+from ppafo.identification.trajectory.fitting import (
+    CandidateExperiment,
+    ChannelFit,
+    ExpectedBenefit,
+    TrajectoryFit,
+    expected_information,
+    fit,
+)
 from ppafo.identification.trajectory.tolerances import tolerance_parameters
 
 __all__ = [

@@ -7,36 +7,64 @@ from functools import partial
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, refused_as
 from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_half_width
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as fit_residuals
-from ppafo.identification.residuals import FitVariable, ResidualBlock
-from ppafo.identification.trajectory.numbers import (
+from ppafo.identification.least_squares import FitRuns, FitVariable, ResidualBlock
+from ppafo.identification.noise import Noise, whiten
+from ppafo.identification.trajectory.experiment import (
+    FITTED_CHANNELS,
     LAG_OF,
     ZERO_OF,
     FitNumber,
+    TrajectoryProblem,
     broken_rule,
     full_path,
+    numbers_of,
     reach_of,
     with_numbers,
 )
-from ppafo.identification.trajectory.problem import TrajectoryProblem, numbers_of
 from ppafo.identification.trajectory.runs import (
-    Floats,
+    FitChannel,
     PreparedExperiment,
     blocks_of,
+    columns_in,
     numbers_in,
     prepare,
+    prepare_samples,
     residuals_of,
+    signals_at,
     signals_of,
 )
 from ppafo.identification.wording import conflict_in_words, in_shown_unit, widened_by
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import correlated_noise_of, noise_of
-from ppafo.signals.recording import CHANNELS, Channel, Recording
+from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import count_of, nearest_name
+
+_STATIC, _DYNAMIC = "friction.static_torque", "friction.dynamic_torque"
+_DEAD_TIMES = "delay", "time_offset"
+"""Last words of the paths of dead times."""
+_LAGS = 10.0
+"""Least increase of the log-likelihood [-] by which lags of sensors are found."""
+_WINDOWS, _RUN = (3, 6, 12, 24, 48), 6.0
+"""Lengths of runs of residuals [samples], and size of their sum that no white noise has [standard deviations]."""
+_FELT = 1.0e-3
+"""Least residuals that are tested as bursts [ranges of the samples]; smaller ones are the engine's."""
+_BURST = 6.0
+"""Ratio of residuals to the noise that lasts [-] from which they are no noise; slow noise has up to 5.5."""
+_INSIDE = 1.0e-3
+"""Relative distance from the edge of successful runs [-] at which a bound is suggested."""
+_OWN_SHARE = 0.2
+"""Weight in an undetermined combination [-] from which a parameter itself counts as not identifiable."""
+_AT_BOUND = 1.0e-6
+"""Relative distance from a bound [-] up to which an estimate counts as at its bound."""
+_NEAR = 1.0e-3
+"""Same distance, as a fraction of the width of the interval [-]."""
+_WHOLE = 1.0e-6
+"""Rounding tolerance of the last sample interval, as a fraction of an interval [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,9 +152,6 @@ class TrajectoryFit:
         return {estimate.path: estimate.value for estimate in self.estimates}
 
 
-_STATIC, _DYNAMIC = "friction.static_torque", "friction.dynamic_torque"
-
-
 def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> TrajectoryFit:
     """Fit the parameters of a problem to its recordings; each estimate has an interval [SI] and a verdict.
 
@@ -145,18 +170,6 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         if lagging.fit.log_likelihood > found.fit.log_likelihood + _LAGS:
             return lagging
     return found
-
-
-_DEAD_TIMES = "delay", "time_offset"
-"""Last words of the paths of dead times."""
-_LAGS = 10.0
-"""Least increase of the log-likelihood [-] by which lags of sensors are found."""
-_WINDOWS, _RUN = (3, 6, 12, 24, 48), 6.0
-"""Lengths of runs of residuals [samples], and size of their sum that no white noise has [standard deviations]."""
-_FELT = 1.0e-3
-"""Least residuals that are tested as bursts [ranges of the samples]; smaller ones are the engine's."""
-_BURST = 6.0
-"""Ratio of residuals to the noise that lasts [-] from which they are no noise; slow noise has up to 5.5."""
 
 
 def _residuals_in(found: TrajectoryFit) -> Iterator[Floats]:
@@ -316,10 +329,6 @@ def _outlier_remarks(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mappin
             yield f"experiment '{block.recording}': {outliers} of {block.channel} left out, the first at {first:.6g} s"
 
 
-_INSIDE = 1.0e-3
-"""Relative distance from the edge of successful runs [-] at which a bound is suggested."""
-
-
 def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Sequence[Estimate]) -> NuisanceParameter:
     """Return a tolerance after the fit, with the unknown whose interval it widens most."""
     name, free = number.free.name, number.free
@@ -364,14 +373,6 @@ def _bursting(measurements: Sequence[Recording], models: Sequence[Recording]) ->
                     "that lasts; the model is incomplete"
                 )
     return ""
-
-
-_OWN_SHARE = 0.2
-"""Weight in an undetermined combination [-] from which a parameter itself counts as not identifiable."""
-_AT_BOUND = 1.0e-6
-"""Relative distance from a bound [-] up to which an estimate counts as at its bound."""
-_NEAR = 1.0e-3
-"""Same distance, as a fraction of the width of the interval [-]."""
 
 
 def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: int, conflict: str) -> Estimate:
@@ -424,3 +425,91 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
         if number.acts_in(experiment.label)
     )
     return Estimate(name, value, number.unit, low, high, verdict, text, recordings, problem.confidence, size)
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateExperiment:
+    """Candidate for the next experiment: scenario, noise of each channel [rad], [Pa], and sample interval [s].
+
+    The device comes from the scenario, with the fitted values inserted. Without ``noise``, all channels of the fit are
+    compared, each with its estimated noise; otherwise only the channels in ``noise``.
+    """
+
+    label: str
+    scenario: Scenario
+    noise: Mapping[str, float]
+    interval: float = 1.0e-3
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedBenefit:
+    """Expected benefit of a candidate experiment.
+
+    ``gain`` is half the increase of the log-determinant of the information on the unknowns [-] (D-optimality): the
+    volume of their confidence region shrinks by exp(gain). ``shrinkage`` is, for each unknown, the standard error after
+    the experiment divided by the present one. ``most_helped`` names the unknown that shrinks most.
+    """
+
+    label: str
+    gain: float
+    shrinkage: Mapping[str, float]
+    most_helped: str
+
+
+def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExperiment]) -> tuple[ExpectedBenefit, ...]:
+    """Return the expected benefit of each candidate experiment, the most informative first.
+
+    Raises IdentificationError for a candidate without noise in any channel that can be fitted.
+    """
+    benefits = [_benefit(fit, candidate) for candidate in candidates]
+    return tuple(sorted(benefits, key=lambda benefit: -benefit.gain))
+
+
+def _benefit(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBenefit:
+    """Return the expected benefit of a candidate, from its whitened Jacobian added to the information of the fit."""
+    noise = dict(candidate.noise) or dict(fit.fit.noise)
+    if not noise or any(name not in FITTED_CHANNELS or not deviation > 0.0 for name, deviation in noise.items()):
+        raise IdentificationError(
+            f"candidate '{candidate.label}': noise must be above 0 for at least one of {', '.join(FITTED_CHANNELS)}"
+        )
+    # What belongs to one recording, such as its trigger, another experiment says nothing of.
+    common = [index for index, number in enumerate(fit.numbers) if not number.recordings]
+    slopes = _slopes(candidate, noise, [fit.numbers[index] for index in common], fit.fit.values[common])
+    blocks = []
+    for block, (name, deviation) in zip(np.split(slopes, len(noise)), noise.items(), strict=True):
+        sensor = fit.fit.sensors.get(name)
+        blocks.append(whiten(block, replace(sensor, deviation=deviation) if sensor else Noise(deviation)))
+    # In units of today's standard errors, for pascals and radians differ by many powers of ten.
+    errors = np.sqrt(np.diag(fit.fit.covariance))
+    jacobian = np.concatenate(blocks) * errors[common]
+    before = fit.fit.covariance / np.outer(errors, errors)
+    information = np.linalg.inv(before)
+    information[np.ix_(common, common)] += jacobian.T @ jacobian
+    after = np.linalg.inv(information)
+    unknowns = [index for index, number in enumerate(fit.numbers) if not number.is_tolerance]
+    shrinkage = {fit.numbers[index].free.name: math.sqrt(max(after[index, index], 0.0)) for index in unknowns}
+    rows = np.ix_(unknowns, unknowns)
+    gain = 0.5 * float(np.linalg.slogdet(before[rows])[1] - np.linalg.slogdet(after[rows])[1])
+    return ExpectedBenefit(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))
+
+
+def _slopes(
+    candidate: CandidateExperiment, noise: Mapping[str, float], numbers: Sequence[FitNumber], point: Floats
+) -> Floats:
+    """Return the Jacobian [SI] (samples of all channels, numbers) of the samples of a candidate at a point [SI]."""
+    count = math.floor(candidate.scenario.run.duration / candidate.interval + _WHOLE)
+    times = candidate.interval * np.arange(count + 1, dtype=np.float64)
+    channels = [FitChannel(name, np.zeros(times.size)) for name in noise]
+    values = numbers_in("", numbers, point)
+    prepared = prepare_samples(candidate.label, candidate.scenario, times, channels, reach_of(numbers), values)
+
+    def samples(points: Floats) -> Floats:
+        signals = signals_at(prepared, columns_in("", numbers, points), points.shape[1])
+        return np.concatenate([signals[name] for name in noise])
+
+    runs = FitRuns(samples, tuple(number.free for number in numbers), (), report_nothing, 0, is_motion=True)
+    with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
+        # As in the fit, a difference is as long as changes the samples by three units of noise in all.
+        weight = 1.0 / np.repeat(list(noise.values()), times.size)
+        runs.adapt_steps(runs.jacobian(point / runs.scale), weight)
+        return np.asarray(runs.jacobian(point / runs.scale) / runs.scale)

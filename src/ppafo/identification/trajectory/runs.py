@@ -22,9 +22,17 @@ from ppafo.engine.run import NEVER_FAILED, Run, batches_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
-from ppafo.identification.residuals import ResidualBlock
-from ppafo.identification.trajectory.experiment import FittedExperiment, scenario_of
-from ppafo.identification.trajectory.numbers import GAIN_OF, LAG_OF, TIME_OFFSET, ZERO_OF, FitNumber, with_numbers
+from ppafo.identification.least_squares import ResidualBlock
+from ppafo.identification.trajectory.experiment import (
+    GAIN_OF,
+    LAG_OF,
+    TIME_OFFSET,
+    ZERO_OF,
+    FitNumber,
+    FittedExperiment,
+    scenario_of,
+    with_numbers,
+)
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.device import Device

@@ -10,22 +10,29 @@ from pathlib import Path
 
 from ppafo.errors import DataError, IdentificationError, ScenarioError
 from ppafo.identification.estimate import Estimate, interval_factor
-from ppafo.identification.keys import positive_in, quantity_in
+from ppafo.identification.problem import ExperimentSection, ParameterSection, TrajectorySection
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
-from ppafo.identification.tolerances import Tolerances, quantity_of
-from ppafo.identification.trajectory.expected import CandidateExperiment, ExpectedBenefit, expected_information
+from ppafo.identification.tolerances import Tolerances, positive_in, quantity_in, quantity_of
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
     INPUTS,
+    TIME_OFFSET,
     FittedExperiment,
+    FreeParameter,
     InitialState,
+    TrajectoryProblem,
+    declaration_of,
+    full_path,
     refuse_first,
     use_of,
 )
-from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
-from ppafo.identification.trajectory.layout import ExperimentSection, ParameterSection, TrajectorySection
-from ppafo.identification.trajectory.numbers import TIME_OFFSET, FreeParameter, declaration_of, full_path
-from ppafo.identification.trajectory.problem import TrajectoryProblem
+from ppafo.identification.trajectory.fitting import (
+    CandidateExperiment,
+    ExpectedBenefit,
+    TrajectoryFit,
+    expected_information,
+    fit,
+)
 from ppafo.identification.trajectory.tolerances import stated_by, tolerance_parameters
 from ppafo.identification.wording import in_shown_unit
 from ppafo.parameters import apply_overrides, build_device

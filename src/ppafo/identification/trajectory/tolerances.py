@@ -6,15 +6,17 @@ from dataclasses import replace
 
 from ppafo.identification.new_set import fitting_unit, stated_half_width
 from ppafo.identification.tolerances import Tolerances
-from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, FittedExperiment, scenario_of
-from ppafo.identification.trajectory.numbers import (
+from ppafo.identification.trajectory.experiment import (
+    FITTED_CHANNELS,
     GAIN_OF,
     LAG_OF,
     ZERO_OF,
+    FittedExperiment,
     FreeParameter,
     declared_numbers,
     full_path,
     number_at,
+    scenario_of,
 )
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.effects import switches_of

@@ -12,8 +12,8 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
-from ppafo.identification.bench.chamber_decay import pressures_of_fall
 from ppafo.identification.bench.flow import GasAt, Opening, OpeningSizes, iso6358_shape, orifice_shape
+from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.noise import burg
 from ppafo.identification.source import RecordingSource
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function

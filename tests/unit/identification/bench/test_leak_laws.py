@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import vane_leak
 from ppafo.identification.bench.flow import GasAt
-from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.bench.law import BenchResult
 from ppafo.identification.source import RecordingSource
 from ppafo.signals import Channel, Recording
 

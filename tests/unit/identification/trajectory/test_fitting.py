@@ -18,8 +18,7 @@ from ppafo.identification.trajectory import (
     fit,
     fitting,
 )
-from ppafo.identification.trajectory.numbers import number_at, with_numbers
-from ppafo.identification.trajectory.problem import numbers_of
+from ppafo.identification.trajectory.experiment import number_at, numbers_of, with_numbers
 from ppafo.identification.trajectory.runs import FIT_TOLERANCE, prepare, run_with, signals_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Recording

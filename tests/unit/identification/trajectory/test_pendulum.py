@@ -14,7 +14,7 @@ from ppafo.identification.trajectory import (
     TrajectoryProblem,
     fit,
 )
-from ppafo.identification.trajectory.numbers import with_numbers
+from ppafo.identification.trajectory.experiment import with_numbers
 from ppafo.identification.trajectory.tolerances import tolerance_parameters
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording

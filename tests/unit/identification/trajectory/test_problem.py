@@ -5,16 +5,16 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import FittedExperiment, FreeParameter, TrajectoryProblem, fit
-from ppafo.identification.trajectory.numbers import (
+from ppafo.identification.trajectory.experiment import (
     TIME_OFFSET,
     broken_rule,
     declaration_of,
     declared_numbers,
     full_path,
     number_at,
+    numbers_of,
     with_numbers,
 )
-from ppafo.identification.trajectory.problem import numbers_of
 from ppafo.identification.trajectory.runs import prepare, run_with
 from ppafo.running import simulate
 from ppafo.signals.faults import noise_of

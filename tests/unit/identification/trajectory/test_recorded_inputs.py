@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.trajectory import FittedExperiment, FreeParameter, TrajectoryProblem, fit
-from ppafo.identification.trajectory.problem import numbers_of
+from ppafo.identification.trajectory.experiment import numbers_of
 from ppafo.identification.trajectory.runs import prepare, signals_at, signals_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording

@@ -13,7 +13,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.tolerances import BenchSection, Tolerances, tolerances_of
 from ppafo.identification.trajectory import FittedExperiment, FreeParameter, TrajectoryProblem, fit
 from ppafo.identification.trajectory import runs as trajectory_runs
-from ppafo.identification.trajectory.numbers import number_at, with_numbers
+from ppafo.identification.trajectory.experiment import number_at, with_numbers
 from ppafo.identification.trajectory.runs import prepare, signals_at
 from ppafo.identification.trajectory.tolerances import tolerance_parameters
 from ppafo.running import simulate
