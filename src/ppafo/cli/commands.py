@@ -112,8 +112,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
             f"{_ANALYSES}.walk.question:walk_with_and_without",
             first_line="Simulate walking with the device, without it, and healthy.",
             library="ppafo.walking.loading:FILE",
-            listing="ppafo.analyses.walk.command:list_files",
-            default_folder="ppafo.analyses.walk.command:default_folder",
+            default_folder="ppafo.analyses.walk.question:default_folder",
         ),
     },
     "tools": {

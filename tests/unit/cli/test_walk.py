@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.walk import command
 from ppafo.cli.main import main
 from ppafo.storage import read_csv
 from ppafo.storage.netcdf_reading import read_netcdf
@@ -117,7 +116,6 @@ def bursting(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(configuration, device=replace(configuration.device, supply=supply))
 
     monkeypatch.setattr("ppafo.walking.loading.load_walk", changed)
-    monkeypatch.setattr(command, "load_walk", changed)
 
 
 @pytest.mark.usefixtures("bursting")

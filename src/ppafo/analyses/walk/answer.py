@@ -1,72 +1,72 @@
 """Report of a walk of one wearer with and without the device: text, tables and figures."""
 
-from collections.abc import Callable, Iterator, Sequence
+import platform
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ppafo.analyses.walk.benefit import benefit_sentence
-from ppafo.analyses.walk.bottle import bottle_data, bottle_parts
-from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes, versions, walk_document
-from ppafo.documents.json_text import plain
+from ppafo.documents.json_text import fields_of, plain
 from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
 from ppafo.parameters.bottles.fluid import list_fluids
 from ppafo.remedy_trials import tried
-from ppafo.report.finding import Column, Finding, Section, columns_of
+from ppafo.report.display_units import display_unit, display_value
+from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import changes_in
-from ppafo.simulation.scenario import UNITS
+from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.simulation.tracking import Tracking
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
+from ppafo.version import __version__
+from ppafo.walking.bottle.course import SupplyCourse, duration_text, strides_text
 from ppafo.walking.bottle.supply import is_of_bottle
+from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.motion import person_remarks, walk_of
-from ppafo.walking.planning import law_of
+from ppafo.walking.planning import law_of, sensor_numbers
 from ppafo.walking.result import WALK_FORMAT, WalkResult, limited_request
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison
 from ppafo.wording import argument_text
 
-_PRESSURE = Kind(quantity="pressure", form=".3g")
+_PRESSURE, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("pressure", "torque", "gas mass"))
+_SHARE, _WARMTH, _BOTTLE_PRESSURE = (
+    Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure")
+)
 _FAR_ABOVE = 2.0
 """Ratio of absolute chamber pressure to supply pressure for a remark; healthy wearers stay below."""
-
-
 SCHEMA_VERSION = 1
 REVERSALS_PER_STRIDE, LARGEST_TORQUE = "reversals_per_stride", "largest_torque"
-_NUMBERS = (
-    ShownNumber(name="body_mass", title="Body mass of the wearer", quantity="mass", digits=1),
-    ShownNumber(name="gas", title="Gas per stride", quantity="gas mass", digits=3),
-    ShownNumber(name="total_gas", title="Gas of the whole walk", quantity="gas mass", digits=2),
-    ShownNumber(
-        name="positive_push_off_work", title="Positive work on the wearer in push-off", quantity="energy", digits=2
-    ),
-    ShownNumber(name="push_off_share", title="... of the healthy ankle's positive work", quantity="fraction", digits=1),
-    ShownNumber(name="net_push_off_work", title="Net work on the wearer in push-off", quantity="energy", digits=2),
-    ShownNumber(name="torque_error", title="RMS torque error while torque is requested", quantity="torque", digits=2),
-    ShownNumber(name="requested_torque", title="... RMS of the requested torque", quantity="torque", digits=2),
-    ShownNumber(name="peak_torque", title="Largest torque in either direction", quantity="torque", digits=1),
-    ShownNumber(name=LARGEST_TORQUE, title="... limit of the controller", quantity="torque", digits=1),
-    ShownNumber(name=REVERSALS_PER_STRIDE, title="Command reversals per stride", quantity="", digits=1),
-    ShownNumber(
-        name="lowest_toes", title="Lowest toe height above ground in mid-swing", quantity="body length", digits=1
-    ),
-    ShownNumber(name="toe_landing", title="Strides that begin on the toes", quantity="fraction", digits=0),
-    ShownNumber(
-        name="dorsiflexor_moment", title="Moment of the wearer's dorsiflexors, mean", quantity="torque", digits=2
-    ),
-    ShownNumber(name="angle_difference", title="RMS difference to the healthy ankle angle", quantity="angle", digits=1),
-    ShownNumber(name="counted_strides", title="Strides in these means", quantity="", digits=0),
-)
-"""Rows of the table of metrics of a walk."""
+_NUMBERS = {
+    "body_mass": ("Body mass of the wearer", "mass", 1),
+    "gas": ("Gas per stride", "gas mass", 3),
+    "total_gas": ("Gas of the whole walk", "gas mass", 2),
+    "positive_push_off_work": ("Positive work on the wearer in push-off", "energy", 2),
+    "push_off_share": ("... of the healthy ankle's positive work", "fraction", 1),
+    "net_push_off_work": ("Net work on the wearer in push-off", "energy", 2),
+    "torque_error": ("RMS torque error while torque is requested", "torque", 2),
+    "requested_torque": ("... RMS of the requested torque", "torque", 2),
+    "peak_torque": ("Largest torque in either direction", "torque", 1),
+    LARGEST_TORQUE: ("... limit of the controller", "torque", 1),
+    REVERSALS_PER_STRIDE: ("Command reversals per stride", "", 1),
+    "lowest_toes": ("Lowest toe height above ground in mid-swing", "body length", 1),
+    "toe_landing": ("Strides that begin on the toes", "fraction", 0),
+    "dorsiflexor_moment": ("Moment of the wearer's dorsiflexors, mean", "torque", 2),
+    "angle_difference": ("RMS difference to the healthy ankle angle", "angle", 1),
+    "counted_strides": ("Strides in these means", "", 0),
+}
+"""Rows of the table of metrics of a walk: title, kind of quantity and number of decimals by name."""
+WOULD_DRAG = "would drag"
+"""Text in tables for toes that would penetrate the ground."""
 _EXPLAINED = (
     "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
     "'Healthy' is the gait itself. Ground contact in the swing is not simulated: toes below the ground would drag. "
@@ -80,6 +80,18 @@ _LEGS = (
 _MEAN = (
     "Mean over the strides with the standard deviation as a band. A deterministic walk on a perfectly regular gait "
     "has almost none."
+)
+_BOTTLE = (
+    "Gas supply over the walk. A regulator delivers its set pressure at most, and less as the bottle empties. "
+    "Gas at the device leaves the hose."
+)
+_BOTTLE_EXPLAINED = (
+    "The vapour of liquid CO2 at 20 degC needs 95 kJ/kg to become gas of 25 degC behind the regulator. It draws "
+    "this heat from the regulator's body and the hose, and these from the room. Below the triple point dry ice "
+    "stays in the seat and narrows it. The gas in lines and chambers keeps the temperature with which it leaves the "
+    "hose; in reality their walls warm it, so its effect is overestimated here.",
+    "A walk ends when the line behind the regulator does not reach the given fraction of the set pressure within two "
+    "strides, or when the fluid in the bottle freezes.",
 )
 _LIMITS = (
     "The gait is prescribed: the device moves the ankle where the foot is free, and cannot change how the wearer walks."
@@ -113,7 +125,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
         parts=(
             Section(said=[sentence for sentence in set_up if sentence], is_detail=True),
             Section(columns=comparison_table(comparison), remarks=_remarks(comparison)),
-            *bottle_parts(worn),
+            *_bottle_parts(worn),
             Section("Command with the remedy" if mended else "", code=mended),
             Section("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
             *_pictures(comparison),
@@ -140,14 +152,54 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking) -> dict[str, Any]:
         "status_off": plain(bare.status),
         "metrics": plain(dict(worn.metrics)),
         "metrics_off": plain(dict(bare.metrics)),
-        "versions": versions(),
-        "configuration": walk_document(worn.scenario),
+        "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
+        "configuration": _scenario_data(worn.scenario),
         "shown": dict(worn.scenario.device.shown),
         "tracking": {**plain(verdict), "sentence": verdict.sentence},
         "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
         "minutes": float(worn.recording.time[-1]) / 60.0,
-        **bottle_data(worn),
+        **_supply_data(worn),
         "healthy": plain(dict(comparison.healthy)),
+    }
+
+
+def _scenario_data(scenario: Scenario) -> dict[str, Any]:
+    """Return a walk as data in SI units; a bottle is described by its values, without the gas property tables."""
+    motion, control, origin = walk_of(scenario), scenario.controller, scenario.origin
+    seed = scenario.sensors.seed
+    return {
+        **fields_of(scenario, "name", "description"),
+        "device": plain(scenario.device),
+        "gait": plain(motion.gait),
+        "wearer": plain(motion.wearer),
+        "wearer_origin": motion.wearer_origin,
+        "controller": control.kind,
+        "settings": plain(control.settings),
+        "period": control.period,
+        "step": scenario.run.step,
+        "sensors": {"numbers": plain(sensor_numbers(scenario)), "seed": seed},
+        "supply_line": plain(scenario.supply_line),
+        "gas_model": plain(scenario.gas_model),
+        "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
+        "assumed": {assumption.path: assumption.note for assumption in scenario.assumptions},
+        **fields_of(origin, "file", "content"),
+        "overrides": list(origin.overrides),
+    }
+
+
+def _supply_data(worn: WalkResult) -> dict[str, Any]:
+    """Return the supply as data in SI units: end, balances, final and lowest values; {} without a bottle."""
+    supply = worn.supply
+    if supply is None:
+        return {}
+    return {
+        "supply": {
+            **supply.supply.to_dict(),
+            "ending": supply.ending._asdict(),
+            "balance": supply.balance._asdict(),
+            "at_end": {name: float(values[-1]) for name, values in supply.values.items()},
+            "lowest": {name: float(np.min(values)) for name, values in supply.values.items()},
+        }
     }
 
 
@@ -201,6 +253,55 @@ def _pressure_remarks(worn: WalkResult) -> Iterator[str]:
             )
 
 
+def _bottle_parts(worn: WalkResult) -> tuple[Section, ...]:
+    """Return the facts of the bottle of a walk, its figure and an explanation; () for a walk without a bottle."""
+    supply = worn.supply
+    if supply is None:
+        return ()
+    return (
+        Section("On the bottle", facts(_bottle_facts(worn, supply))),
+        Section(
+            "The bottle over the walk",
+            name="bottle",
+            caption=_BOTTLE,
+            draw=partial(bottle_figure, worn),
+            is_detail=True,
+        ),
+        Section("How to read the bottle", said=_BOTTLE_EXPLAINED, is_detail=True),
+    )
+
+
+def _bottle_facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
+    """Return end of the walk and its time, gas used, and lowest temperatures, as pairs of name and value."""
+    values, motion, peaks = supply.values, walk_of(worn.scenario), worn.peak_torques
+    end = {name: float(series[-1]) for name, series in values.items()}
+    filled = f"{_GAS.text(supply.supply.mass)} at {_WARMTH.text(supply.supply.temperature)}"
+    remaining = _GAS.text(end["bottle_mass"])
+    if "liquid_mass" in values:
+        remaining += f", {_GAS.text(end['liquid_mass'])} of it liquid"
+    # Strides are counted by time, as ``ppafo bottle`` counts them.
+    strides = strides_text(supply.ending.time / motion.gait.stride_time)
+    walked = f"{strides} strides, {worn.metrics['strides'].value:.0f} of them whole between strikes"
+    rows = [
+        ("bottle", f"{supply.supply.bottle.title}, with {filled}"),
+        ("reason for the end", supply.ending.message),
+        ("when", f"{duration_text(supply.ending.time)}, {walked}"),
+        ("gas used", f"{_GAS.text(supply.balance.left_bottle)}, left {remaining}"),
+        (
+            "bottle at the end",
+            f"{_WARMTH.text(end['bottle_temperature'])}, {_BOTTLE_PRESSURE.text(end['bottle_pressure'])}",
+        ),
+        ("coldest gas behind the regulator", _WARMTH.text(float(values["outlet_temperature"].min()))),
+        ("coldest gas at the device", _WARMTH.text(float(values["gas_temperature"].min()))),
+        ("seat free of ice, at least", _SHARE.text(float(values["seat_open"].min()))),
+    ]
+    # The third stride is the first in which the controller knows the stride time.
+    if peaks.size > 3:
+        third, last = _TORQUE.text(float(peaks[2])), _TORQUE.text(float(peaks[-1]))
+        rows.append(("push-off peak by stride", f"{third} in the third, {last} in the last"))
+    return rows
+
+
 def _pictures(comparison: WalkComparison) -> Sequence[Section]:
     """Return the figures of a walk, () without a mean stride."""
     worn, bare = comparison.with_device, comparison.without_device
@@ -222,7 +323,8 @@ def comparison_table(comparison: WalkComparison) -> list[Column]:
     for head, metrics in (*walked, ("healthy", comparison.healthy)):
         values: dict[str, float | str | None] = {"body_mass": walk_of(worn.scenario).wearer.body_mass}
         values |= {name: metric.value for name, metric in metrics.items()}
-        values["lowest_toes"] = toes(metrics["lowest_toes"].value) if "lowest_toes" in metrics else None
+        if "lowest_toes" in metrics and metrics["lowest_toes"].value < 0.0:
+            values["lowest_toes"] = WOULD_DRAG
         if "command_reversals" in metrics and "strides" in metrics and metrics["strides"].value > 0.0:
             values[REVERSALS_PER_STRIDE] = metrics["command_reversals"].value / metrics["strides"].value
         columns.append((head, values))
@@ -231,9 +333,23 @@ def comparison_table(comparison: WalkComparison) -> list[Column]:
     if "positive_push_off_work" in comparison.healthy:
         columns[-1][1]["push_off_share"] = 1.0
     # A number that no walk of the table has would be a row of dashes.
-    known = [number for number in _NUMBERS if any(values.get(number.name) is not None for _, values in columns)]
-    cells = (number_texts(number, (values.get(number.name) for _, values in columns)) for number in known)
-    return columns_of(["", *(head for head, _ in columns)], cells)
+    rows = []
+    for name, (title, quantity, digits) in _NUMBERS.items():
+        numbers = [values.get(name) for _, values in columns]
+        if any(number is not None for number in numbers):
+            unit = display_unit(quantity)
+            cells = (_cell(number, quantity, digits) for number in numbers)
+            rows.append((f"{title} ({unit})" if unit else title, *cells))
+    return columns_of(["", *(head for head, _ in columns)], rows)
+
+
+def _cell(number: float | str | None, quantity: str, digits: int) -> str | None:
+    """Return a number [SI] as text in the unit in which a quantity is shown; texts and None are returned unchanged."""
+    if number is None or isinstance(number, str):
+        return number
+    text = f"{display_value(number, quantity):.{digits}f}"
+    # Without the sign of what is rounded to zero.
+    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def strides_csv(result: WalkResult) -> bytes:
@@ -242,7 +358,7 @@ def strides_csv(result: WalkResult) -> bytes:
     count = result.strides["gas"].size
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
     columns |= {f"{name} [{quantity.unit}]": result.strides[name] for name, quantity in PER_STRIDE.items()}
-    return csv_of(columns)
+    return _csv(columns)
 
 
 def mean_stride_csv(result: WalkResult) -> bytes:
@@ -252,4 +368,15 @@ def mean_stride_csv(result: WalkResult) -> bytes:
     for name, curves in result.averages.items():
         columns[f"{name} [{curves.unit}]"] = curves.mean
         columns[f"{name}_deviation [{curves.unit}]"] = curves.deviation
-    return csv_of(columns)
+    return _csv(columns)
+
+
+def _csv(columns: Mapping[str, Iterable[Any]]) -> bytes:
+    """Return simulated columns as CSV; a missing value is an empty cell."""
+    lists = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
+    rows = (
+        ",".join("" if value is None else value if isinstance(value, str) else repr(value) for value in row)
+        for row in zip(*lists, strict=True)
+    )
+    lines = ["# simulated: a model's own output, not measured", ",".join(columns), *rows]
+    return ("\n".join(lines) + "\n").encode()

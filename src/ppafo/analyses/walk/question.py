@@ -1,7 +1,8 @@
-"""Command ``walk``: walking with the device, without it, and healthy."""
+"""Command ``walk``: walking with the device, without it, and healthy; default output folder."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,6 +13,9 @@ from ppafo.progress import Progress, Report, report_nothing
 if TYPE_CHECKING:
     from ppafo.report.finding import Finding
     from ppafo.simulation.scenario import Scenario
+
+_LONG_WALK = 12.0
+"""Duration [min] above which a walk reports its progress."""
 
 
 @checked
@@ -61,11 +65,18 @@ def walk_with_and_without(
     return replace(finding, passed=finding.passed and follows) if check else finding
 
 
-_LONG_WALK = 12.0
-"""Duration [min] above which a walk reports its progress."""
-
-
 def _report_walk(report: Report, done: float, total: float) -> None:
     """Report the progress of a long walk [min]."""
     if total > _LONG_WALK:
         report(Progress("walking", round(done), round(total), noun="min"))
+
+
+def default_folder(values: Mapping[str, Any]) -> Path:
+    """Return the default output folder of the command, named after the configuration."""
+    from ppafo.walking.loading import load_walk
+    from ppafo.walking.motion import walk_of
+
+    configuration = load_walk(values["scenario"], values["overrides"], gait=values["gait"], bottle=values["bottle"])
+    bottled = walk_of(configuration).bottle
+    along = "" if bottled is None else f"-{bottled.bottle.name}"
+    return Path("out") / f"walk-{configuration.name}{along}"
