@@ -47,6 +47,6 @@ def test_a_line_counts_as_the_orifice_of_the_rig_does() -> None:
 def test_a_laminar_gap_passes_its_coefficient_times_the_difference_of_the_squares_at_any_pressures() -> None:
     gap = LaminarLeak(1.0e-15)
     for first, second in ((6.0e5, 1.0e5), (2.0e5, 3.0e5), (3.0e5, 2.9995e5), (3.0e5, 3.0e5 - 1.0), (2.0e5, 2.0e5)):
-        through = orifice_flow(first, second, leak_with_gap(1.0e-10, first, second, CURVE, gap), CURVE)
-        alone = orifice_flow(first, second, 1.0e-10, CURVE)
+        through = orifice_flow(first, second, leak_with_gap(1.0e-10, first, second, CURVE, gap), 1.0, CURVE)[0]
+        alone = orifice_flow(first, second, 1.0e-10, 1.0, CURVE)[0]
         assert through - alone == pytest.approx(1.0e-15 * (first**2 - second**2), rel=1e-9, abs=1e-22)

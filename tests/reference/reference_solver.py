@@ -180,8 +180,6 @@ def load_right_hand_side(run: Run) -> RightHandSide:
     groups = (
         run.plant,
         run.thermal,
-        run.valve_orifice,
-        run.leak_orifice,
         run.valve,
         run.path,
         *(() if run.leg is None else (run.leg.load, run.leg.shank)),

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from ppafo.engine.in_python import in_program
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.run import Run
-from ppafo.engine.scheme.pneumatics import StageFlows, plant_with_leak_at, stage_flows
+from ppafo.engine.scheme.pneumatics import GasFlows, flow_rates, gas_flows
 from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows
 from ppafo.model.plant import (
     ActuatorFunctions,
@@ -23,7 +23,7 @@ from ppafo.model.plant import (
     chamber_mass,
     driving_torque,
     holds_still,
-    vane_acceleration,
+    net_torque,
 )
 from ppafo.model.ports import friction_in_motion
 
@@ -42,11 +42,30 @@ class GasRates(NamedTuple):
     vented: float
 
 
-def flows_at(plant: PlantParameters, openings: Openings, pressure_1: float, pressure_2: float) -> StageFlows:
+def flows_at(plant: PlantParameters, openings: Openings, pressure_1: float, pressure_2: float) -> GasFlows:
     """Flows [kg/s] through both ports and the leakage, for valve openings [-]. Equations (6) to (8)."""
-    leaking = plant_with_leak_at(plant, pressure_1, pressure_2)
     port_1, port_2 = blended_ports(plant, openings)
-    return stage_flows(leaking, pressure_1, pressure_2, port_1, port_2, blended_port_flow)
+    return gas_flows(plant, pressure_1, pressure_2, port_1, port_2, blended_port_flow).flows
+
+
+def chambers_in_motion(
+    plant: PlantParameters, motion: tuple[float, float], pressures: tuple[float, float], *, parts: ActuatorFunctions
+) -> WarmChambers:
+    """Both chambers at an angle [rad] and rate [rad/s] and two absolute pressures [Pa]."""
+    angle, angular_velocity = motion
+    pressure_1, pressure_2 = pressures
+    now = parts.chambers(plant, angle, pressure_1, pressure_2)
+    less = parts.chambers(plant, angle - NEAR, pressure_1, pressure_2)
+    more = parts.chambers(plant, angle + NEAR, pressure_1, pressure_2)
+    per_angle = angular_velocity / (2.0 * NEAR)
+    return WarmChambers(
+        volume_1=now.volume_1,
+        volume_2=now.volume_2,
+        growth_1=(more.volume_1 - less.volume_1) * per_angle,
+        growth_2=(more.volume_2 - less.volume_2) * per_angle,
+        give_1=pressure_1 * now.compliance_1 / now.volume_1,
+        give_2=pressure_2 * now.compliance_2 / now.volume_2,
+    )
 
 
 def gas_rates(
@@ -64,26 +83,22 @@ def gas_rates(
     Without ``thermal`` the gas is isothermal. The pressures follow from the time derivative of equation (3), d(p V) =
     R T dm, where the volume of a compliant chamber also changes with its pressure.
     """
-    (angle, angular_velocity), (pressure_1, pressure_2), product = motion, pressures, plant.gas_product
-    now, less, more = (parts.chambers(plant, at, *pressures) for at in (angle, angle - NEAR, angle + NEAR))
-    per_angle = angular_velocity / (2.0 * NEAR)
-    growth_1, growth_2 = (more.volume_1 - less.volume_1) * per_angle, (more.volume_2 - less.volume_2) * per_angle
-    in_1, in_2, leak = flows_at(plant, openings, pressure_1, pressure_2)
+    (pressure_1, pressure_2), product = pressures, plant.gas_product
+    at = chambers_in_motion(plant, motion, pressures, parts=parts)
+    flowing = flows_at(plant, openings, pressure_1, pressure_2)
     if thermal is None:
-        gained_1, gained_2, warming_1, warming_2 = in_1.total - leak, in_2.total + leak, 0.0, 0.0
-        supplied = in_1.from_source + in_2.from_source
-        vented = supplied - in_1.total - in_2.total
+        flows = flow_rates(flowing)
+        gained_1, gained_2, supplied, warming_1, warming_2 = flows.mass_1, flows.mass_2, flows.supplied, 0.0, 0.0
+        vented = supplied - gained_1 - gained_2
     else:
-        content_1 = chamber_mass(pressure_1, now.volume_1, product)
-        content_2 = chamber_mass(pressure_2, now.volume_2, product)
+        content_1 = chamber_mass(pressure_1, at.volume_1, product)
+        content_2 = chamber_mass(pressure_2, at.volume_2, product)
         mass_1 = content_1 * thermal.temperature / temperatures[0]
         mass_2 = content_2 * thermal.temperature / temperatures[1]
-        give_1, give_2 = pressure_1 * now.compliance_1 / now.volume_1, pressure_2 * now.compliance_2 / now.volume_2
-        warm = WarmChambers(now.volume_1, now.volume_2, growth_1, growth_2, give_1, give_2)
         # Neither motion nor totals act on the rates of the gas: zeros stand for them.
         state = PlantState(*[0.0] * len(PlantState._fields))._replace(mass_1=content_1, mass_2=content_2)
         masses = ThermalState(*[0.0] * len(ThermalState._fields))._replace(mass_1=mass_1, mass_2=mass_2)
-        found = thermal_flows(thermal, state, masses, warm, in_1, in_2, leak)
+        found = thermal_flows(thermal, state, masses, at, flowing)
         gained_1, gained_2, supplied = found.content_1, found.content_2, found.supplied
         vented = supplied - found.mass_1 - found.mass_2
         # A temperature is the walls' times content over mass.
@@ -91,8 +106,8 @@ def gas_rates(
         warming_2 = temperatures[1] * (gained_2 / content_2 - found.mass_2 / mass_2)
         # The contents have the work of the moving wall in them: of equation (3) only the volumes are left.
     return GasRates(
-        pressure_1=(product * gained_1 - pressure_1 * growth_1) / (now.volume_1 + pressure_1 * now.compliance_1),
-        pressure_2=(product * gained_2 - pressure_2 * growth_2) / (now.volume_2 + pressure_2 * now.compliance_2),
+        pressure_1=(product * gained_1 - pressure_1 * at.growth_1) / (at.volume_1 * (1.0 + at.give_1)),
+        pressure_2=(product * gained_2 - pressure_2 * at.growth_2) / (at.volume_2 * (1.0 + at.give_2)),
         temperature_1=warming_1,
         temperature_2=warming_2,
         supplied=supplied,
@@ -117,11 +132,10 @@ def free_motion(
     """
     if way == 0.0:
         return 0.0, 0.0
-    torque = driving_torque(plant, angle, pressure_1, pressure_2, parts=parts) + added_torque
-    friction = way * friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2)
-    return angular_velocity, vane_acceleration(
-        torque, friction, plant.viscous_damping, plant.inertia, angle, angular_velocity
-    )
+    torque = driving_torque(plant, parts.torque(plant, angle, pressure_1, pressure_2), angle) + added_torque
+    friction = friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2)
+    net = net_torque(torque, way, friction, plant.viscous_damping, angle, angular_velocity)
+    return angular_velocity, net / plant.inertia
 
 
 def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float, float], float]:
@@ -134,7 +148,8 @@ def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float
     driving = in_program(driving_torque, program, run.effects)
 
     def torque(states: Mapping[str, Any], time: float, angle: float, pressure_1: float, pressure_2: float) -> float:
-        alone: float = driving(states, run.plant, angle, pressure_1, pressure_2, parts=program.functions)
+        actuator = program.actuator.torque(run.plant, angle, pressure_1, pressure_2)
+        alone: float = driving(states, run.plant, actuator, angle)
         return alone if run.leg is None else alone + torque_of_leg(program, run.leg, time, angle)
 
     return torque

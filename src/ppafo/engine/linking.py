@@ -8,7 +8,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.source_text import Replacements
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
-from ppafo.model.plant import PlantParameters, net_torque
+from ppafo.model.plant import PlantParameters, net_torque, viscous_torque
 from ppafo.model.valves.kind import valve_problem
 
 
@@ -46,7 +46,13 @@ def check_net_torque() -> None:
     ``load_torque`` is the load that friction and stops balance at rest: a spring missing there would move a joint at
     rest.
     """
-    at_rest = [net_torque(0.0, 0.0, 0.0, angle, 0.0) for angle in TEST_ANGLES]
+    at_rest = [net_torque(0.0, 0.0, 0.0, 0.0, angle, 0.0) for angle in TEST_ANGLES]
+    damping = viscous_torque(0.0, 0.0)
+    if damping != 0.0:
+        raise ProgramError(
+            f"{place_of(viscous_torque)}: viscous_torque is {damping:.4g} N m at rest, where there is none; subtract "
+            "this torque in load_torque of ppafo.model.ports"
+        )
     if any(at_rest):
         raise ProgramError(
             f"{place_of(net_torque)}: net_torque subtracts {-max(at_rest, key=abs):.4g} N m at rest, which friction "

@@ -14,7 +14,7 @@ from ppafo.engine.plain_python import place
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.actuators import functions_of_actuator
 from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
-from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
+from ppafo.engine.scheme.pneumatics import GasFlows, HeldChambers, SlopedFlows
 from ppafo.engine.step.lane import LaneResult, LaneTiming, NoParameters
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.kind import ActuatorModel
@@ -337,7 +337,7 @@ def groups_of(program: Program) -> Groups:
         "flowing": handed(SlopedFlows),
     }
     after = {
-        "passing": handed(StageFlows),
+        "passing": handed(GasFlows),
         "valve": given(program.valve.parameters),
         "valve_state": kept(program.valve.state),
         "shown": handed(program.valve.shown),

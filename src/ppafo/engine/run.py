@@ -17,7 +17,6 @@ from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
 from ppafo.model.columns import larger, truncated
 from ppafo.model.effects.kind import PlantSnapshot
-from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, ThermalParameters
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
@@ -93,8 +92,6 @@ class Run:
     program: Program
     plant: PlantParameters
     thermal: ThermalParameters | NoParameters
-    valve_orifice: ExactOrifice
-    leak_orifice: ExactOrifice
     initial: PlantState
     valve: Any
     controller: Any

@@ -7,9 +7,8 @@ import math
 from functools import lru_cache
 
 from ppafo.model.columns import over_runs, root
-from ppafo.model.elementary import power
 from ppafo.model.gas import critical_pressure_ratio
-from ppafo.model.orifice import TERMS, FlowCurve
+from ppafo.model.orifice import TERMS, FlowCurve, isentropic_flow_function, iso6358_flow_function
 
 Terms = tuple[float, float, float, float, float, float, float]
 """Coefficients of a series, ``TERMS`` of them."""
@@ -54,17 +53,14 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
 
 def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
     """Coefficients for a gas that interpolate the exact function of equation (7) at nodes in the subsonic region."""
-    k = heat_capacity_ratio
-    critical_gap = 1.0 - critical_pressure_ratio(k)
-    # Choked flow over the factor in front of the subsonic form: the curve is 1 where the flow is choked.
-    choked = math.sqrt(0.5 * (k - 1.0) * power(2.0 / (k + 1.0), (k + 1.0) / (k - 1.0)))
+    critical_gap = 1.0 - critical_pressure_ratio(heat_capacity_ratio)
     gaps, values = NODES, NODES
     for index in range(TERMS):
         gap = critical_gap * NODES[index]
+        value = isentropic_flow_function(1.0 - gap, heat_capacity_ratio)
         # Divided by the root of the gap, which the curve has as a factor: what is left to fit is smooth at equal
         # pressures.
-        value = power(1.0 - gap, 1.0 / k) * math.sqrt((1.0 - power(1.0 - gap, (k - 1.0) / k)) / gap)
-        gaps, values = _with_item(gaps, index, gap), _with_item(values, index, value / choked)
+        gaps, values = _with_item(gaps, index, gap), _with_item(values, index, value / math.sqrt(gap))
     return _polynomial_through(gaps, values)
 
 
@@ -72,7 +68,8 @@ def _iso6358_coefficients() -> Terms:
     """Coefficients for a critical ratio of 0, where the exact function is the square root of (1 - r)(1 + r)."""
     values = NODES
     for index in range(TERMS):
-        values = _with_item(values, index, math.sqrt(2.0 - NODES[index]))
+        gap = NODES[index]
+        values = _with_item(values, index, iso6358_flow_function(1.0 - gap, 0.0) / math.sqrt(gap))
     return _polynomial_through(NODES, values)
 
 

@@ -59,12 +59,6 @@ def choked_flow_constant(heat_capacity_ratio: float, gas_constant: float, temper
     return root(k / (gas_constant * temperature) * choked)
 
 
-def subsonic_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
-    """Constant C2 [s/m] of equation (7); ``gas_constant`` is R/M [J/(kg K)]."""
-    k = heat_capacity_ratio
-    return math.sqrt(2.0 * k / (gas_constant * temperature * (k - 1.0)))
-
-
 def wall_exchange(
     heat_transfer_coefficient: float, area_per_volume: float, heat_capacity_ratio: float, gas_constant: float
 ) -> float:

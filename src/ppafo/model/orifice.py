@@ -11,7 +11,8 @@ from typing import Annotated, NamedTuple
 
 from ppafo.constants import STANDARD_REFERENCE_DENSITY_AIR, STANDARD_REFERENCE_TEMPERATURE
 from ppafo.model.columns import root
-from ppafo.model.gas import choked_flow_constant
+from ppafo.model.elementary import power
+from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
 
 TERMS = 7
 """Number of coefficients of the polynomial of a flow curve."""
@@ -32,16 +33,21 @@ class FlowCurve(NamedTuple):
 
 def isentropic_flow_function(pressure_ratio: float, heat_capacity_ratio: float) -> float:
     """Flow divided by choked flow [-] of an isentropic nozzle, for downstream over upstream pressure. Eqs (6), (7)."""
+    critical = critical_pressure_ratio(heat_capacity_ratio)
+    within = min(max(pressure_ratio, critical), 1.0)
+    return _subsonic(within, heat_capacity_ratio) / _subsonic(critical, heat_capacity_ratio)
+
+
+def _subsonic(pressure_ratio: float, heat_capacity_ratio: float) -> float:
+    """Factor [-] of equation (7) behind ``C2 P_up``."""
     k = heat_capacity_ratio
-    critical = (2.0 / (k + 1.0)) ** (k / (k - 1.0))
-    if pressure_ratio <= critical:
-        return 1.0
-    if pressure_ratio >= 1.0:
-        return 0.0
-    subsonic = math.sqrt(2.0 * k / (k - 1.0)) * pressure_ratio ** (1.0 / k)
-    subsonic *= math.sqrt(1.0 - pressure_ratio ** ((k - 1.0) / k))
-    choked = math.sqrt(k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
-    return float(subsonic / choked)
+    return power(pressure_ratio, 1.0 / k) * math.sqrt(1.0 - power(pressure_ratio, (k - 1.0) / k))
+
+
+def subsonic_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
+    """Constant C2 [s/m] of equation (7), with which it meets (6); ``gas_constant`` is R/M [J/(kg K)]."""
+    k = heat_capacity_ratio
+    return choked_flow_constant(k, gas_constant, temperature) / _subsonic(critical_pressure_ratio(k), k)
 
 
 def iso6358_flow_function(pressure_ratio: float, critical_ratio: float) -> float:
@@ -54,45 +60,7 @@ def iso6358_flow_function(pressure_ratio: float, critical_ratio: float) -> float
     return math.sqrt(1.0 - position * position)
 
 
-class ExactOrifice(NamedTuple):
-    """Orifice with an exact flow function: conductance [kg/(s Pa)], and form of the flow function.
-
-    ``is_iso6358`` is 1 for the ISO 6358 form and 0 for the isentropic one; ``number`` is the critical ratio in the
-    first case and the heat capacity ratio in the second.
-    """
-
-    conductance: float
-    is_iso6358: float
-    number: float
-    linear_ratio: float
-
-
-def exact_flow(pressure_a: float, pressure_b: float, conductance: float, orifice: ExactOrifice) -> float:
-    """Mass flow from a to b [kg/s] through a conductance [kg/(s Pa)] with the exact flow function of an orifice.
-
-    Positive from a to b, with a straight line near equal pressures. Equations (6), (7).
-    """
-    upstream = max(pressure_a, pressure_b)
-    ratio = min(pressure_a, pressure_b) / upstream
-    inside = min(ratio, orifice.linear_ratio)
-    if orifice.is_iso6358 > 0.5:
-        value = iso6358_flow_function(inside, orifice.number)
-    else:
-        value = isentropic_flow_function(inside, orifice.number)
-    # The slope of both functions is infinite at equal pressures: ISO 6358 has a straight line there, and so the gas no
-    # infinite stiffness.
-    value = value * min((1.0 - ratio) / (1.0 - orifice.linear_ratio), 1.0)
-    flow = conductance * upstream * value
-    return flow if pressure_a >= pressure_b else -flow
-
-
-def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
-    """Flow divided by choked flow [-] by a fitted curve; the ratio of downstream to upstream pressure is at most 1."""
-    value, _ = fitted_flow_slope(pressure_ratio, curve)
-    return value
-
-
-def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:
+def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:
     """Flow function [-] and slope with respect to the pressure ratio [-], at most 0, of a fitted curve.
 
     The slope is the derivative; within twice the linear region it is the slope of the secant to equal pressures.
@@ -123,36 +91,17 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
     return value * min(gap * curve.linear_slope, 1.0), -slope
 
 
-def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve) -> float:
-    """Mass flow from a to b [kg/s], positive from a to b, antisymmetric under exchange. Eqs (6), (7)."""
-    return check_valve_flow(pressure_a, pressure_b, conductance, 1.0, curve)
-
-
-def check_valve_flow(
-    pressure_a: float, pressure_b: float, conductance: float, is_relieving: float, curve: FlowCurve
-) -> float:
-    """Mass flow from a to b [kg/s] with a check valve: no backflow if ``is_relieving`` is 0. Eqs (6) to (8)."""
-    upstream = max(pressure_a, pressure_b)
-    ratio = min(pressure_a, pressure_b) / upstream
-    flow = conductance * upstream * fitted_flow_function(ratio, curve)
-    return flow if pressure_a >= pressure_b else -is_relieving * flow
-
-
-def orifice_flow_slopes(
-    pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve
-) -> tuple[float, float, float]:
-    """Mass flow from a to b [kg/s] and its derivatives with respect to both pressures [kg/(s Pa)]. Eqs (6), (7)."""
-    return check_valve_flow_slopes(pressure_a, pressure_b, conductance, 1.0, curve)
-
-
-def check_valve_flow_slopes(
+def orifice_flow(
     pressure_a: float, pressure_b: float, conductance: float, is_relieving: float, curve: FlowCurve
 ) -> tuple[float, float, float]:
-    """Return ``check_valve_flow`` with its derivatives with respect to both pressures [kg/(s Pa)]."""
+    """Mass flow from a to b [kg/s] and its derivatives with respect to both pressures [kg/(s Pa)]. Eqs (6) to (8).
+
+    Positive from a to b, antisymmetric under exchange; no backflow if ``is_relieving`` is 0, as behind a check valve.
+    """
     forward = pressure_a >= pressure_b
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
-    value, slope = fitted_flow_slope(ratio, curve)
+    value, slope = fitted_flow_function(ratio, curve)
     flow = conductance * upstream * value
     # d(C p_up psi(p_dn / p_up)) by p_up: the ratio falls as the upstream pressure grows.
     by_upstream = conductance * (value - ratio * slope)

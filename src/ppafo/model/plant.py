@@ -6,8 +6,8 @@ mass.
 
 Last the connections of a chamber during one step, equation (8), for a steady or a changing valve. A ``SinglePort``
 connects a chamber to one node, source or atmosphere. A ``BlendedPort`` connects the chamber to both, each with the mean
-opening over the step, for a valve that moves or switches within a step. Flows are positive into the chamber. Both kinds
-of port have the same two functions; the engine is composed with one pair. A source does not take gas back, unless its
+opening over the step, for a valve that moves or switches within a step. Flows are positive into the chamber; the
+engine is composed with the function of one kind of port. A source does not take gas back, unless its
 regulator is a relieving one: a flow back into a node is multiplied by ``is_relieving``, 1 for the atmosphere and for a
 relieving supply, 0 for a supply with a check valve.
 """
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.columns import Numeric
 from ppafo.model.elementary import QUARTER_TURN, TURNS_OF_RADIAN, sine_and_cosine_of_turns
-from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_slopes, orifice_flow, orifice_flow_slopes
+from ppafo.model.orifice import FlowCurve, orifice_flow
 from ppafo.model.ports import exhaust_path, load_torque, supply_path
 
 
@@ -147,52 +147,46 @@ def torque_less_loads(torque: float, angle: float) -> float:
 
 
 def viscous_torque(viscous_damping: float, angular_velocity: float) -> float:
-    """Viscous torque [N m] of a damping [N m s/rad] at an angular velocity [rad/s], to be subtracted. Equation (1)."""
+    """Viscous torque [N m] of a damping [N m s/rad] at an angular velocity [rad/s], to be subtracted. Equation (1).
+
+    A step is implicit in it, with its change up to 1 rad/s as the slope.
+    """
     return viscous_damping * angular_velocity
 
 
-def net_torque(driving: float, friction: float, damping: float, angle: float, angular_velocity: float) -> float:
-    """Net torque [N m] that accelerates the joint: the right-hand side of equation (1), defined here only.
+def direction_of(value: float) -> float:
+    """Sign of a number [-]: 1, -1 or 0."""
+    return (1.0 if value > 0.0 else 0.0) - (1.0 if value < 0.0 else 0.0)
+
+
+def net_torque(
+    driving: float, way: float, dynamic_torque: float, viscous_damping: float, angle: float, angular_velocity: float
+) -> float:
+    """Net torque [N m] that accelerates the joint: equations (1) and (10), defined here only.
 
     ``driving`` [N m] is the torque minus the loads at rest (``torque_less_loads``). The additional load torque of a
-    moving joint is subtracted here, as are ``friction`` [N m] and viscous ``damping`` [N m], positive along the motion;
-    the damping is 0 for an implicit step, which solves for it.
+    moving joint is subtracted here, as are friction and viscous torque. ``way`` is the direction of motion, 1 or -1,
+    or that in which a joint at rest starts to move, 0 if it does not.
     """
+    # Along the motion, because it is subtracted: with the sign of the paper friction would drive the joint.
+    friction = way * dynamic_torque
+    damping = viscous_torque(viscous_damping, angular_velocity)
     moving = load_torque(0.0, angle, angular_velocity) - load_torque(0.0, angle, 0.0)
     return driving - friction - moving - damping
 
 
-def vane_acceleration(
-    driving: float, friction: float, viscous_damping: float, inertia: float, angle: float, angular_velocity: float
-) -> float:
-    """Angular acceleration [rad/s^2] of a moving joint; arguments as in ``net_torque``. Equation (1)."""
-    damping = viscous_torque(viscous_damping, angular_velocity)
-    return net_torque(driving, friction, damping, angle, angular_velocity) / inertia
-
-
-def sliding_friction(angular_velocity: float, dynamic_torque: float) -> float:
-    """Friction torque [N m] of a moving vane, with the sign of the angular velocity [rad/s]; subtracted. Equation (10).
-
-    The paper reports the opposite sign although the friction is subtracted there too, which would drive the motion.
-    """
-    return dynamic_torque if angular_velocity > 0.0 else (-dynamic_torque if angular_velocity < 0.0 else 0.0)
-
-
-def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at_upper_stop: bool) -> bool:
-    """Return whether a vane at rest stays at rest: static friction or a stop balances the net torque [N m]."""
+def holds_still(torque: float, static_torque: float, at_lower_stop: bool, at_upper_stop: bool) -> bool:
+    """Return whether a vane at rest stays at rest: static friction or a stop balances the torque [N m]."""
     # Equal torques hold: without friction and torque a resting vane rests.
-    within = abs(net_torque) <= static_torque
-    against_stop = (at_lower_stop and net_torque < 0.0) or (at_upper_stop and net_torque > 0.0)
+    within = abs(torque) <= static_torque
+    against_stop = (at_lower_stop and torque < 0.0) or (at_upper_stop and torque > 0.0)
     return within or against_stop
 
 
-def driving_torque(
-    plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float, *, parts: ActuatorFunctions
-) -> float:
-    """Torque on a vane at rest, before friction [N m], positive in plantarflexion. Equations (1), (2)."""
-    actuator = parts.torque(plant, angle, pressure_1, pressure_2)
+def driving_torque(plant: PlantParameters, torque: float, angle: float) -> float:
+    """Torque on a vane at rest, before friction [N m], of the actuator's ``torque`` [N m]. Equation (1)."""
     gravity = gravity_torque(angle, plant.gravity_torque)
-    return torque_less_loads(actuator - gravity - plant.external_torque, angle)
+    return torque_less_loads(torque - gravity - plant.external_torque, angle)
 
 
 def chamber_1_volume(angle: Numeric, angle_min: float, displacement_per_radian: float, dead_volume: float) -> Numeric:
@@ -306,13 +300,11 @@ class PortFlow(NamedTuple):
     from_source: float
 
 
-class PortFlowSlopes(NamedTuple):
-    """``PortFlow`` with the derivatives with respect to the chamber's pressure [kg/(s Pa)]."""
+class PortSlopes(NamedTuple):
+    """Derivatives of a ``PortFlow`` with respect to the chamber's pressure [kg/(s Pa)]."""
 
     total: float
-    total_slope: float
     from_source: float
-    source_slope: float
 
 
 def admitted_flow(flow: float, is_relieving: float) -> float:
@@ -320,37 +312,18 @@ def admitted_flow(flow: float, is_relieving: float) -> float:
     return max(flow, flow * is_relieving)
 
 
-def single_port_flow(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlow:
-    """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through one open path. Equations (6) to (8)."""
-    flow = check_valve_flow(port.node_pressure, pressure, port.conductance, port.is_relieving, curve)
-    return PortFlow(flow, flow * port.source_fraction)
+def single_port_flow(pressure: float, port: SinglePort, curve: FlowCurve) -> tuple[PortFlow, PortSlopes]:
+    """Flow into a chamber at ``pressure`` [Pa absolute] through one open path, and its derivatives. Eqs (6) to (8)."""
+    flow, _, slope = orifice_flow(port.node_pressure, pressure, port.conductance, port.is_relieving, curve)
+    share = port.source_fraction
+    return PortFlow(flow, flow * share), PortSlopes(slope, slope * share)
 
 
-def single_port_flow_slopes(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlowSlopes:
-    """Flow of ``single_port_flow`` with its derivatives [kg/(s Pa)]."""
-    flow, _, slope = check_valve_flow_slopes(port.node_pressure, pressure, port.conductance, port.is_relieving, curve)
-    return PortFlowSlopes(
-        total=flow,
-        total_slope=slope,
-        from_source=flow * port.source_fraction,
-        source_slope=slope * port.source_fraction,
-    )
-
-
-def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlow:
-    """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through two open paths. Equations (6) to (8)."""
-    source = check_valve_flow(port.source_pressure, pressure, port.source_conductance, port.is_relieving, curve)
-    # The atmosphere gives gas as it takes it: no check valve on this path.
-    vent = orifice_flow(port.vent_pressure, pressure, port.vent_conductance, curve)
-    return PortFlow(source + vent, source)
-
-
-def blended_port_flow_slopes(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlowSlopes:
-    """Flow of ``blended_port_flow`` with its derivatives [kg/(s Pa)]."""
-    source, _, source_slope = check_valve_flow_slopes(
+def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> tuple[PortFlow, PortSlopes]:
+    """Flow into a chamber at ``pressure`` [Pa absolute] through two open paths, and its derivatives. Eqs (6) to (8)."""
+    source, _, source_slope = orifice_flow(
         port.source_pressure, pressure, port.source_conductance, port.is_relieving, curve
     )
-    vent, _, vent_slope = orifice_flow_slopes(port.vent_pressure, pressure, port.vent_conductance, curve)
-    return PortFlowSlopes(
-        total=source + vent, total_slope=source_slope + vent_slope, from_source=source, source_slope=source_slope
-    )
+    # The atmosphere gives gas as it takes it: no check valve on this path.
+    vent, _, vent_slope = orifice_flow(port.vent_pressure, pressure, port.vent_conductance, 1.0, curve)
+    return PortFlow(source + vent, source), PortSlopes(source_slope + vent_slope, source_slope)

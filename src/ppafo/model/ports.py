@@ -28,7 +28,7 @@ def exhaust_path(conductance: float) -> float:
 
 
 def leakage_path(conductance: float, pressure_1: float, pressure_2: float, curve: FlowCurve) -> float:
-    """Conductance [kg/(s Pa)] of the leak between the chambers, given its orifice conductance; absolute pressures [Pa].
+    """Conductance [kg/(s Pa)] of the leak between the chambers, given its orifice's; pressures [Pa]. Equation (8).
 
     The flow is the flow of an orifice with this conductance and the flow function of ``curve``.
     """

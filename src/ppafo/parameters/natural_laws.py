@@ -114,10 +114,10 @@ def valve_departure(model: ValveModel, settings: Any, plant: Any) -> Departure:
                 shown, state = model.advance(valve, state, command, time, part)
                 time, parts = time + part, parts + 1
             ports = model.connect(plant, shown)
-            flows.append([model.port_flow(pressure, port, plant.valve_curve).total for port in ports])
+            flows.append([model.port_flow(pressure, port, plant.valve_curve)[0].total for port in ports])
         openings = model.instant(valve, model.settle(valve, state, command, time), command)
         ports = blended_ports(plant, openings)
-        instant = [blended_port_flow(pressure, port, plant.valve_curve).total for port in ports]
+        instant = [blended_port_flow(pressure, port, plant.valve_curve)[0].total for port in ports]
         for number, (last, former, other) in enumerate(zip(flows[-1], flows[-2], instant, strict=True), 1):
             if parts < _MOST_PARTS and abs(last - former) <= _STEADY * full:
                 text = (

@@ -16,17 +16,16 @@ from ppafo.documents.json_text import fields_of, plain
 from ppafo.errors import ParameterError, SimulationError
 from ppafo.model.catalog import VALVES
 from ppafo.model.gas import temperature_flow_factor
-from ppafo.model.orifice import exact_flow
+from ppafo.model.orifice import FlowCurve, orifice_flow
 from ppafo.model.valves.proportional import spool_position
 from ppafo.parameters.device import VANE, Device, SonicOrifice
 from ppafo.parameters.loading import load_device, load_parameter_set
 from ppafo.parameters.overrides import read_overrides
-from ppafo.parameters.plant import valve_settings
+from ppafo.parameters.plant import plant_parameters, valve_settings
 from ppafo.rig.preset import PREFIX, Preset, list_presets, load_preset
 from ppafo.rig.sensors import SENSORS, random_stream, read_off
 from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.simulation.plan import exact_orifice
 from ppafo.simulation.scenario import LARGEST_SEED, UNITS, Scenario, vane_motion
 from ppafo.simulation.simulate import simulate
 from ppafo.version import __version__
@@ -134,10 +133,10 @@ def _valve_map(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
 
 def _steady_leak(device: Device, _preset: Preset, _seed: int) -> dict[str, Floats]:
     """Mass flow [kg/s] that maintains the pressure in chamber 1, with chamber 2 at the atmosphere."""
-    ambient, orifice = device.supply.atmospheric_pressure, exact_orifice(device.actuator.leak, device)
+    ambient, plant = device.supply.atmospheric_pressure, plant_parameters(device)
     levels = ambient + np.tile(np.arange(5.0, 85.0, 5.0) * PASCALS_PER_PSI, 2)
     laminar = device.effects.get("laminar_leak", {}).get("coefficient", 0.0)
-    through = [exact_flow(level, ambient, orifice.conductance, orifice) for level in levels.tolist()]
+    through = [_flow(level, ambient, plant.leak_conductance, plant.leak_curve) for level in levels.tolist()]
     return {
         "pressure_1": levels,
         "pressure_2": np.full(levels.size, ambient),
@@ -145,10 +144,15 @@ def _steady_leak(device: Device, _preset: Preset, _seed: int) -> dict[str, Float
     }
 
 
+def _flow(upstream: float, downstream: float, conductance: float, curve: FlowCurve) -> float:
+    flow, _, _ = orifice_flow(upstream, downstream, conductance, 1.0, curve)
+    return flow
+
+
 def _valve_flow(device: Device, preset: Preset, upstream: float, downstream: float, opening: float) -> float:
     """Mass flow [kg/s] of the valve at two pressures [Pa] and an opening [-], for the gas in the flow meter."""
-    orifice = exact_orifice(device.valve.orifice, device)
-    flow = exact_flow(upstream, downstream, opening * orifice.conductance, orifice)
+    plant = plant_parameters(device)
+    flow = _flow(upstream, downstream, opening * plant.valve_conductance, plant.valve_curve)
     warmer = device.gas.temperature + preset.values["bench.gas_difference"]
     return flow * temperature_flow_factor(device.gas.temperature, warmer)
 

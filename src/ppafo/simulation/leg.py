@@ -87,7 +87,7 @@ def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str,
         foot = foot_load(0.0, 0.0, *of_foot, carried.shank_length)
         now = shank_over_samples(kind, leg.shank, times)
         added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (leg.load, foot))
-        net = net_torques(run, rows, torque + added - plant.external_torque)
+        net = net_torques(run, rows, torque + added)
         # A vane at rest is held by friction or a stop.
         acceleration = np.where(rows["state.angular_velocity"] != 0.0, net / plant.inertia, 0.0)
         return np.asarray(foot.inertia * acceleration - needed + plant.external_torque)

@@ -26,13 +26,12 @@ from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import Problem, at, choose, first, larger, over_runs, rounded_up, smaller, truncated, whole
 from ppafo.model.controlled import OF_TORQUE, TORQUE, error_functions
 from ppafo.model.gas import wall_exchange
-from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
-from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
+from ppafo.parameters.device import Device, Gas
 from ppafo.parameters.effects import effect_rows, effects_of
-from ppafo.parameters.plant import first_settings, orifice_conductance, plant_parameters, valve_settings
+from ppafo.parameters.plant import first_settings, plant_parameters, valve_settings
 from ppafo.simulation.profiles import profile_bounds, profile_parameters
 from ppafo.simulation.scenario import GasModel, ProfileChoice, Scenario, vane_motion
 
@@ -147,8 +146,6 @@ def compose_run(
         thermal=NoParameters()
         if components.thermal is None
         else thermal_gas(components.thermal, components.device.gas),
-        valve_orifice=exact_orifice(components.device.valve.orifice, components.device),
-        leak_orifice=exact_orifice(components.device.actuator.leak, components.device),
         initial=initial_state_of(plant),
         valve=over_runs(lambda *values: components.valve.prepare(type(settings)(*values)), *settings),
         controller=controller,
@@ -319,16 +316,6 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     pressures = scenario.initial.pressure_1, scenario.initial.pressure_2
     model = ACTUATORS[scenario.device.actuator.kind].model
     return state_with_volumes(plant, angle, rate, *volumes_of(model, plant, angle, *pressures), *pressures)
-
-
-def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifice:
-    """Orifice with the exact flow function, for the reference solver."""
-    return ExactOrifice(
-        conductance=orifice_conductance(orifice, device.gas),
-        is_iso6358=float(isinstance(orifice, SonicOrifice)),
-        number=orifice.critical_ratio if isinstance(orifice, SonicOrifice) else device.gas.heat_capacity_ratio,
-        linear_ratio=device.flow.linear_ratio,
-    )
 
 
 class StepCounts(NamedTuple):

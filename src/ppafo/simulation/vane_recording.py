@@ -15,7 +15,7 @@ from ppafo.metrics import evaluate
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import gravity_torque, net_torque, sliding_friction, torque_less_loads, viscous_torque
+from ppafo.model.plant import direction_of, driving_torque, net_torque
 from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
@@ -33,8 +33,7 @@ def measured_vane(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str
         if path is None:
             return np.full(times.size, plant.external_torque)
         acceleration = profile_values(path, times)[2]
-        gravity = over_samples(gravity_torque, rows["state.angle"], plant.gravity_torque)
-        return np.asarray(net_torques(run, rows, torque - gravity) - plant.inertia * acceleration)
+        return np.asarray(net_torques(run, rows, torque) - plant.inertia * acceleration)
 
     return measured(scenario, run, times, rows, external_torque)
 
@@ -120,16 +119,13 @@ def device_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str,
 
 
 def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
-    """Net torque [N m] on a vane at each sample; ``torque`` [N m] is the driving torque before loads. Equation (1)."""
-    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    largest: Any = run.plant.dynamic_torque
-    if "friction_in_motion" in run.program.ports_with_laws:
-        pressures = pressures_of(run.program.actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
-        largest = _with_effects(run, rows, friction_in_motion, largest, rate, *pressures)
-    friction = over_samples(sliding_friction, rate, 1.0) * largest
-    driving = _with_effects(run, rows, torque_less_loads, torque, angle)
-    damping = over_samples(viscous_torque, run.plant.viscous_damping, rate)
-    return np.asarray(_with_effects(run, rows, net_torque, driving, friction, damping, angle, rate))
+    """Net torque [N m] on a vane at each sample; ``torque`` [N m] is the actuator's. Equation (1)."""
+    angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
+    pressures = pressures_of(run.program.actuator, plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+    sliding = _with_effects(run, rows, friction_in_motion, plant.dynamic_torque, rate, *pressures)
+    driving = _with_effects(run, rows, driving_torque, plant, torque, angle)
+    way = over_samples(direction_of, rate)
+    return np.asarray(_with_effects(run, rows, net_torque, driving, way, sliding, plant.viscous_damping, angle, rate))
 
 
 def _with_effects(run: Run, rows: Mapping[str, Floats], function: PlainFunction, *given: Any) -> Any:

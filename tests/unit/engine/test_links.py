@@ -182,9 +182,9 @@ def test_an_effect_that_cannot_act_says_why(change: dict[str, Any], said: str) -
     assert bool(problem) == bool(said)
 
 
-def sprung(driving: float, friction: float, damping: float, angle: float, angular_velocity: float) -> float:
+def sprung(driving: float, way: float, sliding: float, damping: float, angle: float, rate: float) -> float:
     """Equation (1) with a spring in it."""
-    return driving - friction - damping - 2.0 * (angle - 1.0)
+    return driving - way * sliding - damping * rate - 2.0 * (angle - 1.0)
 
 
 def test_a_spring_in_equation_1_is_refused_with_the_place_where_friction_knows_it(

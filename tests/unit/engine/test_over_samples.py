@@ -12,7 +12,7 @@ from ppafo.engine.led_leg import shank_over_samples
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.model.elementary import exponential, sine_and_cosine_of_turns
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot, torque_on_resting_foot
-from ppafo.model.plant import sliding_friction
+from ppafo.model.plant import direction_of
 
 COLUMN = np.concatenate([[0.0, -0.0, 0.25, 0.5, 1.0, 2.0], np.random.default_rng(1).uniform(-3.0, 3.0, 200)])
 KNOTS = np.concatenate([[0.0, 1.0], np.ravel([(0.1 * place, (-1.0) ** place) for place in range(1, 32)])])
@@ -44,8 +44,8 @@ def test_a_function_of_one_column_has_the_bits_of_each_value_whatever_its_form(f
 
 
 def test_friction_is_along_the_motion_and_none_at_rest() -> None:
-    alone = [sliding_friction(value, 0.3) for value in COLUMN.tolist()]
-    assert over_samples(sliding_friction, COLUMN, 0.3).tobytes() == np.array(alone).tobytes()
+    alone = [direction_of(value) for value in COLUMN.tolist()]
+    assert over_samples(direction_of, COLUMN).tobytes() == np.array(alone).tobytes()
 
 
 def test_a_shank_that_rests_puts_the_same_torque_on_a_foot_to_the_bit_as_one_that_might_move() -> None:

@@ -16,11 +16,10 @@ from ppafo.engine.scheme.pneumatics import (
     MovingGas,
     SlopedFlows,
     begin_moving_gas,
+    gas_flows,
     held_chambers,
     moving_change,
     second_moving_stage,
-    sloped_flows,
-    stage_flows,
 )
 from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, plant_at_line_pressures
 from ppafo.model.orifice import orifice_flow
@@ -31,7 +30,6 @@ from ppafo.model.plant import (
     chamber_pressures,
     chamber_volumes,
     single_port_flow,
-    single_port_flow_slopes,
 )
 from ppafo.model.regulator import LineState, SupplyLines, line_pressures, lines_at_start
 from ppafo.parameters import load_device
@@ -70,12 +68,12 @@ def open_ports(plant: PlantParameters) -> tuple[SinglePort, SinglePort]:
 def flowing_now(plant: PlantParameters, state: PlantState, ports: tuple[SinglePort, SinglePort]) -> SlopedFlows:
     """All flows of a state."""
     pressures = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
-    return sloped_flows(plant, *pressures, *ports, single_port_flow_slopes)
+    return gas_flows(plant, *pressures, *ports, single_port_flow)
 
 
 def end_of(plant: PlantParameters, begun: MovingGas, ports: tuple[SinglePort, SinglePort], step: float) -> GasChange:
     """What a step [s] adds [kg], from its first stage."""
-    flowing = stage_flows(plant, begun.still.end_1, begun.still.end_2, *ports, single_port_flow)
+    flowing = gas_flows(plant, begun.still.end_1, begun.still.end_2, *ports, single_port_flow).flows
     return moving_change(plant, begun.still, second_moving_stage(begun, flowing), step)
 
 
@@ -94,7 +92,7 @@ def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
         )
         ports = open_ports(plant_at_line_pressures(plant, lines, begun.lines.after))
         change = end_of(plant, begun.chambers, ports, step)
-        from_2 = single_port_flow(begun.chambers.still.end_2, ports[1], plant.valve_curve).from_source
+        from_2 = single_port_flow(begun.chambers.still.end_2, ports[1], plant.valve_curve)[0].from_source
         gas = end_lines(plant, lines, gas, begun, change, from_2, step)
         state = with_gas(state, change)
     return Filled(state, gas)
@@ -116,9 +114,9 @@ def solved(dorsiflexion: float, lines: SupplyLines) -> tuple[float, ...]:
     def rates(_time: float, y: np.ndarray) -> list[float]:
         chamber_1, chamber_2 = y[0] * plant.gas_product / volume_1, y[1] * plant.gas_product / volume_2
         line_1, line_2 = y[2] * plant.gas_product / lines.volume_1, y[3] * plant.gas_product / lines.volume_2
-        fed_1 = orifice_flow(line_1, chamber_1, plant.valve_conductance, plant.valve_curve)
-        fed_2 = orifice_flow(line_2, chamber_2, plant.valve_conductance, plant.valve_curve)
-        leak = orifice_flow(chamber_1, chamber_2, plant.leak_conductance, plant.leak_curve)
+        fed_1 = orifice_flow(line_1, chamber_1, plant.valve_conductance, 1.0, plant.valve_curve)[0]
+        fed_2 = orifice_flow(line_2, chamber_2, plant.valve_conductance, 1.0, plant.valve_curve)[0]
+        leak = orifice_flow(chamber_1, chamber_2, plant.leak_conductance, 1.0, plant.leak_curve)[0]
         bottle = regulator_flow(plant.supply_pressure, line_1, lines.droop_1, lines.largest_flow_1)
         level = min(plant.dorsiflexion_pressure, line_1)
         second = regulator_flow(level, line_2, lines.droop_2, lines.largest_flow_2)

@@ -12,10 +12,10 @@ from ppafo.model.plant import (
     actuator_torque,
     chamber_1_volume,
     chamber_2_volume,
+    direction_of,
     gravity_torque,
     holds_still,
-    sliding_friction,
-    vane_acceleration,
+    net_torque,
 )
 from ppafo.model.sensors import SensorParameters, measure, quantise, standard_noise
 from ppafo.parameters.loading import load_device
@@ -45,14 +45,9 @@ def test_gravity_is_a_cosine_at_every_angle_that_a_set_may_state(angle: float) -
     assert gravity_torque(angle, 0.6) == pytest.approx(-0.6 * math.cos(angle - math.pi / 2), abs=1e-7)
 
 
-@given(st.floats(-20.0, 20.0), st.floats(0.0, 1.0))
-def test_friction_never_adds_energy(angular_velocity: float, dynamic_torque: float) -> None:
-    assert sliding_friction(angular_velocity, dynamic_torque) * angular_velocity >= 0.0
-
-
-def test_friction_decelerates_a_vane_that_nothing_drives() -> None:
-    assert vane_acceleration(0.0, sliding_friction(1.0, 0.011), 0.032, 8.4e-3, 1.0, 1.0) < 0.0
-    assert vane_acceleration(0.0, sliding_friction(-1.0, 0.011), 0.032, 8.4e-3, 1.0, -1.0) > 0.0
+@given(st.floats(-20.0, 20.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_friction_and_damping_never_add_energy(rate: float, dynamic_torque: float, damping: float) -> None:
+    assert net_torque(0.0, direction_of(rate), dynamic_torque, damping, 1.0, rate) * rate <= 0.0
 
 
 def test_stop_holds_against_any_torque_towards_it_but_not_away_from_it() -> None:

@@ -84,9 +84,9 @@ def test_a_filling_behind_lines_is_that_of_an_ode_solver() -> None:
     def rates(_time: float, y: np.ndarray) -> list[float]:
         chamber_1, chamber_2 = y[0] * plant.gas_product / volume_1, y[1] * plant.gas_product / volume_2
         line = y[2] * plant.gas_product / fed.volume_1
-        into = orifice_flow(line, chamber_1, plant.valve_conductance, plant.valve_curve)
-        out = orifice_flow(chamber_2, plant.atmospheric_pressure, plant.valve_conductance, plant.valve_curve)
-        leak = orifice_flow(chamber_1, chamber_2, plant.leak_conductance, plant.leak_curve)
+        into = orifice_flow(line, chamber_1, plant.valve_conductance, 1.0, plant.valve_curve)[0]
+        out = orifice_flow(chamber_2, plant.atmospheric_pressure, plant.valve_conductance, 1.0, plant.valve_curve)[0]
+        leak = orifice_flow(chamber_1, chamber_2, plant.leak_conductance, 1.0, plant.leak_curve)[0]
         bottle = min(max((plant.supply_pressure - line) / fed.droop_1, 0.0), fed.largest_flow_1)
         return [into - leak, leak - out, bottle - into]
 

@@ -6,8 +6,8 @@ from typing import TypeVar
 from ppafo.analyses.reproduce.claim import Claim, Verdict
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ParameterError
-from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
-from ppafo.model.orifice import isentropic_flow_function
+from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
+from ppafo.model.orifice import isentropic_flow_function, subsonic_flow_constant
 from ppafo.parameters import ParameterSet, load_parameter_set
 from ppafo.parameters.audit.evidence import Evidence, ReportedRange, digits
 from ppafo.parameters.device import Gas

@@ -16,11 +16,11 @@ from ppafo.model.plant import (
     ActuatorFunctions,
     PlantParameters,
     PlantState,
+    direction_of,
     driving_torque,
     holds_still,
     net_torque,
     torque_less_loads,
-    vane_acceleration,
     viscous_torque,
 )
 from ppafo.model.ports import friction_at_rest, friction_in_motion, rebound
@@ -167,24 +167,28 @@ class PrescribedStep(NamedTuple):
     next_rate: float
 
 
-def direction_of(value: float) -> float:
-    """Sign of a number [-]: 1, -1 or 0."""
-    return (1.0 if value > 0.0 else 0.0) - (1.0 if value < 0.0 else 0.0)
-
-
 def clamp_angle(plant: PlantParameters, angle: float) -> float:
     """Return ``angle`` [rad] limited to the range between the stops."""
     return max(plant.angle_min, min(plant.angle_max, angle))
 
 
 def next_velocity(
-    plant: PlantParameters, angular_velocity: float, acceleration: float, torque: float, duration: float
+    plant: PlantParameters,
+    angular_velocity: float,
+    acceleration: float,
+    torque: float,
+    expected: float,
+    duration: float,
 ) -> float:
-    """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; final ``torque`` [N m] without damping."""
+    """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; ``torque`` [N m] is the net one at the end.
+
+    The torque is the one at an ``expected`` angular velocity [rad/s]; the viscous torque is that of the result.
+    """
     half = 0.5 * duration
     # Damping is implicit: a strongly damped vane settles instead of ringing.
+    slope = viscous_torque(plant.viscous_damping, 1.0)
     momentum = plant.inertia * (angular_velocity + half * acceleration)
-    return (momentum + half * torque) / (plant.inertia + half * plant.viscous_damping)
+    return (momentum + half * (torque + slope * expected)) / (plant.inertia + half * slope)
 
 
 def time_to_stop(distance: float, angular_velocity: float, acceleration: float) -> float:
@@ -229,17 +233,15 @@ def depart(
     waits = 0.0 if moving or leaves_at_once else max(0.0, min(1.0, waits))
     start_torque = torque + waits * change
     way = direction_of(departure.angular_velocity) if moving else way
-    sliding = way * friction.in_motion
     duration = step * (1.0 - departure.fraction) * (1.0 - waits)
     velocity = departure.angular_velocity
-    per_inertia = 1.0 / plant.inertia
-    damping = viscous_torque(plant.viscous_damping, velocity)
-    first = net_torque(start_torque, sliding, damping, departure.angle, velocity) * per_inertia
-    undamped = net_torque(next_torque, sliding, 0.0, departure.angle, velocity + duration * first)
-    last = undamped * per_inertia
-    next_rate = next_velocity(plant, velocity, first, undamped, duration)
-    # Exact for an acceleration that runs linearly from first to last.
-    travel = duration * velocity + duration * duration * (first + first + last) * SIXTH
+    sliding, damping = friction.in_motion, plant.viscous_damping
+    first = net_torque(start_torque, way, sliding, damping, departure.angle, velocity) / plant.inertia
+    expected = velocity + duration * first
+    net = net_torque(next_torque, way, sliding, damping, departure.angle, expected)
+    next_rate = next_velocity(plant, velocity, first, net, expected, duration)
+    # Exact for an acceleration that runs linearly from the first to the one that ends in this velocity.
+    travel = duration * SIXTH * (4.0 * velocity + 2.0 * next_rate + duration * first)
     goes = moving or leaves_at_once or leaves_later
     # A vane that turned once more inside the rest of a step stops there: the next step decides what it does.
     turned = next_rate * way <= 0.0
@@ -260,15 +262,14 @@ def begin_part(
     """
     velocity = state.angular_velocity
     pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
-    torque = driving_torque(plant, state.angle, pressure_1, pressure_2, parts=parts) + added_torque
+    actuator = parts.torque(plant, state.angle, pressure_1, pressure_2)
+    torque = driving_torque(plant, actuator, state.angle) + added_torque
     friction = friction_now(plant, velocity, pressure_1, pressure_2)
     stays = holds_still(torque, friction.at_rest, state.angle <= plant.angle_min, state.angle >= plant.angle_max)
     leaving = 0.0 if stays else direction_of(torque)
     way = direction_of(velocity) if velocity != 0.0 else leaving
-    sliding = vane_acceleration(
-        torque, way * friction.in_motion, plant.viscous_damping, plant.inertia, state.angle, velocity
-    )
-    acceleration = sliding if way != 0.0 else 0.0
+    net = net_torque(torque, way, friction.in_motion, plant.viscous_damping, state.angle, velocity)
+    acceleration = net / plant.inertia if way != 0.0 else 0.0
     distance = plant.angle_max - state.angle if way > 0.0 else state.angle - plant.angle_min
     gets_there = velocity * velocity + 2.0 * acceleration * way * distance >= 0.0
     impact = time_to_stop(distance, abs(velocity), acceleration * way)
@@ -299,11 +300,12 @@ def slide_part(
     """
     velocity, way = state.angular_velocity, begun.way
     next_1, next_2 = parts.pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
-    next_torque = driving_torque(plant, begun.next_angle, next_1, next_2, parts=parts) + added_torque
+    actuator = parts.torque(plant, begun.next_angle, next_1, next_2)
+    next_torque = driving_torque(plant, actuator, begun.next_angle) + added_torque
     next_rate = velocity + begun.acceleration * length
     friction = friction_now(plant, next_rate, next_1, next_2)
-    sliding_torque = net_torque(next_torque, way * friction.in_motion, 0.0, begun.next_angle, next_rate)
-    full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, length)
+    net = net_torque(next_torque, way, friction.in_motion, plant.viscous_damping, begun.next_angle, next_rate)
+    full_velocity = next_velocity(plant, velocity, begun.acceleration, net, next_rate, length)
     slides = way != 0.0 and full_velocity * way > 0.0
     thrown_back = rebound_velocity(plant, full_velocity, next_torque)
     slid_velocity = thrown_back if begun.meets_stop > 0.5 else full_velocity
@@ -358,9 +360,8 @@ def part_error(
     plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: float, length: float, *, parts: ActuatorFunctions
 ) -> float:
     """Ratio of the error of the angle at the end of a part [rad] to the allowed error [-]."""
-    friction, rate = begun.way * slid.friction.in_motion, slid.angular_velocity
-    damping = viscous_torque(plant.viscous_damping, rate)
-    last = net_torque(slid.torque, friction, damping, begun.next_angle, rate) * (1.0 / plant.inertia)
+    sliding, damping = slid.friction.in_motion, plant.viscous_damping
+    last = net_torque(slid.torque, begun.way, sliding, damping, begun.next_angle, slid.angular_velocity) / plant.inertia
     # A change of acceleration over the part bends the path by a sixth of it times the length squared.
     bent = abs(last - begun.acceleration) * length * length * SIXTH if begun.way != 0.0 else 0.0
     # The gas worked against a motion that did not happen: that is an error although the vane is where it is.
@@ -424,10 +425,8 @@ def begin_free(
     pressure_1, pressure_2 = parts.held_pressures(plant, held, state)
     torque = torque_less_loads(parts.torque(plant, state.angle, pressure_1, pressure_2), state.angle) + added_torque
     friction = friction_now(plant, velocity, pressure_1, pressure_2)
-    sliding = vane_acceleration(
-        torque, way * friction.in_motion, plant.viscous_damping, plant.inertia, state.angle, velocity
-    )
-    acceleration = sliding if way != 0.0 else 0.0
+    net = net_torque(torque, way, friction.in_motion, plant.viscous_damping, state.angle, velocity)
+    acceleration = net / plant.inertia if way != 0.0 else 0.0
     free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
     return FreeStep(free_angle, acceleration, torque)
 
@@ -454,8 +453,8 @@ def end_free(
     next_torque = torque_less_loads(parts.torque(plant, predicted, next_1, next_2), predicted) + added_torque
     next_rate = velocity + begun.acceleration * step
     friction = friction_now(plant, next_rate, next_1, next_2)
-    sliding_torque = net_torque(next_torque, way * friction.in_motion, 0.0, predicted, next_rate)
-    full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
+    net = net_torque(next_torque, way, friction.in_motion, plant.viscous_damping, predicted, next_rate)
+    full_velocity = next_velocity(plant, velocity, begun.acceleration, net, next_rate, step)
     # '&' and no branch: the step of a walk runs on all lanes.
     slides_through = (way != 0.0) & (full_velocity * way > 0.0) & (begun.free_angle == predicted)
     return FreeEnd(

@@ -4,39 +4,23 @@ The method is ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 2
 the exact Jacobian and the time derivative due to the moving volumes, which change linearly through the step. Gas totals
 are integrated by the same method as further unknowns, so that mass is conserved to rounding.
 
-Order of a step: the flows at the start with their derivatives (``sloped_flows``), the first stage (``begin_still_gas``,
-``begin_moving_gas``, ``begin_shaped_gas``), the flows at the pressures after the first stage (``stage_flows``), the
-second stage, and the changes by both stages. The flows of many runs are computed in short loops of their own, because a
-division or a square root has a long latency and the processor overlaps several runs meanwhile. The first stage alone is
-a step of first order, and the contribution of the second stage is the error estimate.
+Order of a step: the flows at the start with their derivatives (``gas_flows``), the first stage (``begin_still_gas``,
+``begin_moving_gas``, ``begin_shaped_gas``), the flows at the pressures after the first stage, the second stage, and the
+changes by both stages. The flows of many runs are computed in short loops of their own, because a division or a square
+root has a long latency and the processor overlaps several runs meanwhile. The first stage alone is a step of first
+order, and the contribution of the second stage is the error estimate.
 """
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ppafo.model.columns import smaller
-from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
-from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, PortFlow, PortFlowSlopes, admitted_flow
+from ppafo.model.orifice import orifice_flow
+from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, PortFlow, PortSlopes, admitted_flow
 from ppafo.model.ports import leakage_path
 
 
-class LeakSlopes(NamedTuple):
-    """Leakage flow across the vane from chamber 1 to 2 [kg/s], and its derivatives by both pressures [kg/(s Pa)]."""
-
-    flow: float
-    by_1: float
-    by_2: float
-
-
-class SlopedFlows(NamedTuple):
-    """Flows into both chambers and leakage flow from chamber 1 to 2 [kg/s], with pressure derivatives [kg/(s Pa)]."""
-
-    in_1: PortFlowSlopes
-    in_2: PortFlowSlopes
-    leak: LeakSlopes
-
-
-class StageFlows(NamedTuple):
+class GasFlows(NamedTuple):
     """Flows into both chambers, and leakage flow across the vane from chamber 1 to 2 [kg/s]."""
 
     in_1: PortFlow
@@ -44,46 +28,34 @@ class StageFlows(NamedTuple):
     leak: float
 
 
-def sloped_flows(
+class SlopedFlows(NamedTuple):
+    """All flows [kg/s] with their derivatives by the pressures of both chambers [kg/(s Pa)]."""
+
+    flows: GasFlows
+    slopes_1: PortSlopes
+    slopes_2: PortSlopes
+    leak_by_1: float
+    leak_by_2: float
+
+
+def gas_flows(
     plant: PlantParameters,
     pressure_1: float,
     pressure_2: float,
     port_1: Any,
     port_2: Any,
-    port_flow_slopes: Callable[..., PortFlowSlopes],
+    port_flow: Callable[..., tuple[PortFlow, PortSlopes]],
 ) -> SlopedFlows:
-    """All flows [kg/s] at two absolute chamber pressures [Pa], with their derivatives by the pressures [kg/(s Pa)]."""
-    flow, by_1, by_2 = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
-    return SlopedFlows(
-        in_1=port_flow_slopes(pressure_1, port_1, plant.valve_curve),
-        in_2=port_flow_slopes(pressure_2, port_2, plant.valve_curve),
-        leak=LeakSlopes(flow, by_1, by_2),
-    )
+    """All flows [kg/s] at two absolute chamber pressures [Pa], with derivatives [kg/(s Pa)]. Equations (6) to (8).
 
-
-def stage_flows(
-    plant: PlantParameters,
-    pressure_1: float,
-    pressure_2: float,
-    port_1: Any,
-    port_2: Any,
-    port_flow: Callable[..., PortFlow],
-) -> StageFlows:
-    """All flows [kg/s] at two absolute chamber pressures [Pa]."""
-    return StageFlows(
-        in_1=port_flow(pressure_1, port_1, plant.valve_curve),
-        in_2=port_flow(pressure_2, port_2, plant.valve_curve),
-        leak=orifice_flow(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve),
-    )
-
-
-def plant_with_leak_at(plant: PlantParameters, pressure_1: float, pressure_2: float) -> PlantParameters:
-    """Plant with the leakage at two absolute chamber pressures [Pa], if an effect makes the leakage depend on pressure.
-
-    The matrix of a step treats this leakage as constant; the method keeps its order with any matrix.
+    Where an effect makes the leakage depend on the pressures, its derivatives are those of a constant leakage; the
+    method keeps its order with any matrix.
     """
-    conductance = leakage_path(plant.leak_conductance, pressure_1, pressure_2, plant.leak_curve)
-    return plant._replace(leak_conductance=conductance)
+    leaking = leakage_path(plant.leak_conductance, pressure_1, pressure_2, plant.leak_curve)
+    in_1, slopes_1 = port_flow(pressure_1, port_1, plant.valve_curve)
+    in_2, slopes_2 = port_flow(pressure_2, port_2, plant.valve_curve)
+    leak, by_1, by_2 = orifice_flow(pressure_1, pressure_2, leaking, 1.0, plant.leak_curve)
+    return SlopedFlows(GasFlows(in_1, in_2, leak), slopes_1, slopes_2, by_1, by_2)
 
 
 # gamma = 1 - 1/sqrt(2) makes the method L-stable; SHORTEST keeps a part without length from dividing by 0.
@@ -113,6 +85,14 @@ class Flows(NamedTuple):
     mass_2: float
     supplied: float
     leaked: float
+
+
+def flow_rates(flowing: GasFlows) -> Flows:
+    """Rates of all masses [kg/s] from the flows through ports and leakage. Equation (9)."""
+    in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
+    return Flows(
+        mass_1=in_1.total - leak, mass_2=in_2.total + leak, supplied=in_1.from_source + in_2.from_source, leaked=leak
+    )
 
 
 class Linearisation(NamedTuple):
@@ -214,14 +194,12 @@ def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: 
 
     ``per_mass_1`` and ``per_mass_2`` are pressure divided by mass [Pa/kg].
     """
-    in_1, in_2 = flowing.in_1, flowing.in_2
-    leak, leak_by_1, leak_by_2 = flowing.leak.flow, flowing.leak.by_1, flowing.leak.by_2
     weight_1 = GAMMA * step * per_mass_1
     weight_2 = GAMMA * step * per_mass_2
-    a = 1.0 - (in_1.total_slope - leak_by_1) * weight_1
-    b = leak_by_2 * weight_2
-    c = -leak_by_1 * weight_1
-    d = 1.0 - (in_2.total_slope + leak_by_2) * weight_2
+    a = 1.0 - (flowing.slopes_1.total - flowing.leak_by_1) * weight_1
+    b = flowing.leak_by_2 * weight_2
+    c = -flowing.leak_by_1 * weight_1
+    d = 1.0 - (flowing.slopes_2.total + flowing.leak_by_2) * weight_2
     scale = 1.0 / (a * d - b * c)
     linear = Linearisation(
         a=a,
@@ -229,12 +207,10 @@ def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: 
         c=c,
         d=d,
         scale=scale,
-        supplied_by_1=in_1.source_slope * weight_1,
-        supplied_by_2=in_2.source_slope * weight_2,
+        supplied_by_1=flowing.slopes_1.from_source * weight_1,
+        supplied_by_2=flowing.slopes_2.from_source * weight_2,
     )
-    return linear, Flows(
-        mass_1=in_1.total - leak, mass_2=in_2.total + leak, supplied=in_1.from_source + in_2.from_source, leaked=leak
-    )
+    return linear, flow_rates(flowing.flows)
 
 
 def begin_still_gas(
@@ -298,14 +274,14 @@ def begin_moving_stage(
     return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
 
 
-def second_right_sides(first: Flows, flowing: StageFlows) -> Flows:
-    """Right-hand sides of the second stage [kg/s] with fixed volumes, from the flows after the first. Equation (9)."""
-    flow_1, flow_2, leak = flowing.in_1, flowing.in_2, flowing.leak
+def second_right_sides(first: Flows, flowing: GasFlows) -> Flows:
+    """Right-hand sides of the second stage [kg/s] with fixed volumes, from the flows after the first."""
+    flows = flow_rates(flowing)
     return Flows(
-        mass_1=flow_1.total - leak - 2.0 * first.mass_1,
-        mass_2=flow_2.total + leak - 2.0 * first.mass_2,
-        supplied=flow_1.from_source + flow_2.from_source - 2.0 * first.supplied,
-        leaked=leak - 2.0 * first.leaked,
+        mass_1=flows.mass_1 - 2.0 * first.mass_1,
+        mass_2=flows.mass_2 - 2.0 * first.mass_2,
+        supplied=flows.supplied - 2.0 * first.supplied,
+        leaked=flows.leaked - 2.0 * first.leaked,
     )
 
 
@@ -320,12 +296,12 @@ def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
     )
 
 
-def second_still_stage(begun: StillGas, flowing: StageFlows) -> Flows:
+def second_still_stage(begun: StillGas, flowing: GasFlows) -> Flows:
     """Slopes of the second stage [kg/s] for a step with a vane at rest."""
     return solve_stage(begun.linear, second_right_sides(begun.first, flowing))
 
 
-def second_moving_stage(begun: MovingGas, flowing: StageFlows) -> Flows:
+def second_moving_stage(begun: MovingGas, flowing: GasFlows) -> Flows:
     """Slopes of the second stage [kg/s] for a step with moving volumes."""
     right, drift = second_right_sides(begun.still.first, flowing), begun.drift
     return solve_stage(

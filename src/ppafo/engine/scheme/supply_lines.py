@@ -26,7 +26,7 @@ from ppafo.model.plant import (
     ActuatorFunctions,
     PlantParameters,
     PlantState,
-    PortFlowSlopes,
+    PortSlopes,
     ThermalParameters,
     ThermalState,
 )
@@ -100,7 +100,7 @@ def begin_fed_gas(
     # The same stage for the flow out of line 2 alone, of which ``supplied`` is the sum with line 1.
     growth_2 = (volume_2 - parts.rest_volumes(plant, next_angle)[1]) / (volume_2 * max(step, SHORTEST))
     drift_2 = linear.supplied_by_2 * state.mass_2 * growth_2
-    taken_2 = flowing.in_2.from_source + drift_2 + linear.supplied_by_2 * first.mass_2
+    taken_2 = flowing.flows.in_2.from_source + drift_2 + linear.supplied_by_2 * first.mass_2
     stepped = lines_after(plant, lines, line_state, step * (first.supplied - taken_2), step * taken_2, 0.0, step)
     return FedGas(chambers=chambers, taken_2=taken_2, drift_2=drift_2, lines=stepped)
 
@@ -149,10 +149,10 @@ class FedThermalGas(NamedTuple):
     lines: LineStep
 
 
-def with_line(flow: PortFlowSlopes, ratio: float) -> PortFlowSlopes:
-    """Flow of a port with derivatives that include the gas lost by its line; ``ratio`` as in ``with_lines``."""
-    added = flow.source_slope * ratio
-    return flow._replace(total_slope=flow.total_slope + added, source_slope=flow.source_slope + added)
+def with_line(slopes: PortSlopes, ratio: float) -> PortSlopes:
+    """Derivatives of the flow of a port that include the gas lost by its line; ``ratio`` as in ``with_lines``."""
+    added = slopes.from_source * ratio
+    return PortSlopes(slopes.total + added, slopes.from_source + added)
 
 
 def mass_from_source(thermal: ThermalParameters, flow: float, state: PlantState, masses: ThermalState) -> float:
@@ -180,13 +180,15 @@ def begin_fed_thermal_gas(
     ratio_1 = start.volume_1 * (1.0 + heat_ratio * start.give_1) / lines.volume_1
     ratio_2 = start.volume_2 * (1.0 + heat_ratio * start.give_2) / lines.volume_2
     # Gas from a line brings more energy than mass, by the ratio of heat capacities.
-    in_1 = with_line(flowing.in_1, 1.0 / heat_ratio * ratio_1)
-    in_2 = with_line(flowing.in_2, 1.0 / heat_ratio * ratio_2)
-    flowing = SlopedFlows(in_1, in_2, flowing.leak)
+    flowing = flowing._replace(
+        slopes_1=with_line(flowing.slopes_1, 1.0 / heat_ratio * ratio_1),
+        slopes_2=with_line(flowing.slopes_2, 1.0 / heat_ratio * ratio_2),
+    )
+    from_2 = flowing.flows.in_2.from_source
     chambers = begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step, parts=parts)
     first, supplied_by_2 = chambers.first, chambers.matrix.slopes.supplied_by_2
     drift_2 = -supplied_by_2 * state.mass_2 * start.growth_2 / start.volume_2
-    taken_2 = mass_from_source(thermal, in_2.from_source, state, masses) + drift_2 + supplied_by_2 * first.content_2
+    taken_2 = mass_from_source(thermal, from_2, state, masses) + drift_2 + supplied_by_2 * first.content_2
     stepped = lines_after(plant, lines, line_state, step * (first.supplied - taken_2), step * taken_2, 0.0, step)
     return FedThermalGas(chambers=chambers, taken_2=taken_2, drift_2=drift_2, lines=stepped)
 

@@ -28,17 +28,14 @@ from ppafo.engine.scheme.pneumatics import (
     ALLOWED_OF_PRESSURE,
     GAMMA,
     SHORTEST,
-    LeakSlopes,
+    GasFlows,
     SlopedFlows,
-    StageFlows,
     pressure_that_matters,
 )
 from ppafo.model.gas import enthalpy_flow_ratio, mass_flow_ratio
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
-    PortFlow,
-    PortFlowSlopes,
     ThermalParameters,
     ThermalState,
     admitted_flow,
@@ -165,11 +162,10 @@ def thermal_flows(
     state: PlantState,
     masses: ThermalState,
     at: WarmChambers,
-    in_1: PortFlow,
-    in_2: PortFlow,
-    leak: float,
+    flowing: GasFlows,
 ) -> ThermalFlows:
     """All rates of gas with an energy balance [kg/s], from the flows at the reference temperature [kg/s]."""
+    in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
     root_1 = math.sqrt(state.mass_1 / masses.mass_1)
     root_2 = math.sqrt(state.mass_2 / masses.mass_2)
     vent_1 = in_1.total - in_1.from_source
@@ -212,9 +208,7 @@ def flow_slopes(
     root_2: float,
     weight_1: float,
     weight_2: float,
-    in_1: PortFlowSlopes,
-    in_2: PortFlowSlopes,
-    leak: LeakSlopes,
+    flowing: SlopedFlows,
     near_1: float,
     near_2: float,
     at: WarmChambers,
@@ -224,35 +218,37 @@ def flow_slopes(
     ``root_1`` and ``root_2`` are ``sqrt(T / T_0)`` of both chambers [-]. The weights are gamma h times pressure divided
     by content [Pa s/kg]. ``near_1`` and ``near_2`` [Pa] are pressure differences below which a flow may reverse.
     """
-    leak_carries = transport(thermal, leak.flow, root_1, root_2)
+    in_1, in_2, leak = flowing.flows.in_1, flowing.flows.in_2, flowing.flows.leak
+    slopes_1, slopes_2 = flowing.slopes_1, flowing.slopes_2
+    leak_carries = transport(thermal, leak, root_1, root_2)
     source_1 = transport(thermal, in_1.from_source, 1.0, root_1)
     source_2 = transport(thermal, in_2.from_source, 1.0, root_2)
-    vent_slope_1 = in_1.total_slope - in_1.source_slope
-    vent_slope_2 = in_2.total_slope - in_2.source_slope
+    vent_slope_1 = slopes_1.total - slopes_1.from_source
+    vent_slope_2 = slopes_2.total - slopes_2.from_source
     turns_1, turns_2 = abs(vent_slope_1) * near_1, abs(vent_slope_2) * near_2
     vent_1 = steeper_transport(thermal, in_1.total - in_1.from_source, turns_1, 1.0, root_1)
     vent_2 = steeper_transport(thermal, in_2.total - in_2.from_source, turns_2, 1.0, root_2)
-    by_1 = leak.by_1 * weight_1
-    by_2 = leak.by_2 * weight_2
+    by_1 = flowing.leak_by_1 * weight_1
+    by_2 = flowing.leak_by_2 * weight_2
     return _FlowSlopes(
-        content_1_by_1=(in_1.source_slope * source_1.content + vent_slope_1 * vent_1.content) * weight_1
+        content_1_by_1=(slopes_1.from_source * source_1.content + vent_slope_1 * vent_1.content) * weight_1
         - by_1 * leak_carries.content,
         content_1_by_2=-by_2 * leak_carries.content,
         content_2_by_1=by_1 * leak_carries.content,
-        content_2_by_2=(in_2.source_slope * source_2.content + vent_slope_2 * vent_2.content) * weight_2
+        content_2_by_2=(slopes_2.from_source * source_2.content + vent_slope_2 * vent_2.content) * weight_2
         + by_2 * leak_carries.content,
-        mass_1_by_1=(in_1.source_slope * source_1.mass + vent_slope_1 * vent_1.mass) * weight_1
+        mass_1_by_1=(slopes_1.from_source * source_1.mass + vent_slope_1 * vent_1.mass) * weight_1
         - by_1 * leak_carries.mass,
         mass_1_by_2=-by_2 * leak_carries.mass,
         mass_2_by_1=by_1 * leak_carries.mass,
-        mass_2_by_2=(in_2.source_slope * source_2.mass + vent_slope_2 * vent_2.mass) * weight_2
+        mass_2_by_2=(slopes_2.from_source * source_2.mass + vent_slope_2 * vent_2.mass) * weight_2
         + by_2 * leak_carries.mass,
-        supplied_by_1=in_1.source_slope * source_1.mass * weight_1,
-        supplied_by_2=in_2.source_slope * source_2.mass * weight_2,
+        supplied_by_1=slopes_1.from_source * source_1.mass * weight_1,
+        supplied_by_2=slopes_2.from_source * source_2.mass * weight_2,
         leaked_by_1=by_1 * leak_carries.mass,
         leaked_by_2=by_2 * leak_carries.mass,
-        source_content_by_1=in_1.source_slope * source_1.content * weight_1,
-        source_content_by_2=in_2.source_slope * source_2.content * weight_2,
+        source_content_by_1=slopes_1.from_source * source_1.content * weight_1,
+        source_content_by_2=slopes_2.from_source * source_2.content * weight_2,
         kept_1=kept_share(thermal.heat_capacity_ratio, at.give_1),
         kept_2=kept_share(thermal.heat_capacity_ratio, at.give_2),
     )
@@ -463,18 +459,15 @@ def begin_thermal_stage(
     parts: WarmFunctions,
 ) -> ThermalGas:
     """First stage of one step [s] that ends at ``next_angle`` [rad], from all flows with their derivatives."""
-    in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
     at = at_begin.chambers
     per_content_1, per_content_2 = at_begin.per_content_1, at_begin.per_content_2
-    flow_1 = PortFlow(in_1.total, in_1.from_source)
-    flow_2 = PortFlow(in_2.total, in_2.from_source)
-    flows = thermal_flows(thermal, state, masses, at, flow_1, flow_2, leak.flow)
+    flows = thermal_flows(thermal, state, masses, at, flowing.flows)
     weight = GAMMA * step
     root_1 = math.sqrt(state.mass_1 / masses.mass_1)
     root_2 = math.sqrt(state.mass_2 / masses.mass_2)
     near_1, near_2 = NEARLY_EQUAL * per_content_1 * state.mass_1, NEARLY_EQUAL * per_content_2 * state.mass_2
     weight_1, weight_2 = weight * per_content_1, weight * per_content_2
-    slopes = flow_slopes(thermal, root_1, root_2, weight_1, weight_2, in_1, in_2, leak, near_1, near_2, at)
+    slopes = flow_slopes(thermal, root_1, root_2, weight_1, weight_2, flowing, near_1, near_2, at)
     matrix = thermal_matrix(thermal, state, masses, at, weight, slopes)
     # A growing volume lowers the pressure as a loss of content at this rate would.
     lost_1, lost_2 = -state.mass_1 * at.growth_1 / at.volume_1, -state.mass_2 * at.growth_2 / at.volume_2
@@ -500,9 +493,9 @@ def end_pressures(plant: PlantParameters, begun: ThermalGas) -> tuple[float, flo
     )
 
 
-def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing: StageFlows) -> ThermalFlows:
+def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing: GasFlows) -> ThermalFlows:
     """Slopes of the second stage [kg/s] of a step with an energy balance."""
-    flows = thermal_flows(thermal, begun.end, begun.end_masses, begun.ended, flowing.in_1, flowing.in_2, flowing.leak)
+    flows = thermal_flows(thermal, begun.end, begun.end_masses, begun.ended, flowing)
     # Right-hand side of ROS2: the flows at the end of the first stage less twice that stage, less the drift.
     right = combine_flows(combine_flows(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
     return solve_thermal_stage(begun.matrix, right)

@@ -15,6 +15,7 @@ from ppafo.model.plant import (
     ActuatorFunctions,
     PlantParameters,
     PlantState,
+    direction_of,
     net_torque,
     torque_less_loads,
     viscous_torque,
@@ -213,16 +214,14 @@ def external_torque(
     ``torque`` [N m] is the torque of the leg including the foot plate, ``plate`` [N m] the part of the foot plate.
     """
     speed = state.angular_velocity
-    passive_damping = leg.ankle_damping * speed
+    passive_damping = viscous_torque(leg.ankle_damping, speed)
     # In the air the foot takes what its own motion needs; on the ground the shank leads, and the device gives what is
     # left.
     needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - plate)
     pressure_1, pressure_2 = parts.held_pressures(plant, held, state)
     driving = torque_less_loads(parts.torque(plant, state.angle, pressure_1, pressure_2) + plate, state.angle)
-    way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
     friction = friction_in_motion(plant.dynamic_torque, speed, pressure_1, pressure_2)
-    damping = viscous_torque(share.viscous_damping, speed)
-    net = net_torque(driving, way * friction, damping, state.angle, speed)
+    net = net_torque(driving, direction_of(speed), friction, share.viscous_damping, state.angle, speed)
     return needed if angle_is_free else net - share.inertia * led.acceleration
 
 

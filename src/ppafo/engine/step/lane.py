@@ -11,10 +11,10 @@ if TYPE_CHECKING:  # a lane is of these, and makes none of them
     from ppafo.engine.scheme.pneumatics import (
         Flows,
         GasChange,
+        GasFlows,
         HeldChambers,
         MovingGas,
         SlopedFlows,
-        StageFlows,
         StillGas,
     )
     from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
@@ -144,7 +144,7 @@ class Lane:
     thermal_gas: "ThermalGas"  # energy balance,
     fed_gas: "FedGas"  # behind supply lines,
     fed_thermal_gas: "FedThermalGas"  # behind them with an energy balance
-    passing: "StageFlows"  # flows at the pressures to which the first stage leads
+    passing: "GasFlows"  # flows at the pressures to which the first stage leads
     change: "GasChange"  # what the step adds to the gas, by its kind
     thermal_change: "ThermalFlows"
     next_lines: "LineState"  # lines at the end of a part

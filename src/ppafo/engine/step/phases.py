@@ -111,9 +111,8 @@ def open_valve(parts: Program, lane: Lane, now: Now) -> None:
     source = lane.plant if parts.feed is None else parts.feed.source(parts, lane)
     port_1, port_2 = ports_behind(parts, lane, now, source)
     pressure_1, pressure_2 = present_pressures(parts, lane)
-    leaky = with_leak(parts, lane, lane.plant, pressure_1, pressure_2)
-    slopes = parts.valve.port_flow_slopes
-    lane.flowing = pneumatics.sloped_flows(leaky, pressure_1, pressure_2, port_1, port_2, slopes)
+    flow = parts.valve.port_flow
+    lane.flowing = pneumatics.gas_flows(lane.plant, pressure_1, pressure_2, port_1, port_2, flow)
 
 
 def ports_behind(parts: Program, lane: Lane, now: Now, source: PlantParameters) -> tuple[Any, Any]:
@@ -127,15 +126,6 @@ def present_pressures(parts: Program, lane: Lane) -> tuple[float, float]:
     if parts.hands_chambers_on:
         return parts.functions.held_pressures(lane.plant, lane.held, lane.state)
     return parts.actuator.pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
-
-
-def with_leak(
-    parts: Program, lane: Lane, leaky: PlantParameters, pressure_1: float, pressure_2: float
-) -> PlantParameters:
-    """Return the plant with the leakage at the pressures of a stage, if the leakage varies."""
-    if "leakage_path" in parts.ports_with_laws:
-        leaky = pneumatics.plant_with_leak_at(leaky, pressure_1, pressure_2)
-    return leaky
 
 
 def begin_gas(parts: Program, lane: Lane, now: Now) -> None:
@@ -170,9 +160,9 @@ def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
     source = lane.plant if parts.feed is None else parts.feed.source_ahead(parts, lane)
     port_1, port_2 = ports_behind(parts, lane, now, source)
     pressure_1, pressure_2 = parts.gas.ends(parts, lane)
-    leaky = with_leak(parts, lane, lane.plant, pressure_1, pressure_2)
     flow = parts.valve.port_flow
-    lane.passing = pneumatics.stage_flows(leaky, pressure_1, pressure_2, port_1, port_2, flow)
+    sloped = pneumatics.gas_flows(lane.plant, pressure_1, pressure_2, port_1, port_2, flow)
+    lane.passing = sloped.flows
     if parts.stated_at_ports:
         stated.restore(parts, lane)
 

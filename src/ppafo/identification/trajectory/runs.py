@@ -251,7 +251,7 @@ def blocks_of(
 
 
 _NUMBERS_OF_RUN = (
-    *("plant", "thermal", "valve_orifice", "leak_orifice", "initial"),
+    *("plant", "thermal", "initial"),
     *("valve", "command_delay", "lines", "effects", "leg"),
 )
 """Fields of a run that depend on the parameters of its scenario; program, clock and prescribed motion do not."""

@@ -27,7 +27,8 @@ def leak_with_gap(
     """
     upstream, downstream = max(pressure_1, pressure_2), min(pressure_1, pressure_2)
     ratio = min(downstream / upstream, curve.linear_ratio)
-    gap = laminar_leak.coefficient * (upstream + downstream) * (1.0 - ratio) / fitted_flow_function(ratio, curve)
+    function, _ = fitted_flow_function(ratio, curve)
+    gap = laminar_leak.coefficient * (upstream + downstream) * (1.0 - ratio) / function
     return leakage_path(conductance, pressure_1, pressure_2, curve) + gap
 
 

@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 
 from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.orifice import FlowCurve
-from ppafo.model.plant import BlendedPort, Openings, PlantParameters, PortFlow, PortFlowSlopes, SinglePort
+from ppafo.model.plant import BlendedPort, Openings, PlantParameters, PortFlow, PortSlopes, SinglePort
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class ValveModel:
     declared settings; ``initial()`` makes the state, and is the class itself if its fields have defaults.
     ``advance(parameters, state, command, time, step)`` returns the valve output during the step, and the next state.
     ``shown`` is the class of the output, a float or a NamedTuple; ``connect(plant, shown)`` converts the output to
-    ports of the class ``port``; ``port_flow`` and ``port_flow_slopes`` are the functions of that kind of port.
+    ports of the class ``port``; ``port_flow`` is the flow through that kind of port.
     ``jumps`` is True for a valve that switches by itself within a step, as given by ``next_event`` and ``settle``: the
     step is then divided at the switching times. ``shift(state, next_state)`` is the relative change of the opening of a
     valve that moves within a step, None for a valve that stands still between two switchings.
@@ -41,8 +41,7 @@ class ValveModel:
     port: type[SinglePort] | type[BlendedPort]
     advance: Callable[[Any, Any, float, float, float], tuple[Any, Any]]
     connect: Callable[[PlantParameters, Any], tuple[Any, Any]]
-    port_flow: Callable[[float, Any, FlowCurve], PortFlow]
-    port_flow_slopes: Callable[[float, Any, FlowCurve], PortFlowSlopes]
+    port_flow: Callable[[float, Any, FlowCurve], tuple[PortFlow, PortSlopes]]
     jumps: bool
     shift: Callable[[Any, Any], float] | None
     command_delay: Callable[[Any], float]

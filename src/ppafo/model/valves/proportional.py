@@ -15,10 +15,8 @@ from ppafo.model.plant import (
     Openings,
     SinglePort,
     blended_port_flow,
-    blended_port_flow_slopes,
     blended_ports,
     single_port_flow,
-    single_port_flow_slopes,
     single_ports,
 )
 from ppafo.model.valves.kind import ValveKind, ValveModel, never
@@ -307,7 +305,6 @@ IDEAL = ValveModel(
     advance=advance_ideal,
     connect=single_ports,
     port_flow=single_port_flow,
-    port_flow_slopes=single_port_flow_slopes,
     jumps=False,
     shift=None,
     command_delay=dead_time,
@@ -327,7 +324,6 @@ MOVING = ValveModel(
     advance=advance_moving,
     connect=blended_ports,
     port_flow=blended_port_flow,
-    port_flow_slopes=blended_port_flow_slopes,
     jumps=True,
     shift=shift_of_spool,
     command_delay=dead_time,

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.declaration import EmptyRow, Number
-from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
+from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow
 from ppafo.model.ports import exhaust_path, opening_time, supply_path
 from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel, never
 
@@ -210,7 +210,6 @@ IDEAL = ValveModel(
     advance=advance_ideal,
     connect=connect_positions,
     port_flow=single_port_flow,
-    port_flow_slopes=single_port_flow_slopes,
     jumps=False,
     shift=None,
     command_delay=no_dead_time,

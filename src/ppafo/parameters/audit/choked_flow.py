@@ -5,7 +5,8 @@ import math
 import operator
 from collections.abc import Callable, Iterator
 
-from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
+from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
+from ppafo.model.orifice import subsonic_flow_constant
 from ppafo.parameters.audit.evidence import GAS_PATHS, AuditFinding, ComparedNumber, Evidence
 from ppafo.parameters.device import Gas
 

@@ -70,7 +70,8 @@ def of_the_textbook(run: Run, way: float | None, at: Mapping[str, float]) -> dic
         plant.dead_volume_2 + plant.displacement_per_radian * (plant.angle_max - at["angle"]),
     )
     pressures = (at["pressure_1"], at["pressure_2"])
-    in_1, in_2, leak = flows_at(plant, openings, *pressures)
+    flowing = flows_at(plant, openings, *pressures)
+    in_1, in_2, leak = flowing
     growth = plant.displacement_per_radian * at["angular_velocity"]
     contents = [pressure * volume / plant.gas_product for pressure, volume in zip(pressures, volumes, strict=True)]
     if isinstance(run.thermal, ThermalParameters):
@@ -79,7 +80,7 @@ def of_the_textbook(run: Run, way: float | None, at: Mapping[str, float]) -> dic
         state = PlantState(at["angle"], at["angular_velocity"], *contents, 0.0, 0.0, 0.0)
         held = ThermalState(*masses, 0.0, 0.0, 0.0, 0.0)
         at_work = WarmChambers(*volumes, growth, -growth, 0.0, 0.0)
-        thermal = thermal_flows(run.thermal, state, held, at_work, in_1, in_2, leak)
+        thermal = thermal_flows(run.thermal, state, held, at_work, flowing)
         gained, entered = (thermal.content_1, thermal.content_2), (thermal.mass_1, thermal.mass_2)
         supplied, vented = thermal.supplied, thermal.supplied - sum(entered)
         for side in (0, 1):

@@ -8,9 +8,9 @@ import pytest
 import ppafo
 from ppafo.analyses.linearise.model import one_sided_slopes
 from ppafo.engine.lanes import Floats
-from ppafo.engine.scheme.pneumatics import GAMMA, linearise, sloped_flows
+from ppafo.engine.scheme.pneumatics import GAMMA, flow_rates, gas_flows, linearise
 from ppafo.model.orifice import fitted_flow_function, orifice_flow
-from ppafo.model.plant import Openings, blended_port_flow_slopes, blended_ports, pressures_per_mass
+from ppafo.model.plant import Openings, blended_port_flow, blended_ports, pressures_per_mass
 from ppafo.parameters.plant import plant_parameters
 
 PLANT = plant_parameters(ppafo.load_device("ppafo2011"))
@@ -37,9 +37,11 @@ def test_a_kink_and_a_jump_have_the_slope_of_the_side() -> None:
 
 def test_near_equal_pressures_the_slope_is_of_the_straight_line_that_the_flow_is_there() -> None:
     curve = PLANT.valve_curve
-    slope = 1e-8 * fitted_flow_function(curve.linear_ratio, curve) / (1.0 - curve.linear_ratio)
+    slope = 1e-8 * fitted_flow_function(curve.linear_ratio, curve)[0] / (1.0 - curve.linear_ratio)
     for side in (1.0, -1.0):
-        slopes, _ = one_sided_slopes(lambda value: np.array([orifice_flow(value, 3e5, 1e-8, curve)]), 3e5, side, 1e5)
+        slopes, _ = one_sided_slopes(
+            lambda value: np.array([orifice_flow(value, 3e5, 1e-8, 1.0, curve)[0]]), 3e5, side, 1e5
+        )
         assert slopes == pytest.approx([slope], rel=1e-8)
 
 
@@ -52,12 +54,9 @@ def test_the_jacobian_of_a_step_of_the_lanes_is_that_of_its_own_flows(ratios: tu
     ports = blended_ports(PLANT, openings)
 
     def flows_at(pressure_1: float, pressure_2: float) -> Floats:
-        flows = linearise(
-            *per_mass, sloped_flows(PLANT, pressure_1, pressure_2, *ports, blended_port_flow_slopes), step
-        )
-        return np.array(flows[1][:2])
+        return np.array(flow_rates(gas_flows(PLANT, pressure_1, pressure_2, *ports, blended_port_flow).flows)[:2])
 
-    linear, _ = linearise(*per_mass, sloped_flows(PLANT, *pressures, *ports, blended_port_flow_slopes), step)
+    linear, _ = linearise(*per_mass, gas_flows(PLANT, *pressures, *ports, blended_port_flow), step)
     by_1 = one_sided_slopes(lambda value: flows_at(value, pressures[1]), pressures[0], 1.0, 1e5)[0] * per_mass[0]
     by_2 = one_sided_slopes(lambda value: flows_at(pressures[0], value), pressures[1], 1.0, 1e5)[0] * per_mass[1]
     found = np.eye(2) - GAMMA * step * np.array([by_1, by_2]).T
