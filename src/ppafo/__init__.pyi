@@ -7,8 +7,8 @@ from ppafo.analyses.design.search import Sizing as Sizing
 from ppafo.analyses.endurance.discharge import Endurance as Endurance
 from ppafo.analyses.endurance.question import bottle as bottle
 from ppafo.analyses.find import find as find
-from ppafo.analyses.identify.answer import Identification as Identification
-from ppafo.analyses.identify.question import identify as identify
+from ppafo.analyses.identify import Identification as Identification
+from ppafo.analyses.identify import identify as identify
 from ppafo.analyses.linearise.model import LinearModel as LinearModel
 from ppafo.analyses.linearise.question import linearise as linearise
 from ppafo.analyses.reproduce.question import reproduce as reproduce

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.identify.answer import Identification
-from ppafo.analyses.identify.question import identify
+from ppafo.analyses.identify import Identification, identify
 from ppafo.cli.main import main
 from tests.page_code import assert_shows
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.identify.question import identify
+from ppafo.analyses.identify import identify
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))

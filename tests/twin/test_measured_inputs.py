@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.question import identify
+from ppafo.analyses.identify import identify
 from ppafo.identification.trajectory import TrajectoryFit
 from ppafo.rig.experiments import record
 from ppafo.storage import write_csv

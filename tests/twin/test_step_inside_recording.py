@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.question import identify
+from ppafo.analyses.identify import identify
 from ppafo.analyses.validate.question import validate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario

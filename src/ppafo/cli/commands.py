@@ -51,7 +51,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
             },
         ),
         "identify": Command(
-            f"{_ANALYSES}.identify.question:identify",
+            f"{_ANALYSES}.identify:identify",
             first_line="Identify a parameter set, with uncertainty, from bench recordings.",
         ),
         "validate": Command(

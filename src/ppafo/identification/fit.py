@@ -19,6 +19,7 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from ppafo.errors import IdentificationError
+from ppafo.identification.estimate import NAMED
 from ppafo.identification.least_squares import (
     SHORT,
     FitRuns,
@@ -42,6 +43,7 @@ from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import noise_of as white_noise_of
 from ppafo.signals.faults import off_neighbours, outlying_samples
 from ppafo.signals.recording import Floats
+from ppafo.wording import percentage
 
 SMOOTH = "noise"
 """Marker in ``Conflict.number`` for residuals too smooth to be noise; ``standard_errors`` is then 1 / innovation."""
@@ -54,6 +56,8 @@ _SMOOTHEST = 0.15
 
 Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recordings of 500 samples.
 """
+_SEVERAL = {"readings", "commands"}
+"""Last words of group names that are plural."""
 _SIGNIFICANCE = 0.01
 """Significance level [-] of a difference between estimates."""
 _BY_CHANCE = 0.001
@@ -527,3 +531,34 @@ def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:
     costs = np.sum(np.log1p(np.square(residuals / np.concatenate(noise)[:, None])), axis=0)
     costs[~np.isfinite(costs)] = np.inf
     yield from (points[:, index] for index in np.argsort(costs)[:2].tolist() if costs[index] < costs[-1])
+
+
+def widened_by(fitted: Fit, name: str) -> str:
+    """Return a phrase on the largest parts of the variance of a variable, of tolerances and of the scatter."""
+    scatter = 1.0 - sum(share for _, share in fitted.shares[name])
+    parts = [("the scatter of the readings", scatter), *(part for part in fitted.shares[name] if part[0] != name)]
+    # Of parts that are shown as equal, such as those of both chambers, the name decides.
+    parts.sort(key=lambda part: (-float(f"{part[1]:.2g}"), part[0]))
+    return f"variance from {', '.join(f'{part} ({percentage(share, 2)})' for part, share in parts[:NAMED])}"
+
+
+def conflict_in_words(fitted: Fit, remedy: str) -> str:
+    """Return a sentence on the readings that contradict the others, with a remedy; empty if all agree."""
+    conflict = fitted.conflict
+    if conflict is None:
+        return ""
+    errors = conflict.standard_errors
+    if conflict.group == STATED:
+        return f"{conflict.number} is {errors:.1f} standard errors beyond its stated limit; {remedy}"
+    if conflict.number == SMOOTH:
+        return f"the residual of {conflict.group} is {errors:.0f} times its noise and too smooth to be noise; {remedy}"
+    if conflict.number == SHAPE:
+        return (
+            f"the residuals of {conflict.group} have a shape that the law has not, by {errors:.1f} standard errors; "
+            f"{remedy}"
+        )
+    give = "give" if _SEVERAL & set(conflict.group.split()) else "gives"
+    return (
+        f"{conflict.group}, fitted alone, {give} different values: {conflict.number} by {errors:.1f} standard "
+        f"errors; {remedy}"
+    )

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.identification.wording import in_shown_unit
+from ppafo.identification.estimate import in_shown_unit
 from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.faults import FEWEST_AT_LIMIT, is_at_limit, longest_gap, plateaus, scatters
 from ppafo.signals.recording import Floats

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from ppafo.analyses.identify.answer import trajectory_panels
-from ppafo.errors import DataError
+from ppafo.analyses.identify import trajectory_panels
 from ppafo.report.panels import draw_panels
 from ppafo.signals.recording import Channel, Recording, RecordingKind
 
@@ -33,8 +32,3 @@ def test_every_fitted_channel_has_a_panel_and_one_for_what_is_left() -> None:
     ]
     left = figure.axes[1].lines[0].get_ydata()
     assert np.asarray(left) == pytest.approx(np.full(101, -0.5))
-
-
-def test_a_model_at_other_times_is_refused() -> None:
-    with pytest.raises(DataError, match=r"its times differ from .*; give both recordings the same times"):
-        fit_figure(recording("measured", 0.0), recording("simulated", 0.0).between(0.0, 0.5))

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.answer import Identification, finding_of
-from ppafo.analyses.identify.question import identify
+from ppafo.analyses.identify import Identification, finding_of, identify
 from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
 from ppafo.identification.estimate import UNKNOWN, Estimate, relative_half_width

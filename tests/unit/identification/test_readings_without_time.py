@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.question import identify
+from ppafo.analyses.identify import identify
 from ppafo.errors import DataError, IdentificationError
 
 HEAD = 'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n'

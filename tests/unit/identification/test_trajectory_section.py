@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.answer import Identification, finding_of
-from ppafo.analyses.identify.question import identify
+from ppafo.analyses.identify import Identification, finding_of, identify
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
 from ppafo.identification.problem import json_schema
@@ -184,7 +183,6 @@ def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(bot
     assert smaller < error
     assert abs(fitted - stated) < 2.0 * error
     assert "g m^2" in text
-    assert re.search(r"\b\d+ other tolerances affect the intervals less", text)
     assert "next experiment 1: slow: gain" in text
 
 

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.answer import Identification, finding_of
-from ppafo.analyses.identify.question import identify
+from ppafo.analyses.identify import Identification, finding_of, identify
 from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.bench.law import BenchResult
 from ppafo.identification.estimate import Estimate

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ppafo.identification.wording import digits_of, in_shown_unit, interval_texts, with_error
+from ppafo.identification.estimate import digits_of, in_shown_unit, interval_texts, with_error
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_half_width
-from ppafo.identification.fit import Fit, fit, wrong_shape
+from ppafo.identification.fit import Fit, conflict_in_words, fit, widened_by, wrong_shape
 from ppafo.identification.least_squares import FitVariable, ResidualBlock
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
 from ppafo.identification.source import RecordingSource, kind_of, remarks_on_readings
-from ppafo.identification.wording import conflict_in_words, widened_by
 from ppafo.report.panels import Panel, draw_panels
 from ppafo.signals import RecordingKind
 from ppafo.signals.faults import resolution_of, rounding_of

@@ -36,9 +36,9 @@ from ppafo.identification.bench.readings import (
     check_not_clipped,
     check_sources,
 )
+from ppafo.identification.estimate import in_shown_unit
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
-from ppafo.identification.wording import in_shown_unit
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals

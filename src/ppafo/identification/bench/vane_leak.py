@@ -58,11 +58,11 @@ from ppafo.identification.bench.readings import (
     meter_readings,
     without_wrong_samples,
 )
+from ppafo.identification.estimate import in_shown_unit, interval_texts
 from ppafo.identification.fit import Fit
 from ppafo.identification.least_squares import FitVariable
 from ppafo.identification.source import RecordingSource, pool, window
 from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances
-from ppafo.identification.wording import in_shown_unit, interval_texts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals

@@ -8,11 +8,12 @@ from functools import partial
 import numpy as np
 
 from ppafo.errors import IdentificationError, refused_as
-from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_half_width
-from ppafo.identification.fit import Fit
+from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, in_shown_unit, relative_half_width
+from ppafo.identification.fit import Fit, conflict_in_words, widened_by
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.least_squares import FitRuns, FitVariable, ResidualBlock
 from ppafo.identification.noise import Noise, whiten
+from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
     LAG_OF,
@@ -37,10 +38,9 @@ from ppafo.identification.trajectory.runs import (
     signals_at,
     signals_of,
 )
-from ppafo.identification.wording import conflict_in_words, in_shown_unit, widened_by
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import correlated_noise_of, noise_of
-from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording
+from ppafo.signals.recording import CHANNELS, Channel, Floats, Recording, RecordingKind
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import count_of, nearest_name
 
@@ -145,6 +145,11 @@ class TrajectoryFit:
                 return estimate
         hint = nearest_name(full, [estimate.path for estimate in self.estimates])
         raise IdentificationError(f"'{name}' was not fitted{hint}")
+
+    @property
+    def kind(self) -> RecordingKind:
+        """Common origin of all recordings: measured, simulated or synthetic."""
+        return kind_of(recording.kind for recording in self.measurements)
 
     @property
     def values(self) -> dict[str, float]:

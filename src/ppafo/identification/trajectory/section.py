@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ppafo.errors import DataError, IdentificationError, ScenarioError
-from ppafo.identification.estimate import Estimate, interval_factor
+from ppafo.identification.estimate import Estimate, in_shown_unit, interval_factor
 from ppafo.identification.problem import ExperimentSection, ParameterSection, TrajectorySection
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
 from ppafo.identification.tolerances import Tolerances, positive_in, quantity_in, quantity_of
@@ -34,7 +34,6 @@ from ppafo.identification.trajectory.fitting import (
     fit,
 )
 from ppafo.identification.trajectory.tolerances import stated_by, tolerance_parameters
-from ppafo.identification.wording import in_shown_unit
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import ParameterSet

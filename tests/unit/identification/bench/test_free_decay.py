@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.question import identify
+from ppafo.analyses.identify import identify
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import Tolerances, free_decay
 from ppafo.identification.bench.free_decay import Slowing, course

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.identify.solve import Identification
+from ppafo.analyses.identify import Identification
 from ppafo.errors import IdentificationError
 
 RISE = np.array([100.0 + 39.0 * number for number in range(60)])

@@ -1,1 +1,0 @@
-"""Identification of a device from bench recordings: estimates, intervals and verdicts."""
