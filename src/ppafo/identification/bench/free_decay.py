@@ -20,10 +20,9 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import (
     BenchResult,
-    PooledReadings,
     ReportedNumber,
     Values,
-    recordings_of,
+    halved_readings,
     result_of,
     solve,
     sought,
@@ -302,9 +301,15 @@ def free_decay(
         *tolerance(_INERTIA, inertia_deviation / assumed_inertia),
         *within(_GAIN, tolerances.gain_of(ANGLE)),
     )
-    fit, model = solve(
-        lambda at: _shown_motion(at, decays, paths, assumed_inertia), _readings(sources, decays), numbers, confidence
-    )
+    # A wrong law gives different parameters for fast and for slow motion.
+    parts = []
+    for decay in decays:
+        moved = np.abs(decay.angle - decay.angle[0])
+        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
+        speeds = [] if decay.velocity is None else [(VELOCITY, decay.velocity)]
+        parts.append((half, [(ANGLE, decay.angle), *speeds]))
+    readings = halved_readings(sources, parts, ("the first half of the travel", "the second half of the travel"))
+    fit, model = solve(lambda at: _shown_motion(at, decays, paths, assumed_inertia), readings, numbers, confidence)
     slowing = _slowing(fit.by_name, paths, assumed_inertia)
     at_rest = sum(
         float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
@@ -377,24 +382,6 @@ def _unknowns(
         *initial,
         *(near_rest if most > 0.0 else ()),
     )
-
-
-def _readings(sources: tuple[RecordingSource, ...], decays: tuple[FreeDecay, ...]) -> PooledReadings:
-    """Return the samples of all decays, labelled by sensor and by half of the swept angle."""
-    series, sensors, halves = list[Floats](), list[str](), list[str]()
-    for decay in decays:
-        moved = np.abs(decay.angle - decay.angle[0])
-        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
-        for sensor, values in ((ANGLE, decay.angle), (VELOCITY, decay.velocity)):
-            if values is not None:
-                series.append(values)
-                sensors += [sensor] * values.size
-                # A wrong law gives different parameters for fast and for slow motion.
-                halves += ["the first half of the travel"] * half + ["the second half of the travel"] * (
-                    values.size - half
-                )
-    counts = [decay.time.size * (1 if decay.velocity is None else 2) for decay in decays]
-    return PooledReadings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
 
 
 def _panels(decays: tuple[FreeDecay, ...], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:

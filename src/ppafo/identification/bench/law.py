@@ -63,6 +63,14 @@ class BenchResult:
                 return estimate
         raise KeyError(path)
 
+    def for_this_model_only(self, conflict: str) -> "BenchResult":
+        """Return the result with a conflict, as a sentence, in which no value counts as identified."""
+        estimates = tuple(
+            replace(item, verdict="holds for this model only") if item.is_identified else item
+            for item in self.estimates
+        )
+        return replace(self, estimates=estimates, conflict=conflict)
+
 
 @dataclass(frozen=True, slots=True)
 class ReportedNumber:
@@ -198,6 +206,26 @@ def recordings_of(sources: tuple[RecordingSource, ...], counts: Iterable[int] = 
     sizes = tuple(counts) or [len(source.recording) for source in sources]
     pairs = enumerate(zip(sources, sizes, strict=True), start=1)
     return [label for number, (source, size) in pairs for label in [f"recording {number} ({source.name})"] * size]
+
+
+def halved_readings(
+    sources: tuple[RecordingSource, ...],
+    parts: Iterable[tuple[int, Iterable[tuple[str, Floats]]]],
+    names: tuple[str, str],
+) -> PooledReadings:
+    """Return the samples over time of all sources, with the two halves of each as groups of these ``names``.
+
+    ``parts`` are, for each source, the first sample of the second half, and the channels with their samples.
+    """
+    series, sensors, halves, counts = list[Floats](), list[str](), list[str](), list[int]()
+    for half, channels in parts:
+        before = len(sensors)
+        for sensor, values in channels:
+            series.append(values)
+            sensors += [sensor] * values.size
+            halves += [names[0]] * half + [names[1]] * (values.size - half)
+        counts.append(len(sensors) - before)
+    return PooledReadings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
 
 
 def solve(

@@ -12,7 +12,7 @@ pressure does not, the actuator slid, and T_s is the kinetic friction. A ``force
 area [m^2] and forces, for which a set has no entry.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,6 @@ from ppafo.identification.estimate import in_shown_unit
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import Kind
-from ppafo.report.panels import Mark
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 from ppafo.wording import count_of, percentage
@@ -230,46 +229,6 @@ def _change_per_sweep(source: RecordingSource, name: str) -> float:
     return abs(float(np.sum((direction[1:] * np.diff(source.recording[name]))[is_inside]))) / sweeps
 
 
-@dataclass(frozen=True, slots=True)
-class _Unknowns:
-    """Unit of the load, and words, paths and units of slope, friction and growth of the friction.
-
-    Unknowns without an entry in a parameter set have a path that starts with ``static_torque``.
-    """
-
-    unit: str
-    slope: str
-    slope_path: str
-    slope_unit: str
-    friction: str
-    friction_path: str
-    growth_path: str
-
-
-def _unknowns_of(readings: TorqueReadings) -> _Unknowns:
-    """Return the unknowns for a torque or a force; an actuator that slides has kinetic friction."""
-    key, friction = ("dynamic", "friction in motion") if readings.slides else ("static", "static friction")
-    if readings.channel == FORCE:
-        return _Unknowns(
-            unit="N",
-            slope="area",
-            slope_path="static_torque.area",
-            slope_unit="m^2",
-            friction=friction,
-            friction_path=f"static_torque.{key}_friction",
-            growth_path="static_torque.friction_per_pressure",
-        )
-    return _Unknowns(
-        unit="N m",
-        slope="torque constant",
-        slope_path="actuator.torque_constant",
-        slope_unit="m^3",
-        friction=friction,
-        friction_path=f"friction.{key}_torque",
-        growth_path=f"effects.seal_friction.{key}_per_pressure",
-    )
-
-
 def static_torque(
     sources: tuple[RecordingSource, ...], confidence: float = 0.95, tolerances: Tolerances = DEFAULTS
 ) -> BenchResult:
@@ -291,29 +250,39 @@ def static_torque(
         IdentificationError: recordings that cannot separate the unknowns; names file, sample and remedy
     """
     readings = torque_readings(sources, tolerances.zero_of_pressure)
-    unknowns, channel = _unknowns_of(readings), readings.channel
-    files = [source.name for source in sources]
-    slope, zero, friction, friction_scale = _straight_line(readings, ", ".join(files))
+    channel, is_force, files = readings.channel, readings.channel == FORCE, [source.name for source in sources]
+    # An actuator that slides has kinetic friction. A set has no entry for a force or an area.
+    key, friction = ("dynamic", "friction in motion") if readings.slides else ("static", "static friction")
+    load_unit, slope, slope_unit = ("N", "area", "m^2") if is_force else ("N m", "torque constant", "m^3")
+    slope_path = "static_torque.area" if is_force else "actuator.torque_constant"
+    friction_path = f"static_torque.{key}_friction" if is_force else f"friction.{key}_torque"
+    growth_path = f"effects.seal_friction.{key}_per_pressure"
+    growth_path = "static_torque.friction_per_pressure" if is_force else growth_path
+    start_slope, start_zero, start_friction, scale = _straight_line(readings, ", ".join(files))
     frictions = [f"friction of {file}" for file in files] if len(files) > 1 else []
     has_zeros = "zero" in tolerances.each_recording and len(files) > 1
     zeros = [f"{_SENSOR_ZERO} of {file}" for file in files] if has_zeros else [_SENSOR_ZERO]
     load_gain = f"gain of the {channel} sensor"
     numbers = (
-        sought(unknowns.slope_path, slope),
-        sought(unknowns.friction_path, friction, scale=friction_scale),
-        sought(unknowns.growth_path, 0.0, scale=friction_scale / float(np.abs(readings.pressure).max())),
-        sought(_ZERO, zero, scale=friction_scale),
+        sought(slope_path, start_slope),
+        sought(friction_path, start_friction, scale=scale),
+        sought(growth_path, 0.0, scale=scale / float(np.abs(readings.pressure).max())),
+        sought(_ZERO, start_zero, scale=scale),
         *(number for name in zeros for number in within(name, tolerances.zero_of_pressure)),
         *within(_GAIN, tolerances.gain_of("pressure")),
         *within(load_gain, tolerances.gain_of(channel)),
         *(number for name in frictions for number in within(name, tolerances.friction, "friction")),
     )
 
+    def of_files(at: Values, names: list[str]) -> Floats:
+        values = np.array([at[name] for name in names] or [0.0])
+        return np.asarray(values[readings.files] if len(names) > 1 else values)
+
     def law(at: Values) -> Floats:
-        pressure = (readings.pressure - _of_files(at, zeros, readings.files)) / (1.0 + at[_GAIN])
-        resisting = readings.branch * (at[unknowns.friction_path] + at[unknowns.growth_path] * np.abs(pressure))
-        resisting = resisting * (1.0 + _of_files(at, frictions, readings.files))
-        load = (1.0 + at[load_gain]) * (at[unknowns.slope_path] * pressure - resisting)
+        pressure = (readings.pressure - of_files(at, zeros)) / (1.0 + at[_GAIN])
+        resisting = readings.branch * (at[friction_path] + at[growth_path] * np.abs(pressure))
+        resisting = resisting * (1.0 + of_files(at, frictions))
+        load = (1.0 + at[load_gain]) * (at[slope_path] * pressure - resisting)
         return np.asarray(readings.weight * (load + at[_ZERO]))
 
     middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
@@ -327,62 +296,42 @@ def static_torque(
     )
     fitted, weighted_model = solve(law, weighted, numbers, confidence)
     values, residuals = fitted.by_name, readings.load - weighted_model / readings.weight
-    shown_slope, slope_unit = in_shown_unit(values[unknowns.slope_path], unknowns.slope_unit)
-    shown_friction, unit = in_shown_unit(values[unknowns.friction_path], unknowns.unit)
-    scatter, _ = in_shown_unit(float(np.std(residuals)), unknowns.unit)
+    marks = []
+    for role, sign, motion in (("rising", 1.0, "with"), ("falling", -1.0, "against")):
+        # An actuator that slides at constant pressure has two directions of motion as branches.
+        label = f"moving {motion} the pressure" if readings.slides else f"pressure {role}"
+        on = readings.branch == sign
+        marks.append(readings_mark(label, readings.pressure[on], readings.load[on], role))
+    ends = np.array([readings.pressure.min(), readings.pressure.max()])
+    marks.append(curve_mark("without friction", ends, values[slope_path] * ends + values[_ZERO]))
+    shown_slope, shown_slope_unit = in_shown_unit(values[slope_path], slope_unit)
+    shown_friction, unit = in_shown_unit(values[friction_path], load_unit)
+    scatter, _ = in_shown_unit(float(np.std(residuals)), load_unit)
+    axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind(channel.capitalize(), load_unit, channel)
     result = result_of(
         PROCEDURE,
         sources,
         fitted,
         (
-            ReportedNumber(
-                unknowns.slope_path,
-                unknowns.slope_unit,
-                f"{unknowns.slope.capitalize()}, the common slope of both branches",
-            ),
-            ReportedNumber(
-                unknowns.friction_path, unknowns.unit, f"{unknowns.friction.capitalize()} without a pressure difference"
-            ),
-            ReportedNumber(
-                unknowns.growth_path,
-                f"{unknowns.unit}/Pa",
-                f"Growth of the {unknowns.friction} with the pressure difference",
-            ),
+            ReportedNumber(slope_path, slope_unit, f"{slope.capitalize()}, the common slope of both branches"),
+            ReportedNumber(friction_path, load_unit, f"{friction.capitalize()} without a pressure difference"),
+            ReportedNumber(growth_path, f"{load_unit}/Pa", f"Growth of the {friction} with the pressure difference"),
             # A zero of the scale may be an answer.
-            ReportedNumber(_ZERO, unknowns.unit, f"Zero of the {channel} sensor", float(np.ptp(readings.load))),
+            ReportedNumber(_ZERO, load_unit, f"Zero of the {channel} sensor", float(np.ptp(readings.load))),
         ),
-        f"{readings.pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {unknowns.slope} "
-        f"{shown_slope:.4g} {slope_unit}, {unknowns.friction} {shown_friction:.3g} {unit}; "
-        f"scatter {scatter:.3g} {unit}",
-        with_residuals(
-            f"Static {channel}",
-            Kind("Pressure difference", "Pa_d", "pressure change"),
-            Kind(channel.capitalize(), unknowns.unit, channel),
-            _marks(readings, values[unknowns.slope_path], values[_ZERO]),
-            readings.pressure,
-            residuals,
-        ),
-        f"a constant {unknowns.slope} and a {unknowns.friction} linear in pressure do not describe the readings",
+        f"{readings.pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {slope} "
+        f"{shown_slope:.4g} {shown_slope_unit}, {friction} {shown_friction:.3g} {unit}; scatter {scatter:.3g} {unit}",
+        with_residuals(f"Static {channel}", *axes, marks, readings.pressure, residuals),
+        f"a constant {slope} and a {friction} linear in pressure do not describe the readings",
     )
-    return _with_possible_friction(result, unknowns)
-
-
-def _with_possible_friction(result: BenchResult, unknowns: _Unknowns) -> BenchResult:
-    """Limit the result to this model if friction or its growth with pressure is certainly negative."""
-    if result.conflict:
-        return result
-    if result[unknowns.friction_path].high < 0.0:
-        fault = f"the {unknowns.friction} without pressure is negative, as if it drove the motion"
-    elif result[unknowns.growth_path].high < 0.0:
-        fault = f"the {unknowns.friction} falls as the pressure rises, as if pressure loosened the seal"
-    else:
-        return result
-    estimates = tuple(
-        replace(estimate, verdict="holds for this model only") if estimate.verdict == "identified" else estimate
-        for estimate in result.estimates
-    )
-    remedy = "check the channels and their units, or add recordings at other pressures"
-    return replace(result, estimates=estimates, conflict=f"{fault}; {remedy}")
+    # Friction that is certainly negative, or falls with the pressure, is none.
+    for path, fault in (
+        (friction_path, "without pressure is negative, as if it drove the motion"),
+        (growth_path, "falls as the pressure rises, as if pressure loosened the seal"),
+    ):
+        if not result.conflict and result[path].high < 0.0:
+            return result.for_this_model_only(f"the {friction} {fault}; check the channels and their units")
+    return result
 
 
 def _straight_line(readings: TorqueReadings, files: str) -> tuple[float, float, float, float]:
@@ -409,21 +358,3 @@ def _straight_line(readings: TorqueReadings, files: str) -> tuple[float, float, 
             "reverse the sign of channel 'direction'"
         )
     return slope, zero, friction, max(abs(friction), deviation)
-
-
-def _of_files(at: Values, names: list[str], files: NDArray[np.int64]) -> Floats:
-    """Return the tolerance of each reading: value of its file, or common value; 0 without tolerance."""
-    values = np.array([at[name] for name in names] or [0.0])
-    return np.asarray(values[files] if len(names) > 1 else values)
-
-
-def _marks(readings: TorqueReadings, slope: float, zero: float) -> list[Mark]:
-    """Return the plot marks of both branches over pressure, and of the frictionless line with this slope and zero."""
-    marks = []
-    for role, sign, motion in (("rising", 1.0, "with"), ("falling", -1.0, "against")):
-        # An actuator that slides at constant pressure has two directions of motion as branches.
-        label = f"moving {motion} the pressure" if readings.slides else f"pressure {role}"
-        on = readings.branch == sign
-        marks.append(readings_mark(label, readings.pressure[on], readings.load[on], role))
-    ends = np.array([readings.pressure.min(), readings.pressure.max()])
-    return [*marks, curve_mark("without friction", ends, slope * ends + zero)]

@@ -12,6 +12,7 @@ gain common to both sensors does not change the rate at which D falls.
 """
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal, NamedTuple
@@ -42,6 +43,7 @@ from ppafo.identification.bench.law import (
     PooledReadings,
     ReportedNumber,
     Values,
+    halved_readings,
     recordings_of,
     result_of,
     solve,
@@ -89,7 +91,7 @@ _LEAST_DIFFERENCE = 1.0
 """Least initial pressure difference of a computed fall [Pa]."""
 _LEAST_RATE = 1.0e-300
 """Least rate of a computed fall [Pa/s], so that the pressures of tight chambers stay finite."""
-RIVALS: dict[Law, Law] = {"both": "iso6358", "iso6358": "both"}
+RIVALS: Mapping[Law, tuple[Law, ...]] = {"both": ("iso6358",), "iso6358": ("both",)}
 """Law that a fitted law is compared with, by law."""
 _CLEAR = math.log(100.0)
 """Difference of log-likelihoods [-] from which one law explains readings clearly better.
@@ -112,9 +114,9 @@ _TRIAL_RATIOS = tuple(np.linspace(*CRITICAL_RATIOS[1:], 20).tolist())
 From the usual one, a search may end at a wrong minimum, with zeros of the sensors for the bend of the curve."""
 _SHARP = 0.6
 """Discharge coefficient of a sharp-edged hole [-]."""
-_Laws = tuple[tuple[Opening, ReportedNumber], ...]
+_Laws = Sequence[tuple[Opening, ReportedNumber]]
 """Chosen law and its rival, if it has one, each with its reported size."""
-_REMEDY = "{}, or give a start and an end; gas may leak elsewhere, or exchange heat with the walls"
+_NEITHER = "neither ISO 6358 nor an orifice beside a laminar gap explains the readings"
 # Closed chambers.
 
 _RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
@@ -302,57 +304,6 @@ class LawFit(NamedTuple):
         return f"law = '{self.opening.law}' ({', '.join(quantities)})"
 
 
-def next_law(chosen: LawFit, rival: LawFit | None) -> str:
-    """Return the remedy for readings that the chosen law does not fit; None for a law without a rival."""
-    if rival is None:
-        # An orifice in the form of the set, with its critical ratio.
-        return NEXT_LAW["orifice" if chosen.opening.law == "iso6358" else chosen.opening.law]
-    if rival.is_sound and rival.fitted.log_likelihood > chosen.fitted.log_likelihood - _CLEAR:
-        return f"try law = '{rival.opening.law}'"
-    return "neither ISO 6358 nor an orifice beside a laminar gap explains the readings"
-
-
-def with_rival(result: BenchResult, chosen: LawFit, rival: LawFit, remedy: str) -> BenchResult:
-    """Return the result of the chosen law, with the verdicts that its rival allows.
-
-    If the rival explains the readings clearly better, that is a conflict. If neither does, a remark says so, and values
-    that depend on whether there is a gap hold for this model only. ``remedy`` is the advice where no law fits.
-    """
-    advantage = rival.fitted.log_likelihood - chosen.fitted.log_likelihood
-    with_gap = rival if chosen.opening.has_sought_ratio else chosen
-    has_leak = any(estimate.is_usable and estimate.value > 0.0 for estimate in result.estimates)
-    if advantage >= _CLEAR:
-        better = (
-            f"{rival.text} explains the readings better than law = '{chosen.opening.law}' (log-likelihood higher by "
-            f"{advantage:.1f})"
-        )
-        advice = f"{better}; give law = '{rival.opening.law}'"
-        unexplained = result.conflict or f"{better}, but not all of them; {remedy}"
-        result = replace(result, conflict=advice if rival.is_sound else unexplained)
-    elif (
-        advantage <= -_CLEAR
-        or not has_leak
-        or result.conflict
-        or rival.fitted.conflict is not None
-        # Without a gap, an orifice with the set's b is ISO 6358 with another b.
-        or (with_gap.opening.critical_ratio is not None and not with_gap.has_gap)
-    ):
-        return result
-    else:
-        remark = (
-            f"the readings do not tell law = '{chosen.opening.law}' from {rival.text}: the log-likelihoods differ by "
-            f"{abs(advantage):.1f}, less than {_CLEAR:.1f}; less noise, or more pressures, may tell them apart"
-        )
-        result = replace(result, remarks=(*result.remarks, remark))
-        # Without a gap, both laws are an orifice.
-        if not with_gap.has_gap:
-            return result
-    estimates = [
-        replace(item, verdict="holds for this model only") if item.is_identified else item for item in result.estimates
-    ]
-    return replace(result, estimates=tuple(estimates))
-
-
 def vane_leak(
     sources: tuple[RecordingSource, ...],
     gas: GasAt,
@@ -392,36 +343,17 @@ def vane_leak(
     Raises:
         IdentificationError: recordings that do not determine the leak; names file, sample and remedy
     """
-    laws = tuple(
-        _law(gas, each, discharge_coefficient, critical_ratio) for each in (law, RIVALS.get(law)) if each is not None
-    )
+    laws = list[tuple[Opening, ReportedNumber]]()
+    for each in (law, *RIVALS.get(law, ())):
+        # An orifice has the form of the set; the law ``iso6358`` seeks b.
+        form = "iso6358" if each == "orifice" and critical_ratio is not None else each
+        known_ratio = None if each == "iso6358" else critical_ratio
+        opening = Opening(gas, form, discharge_coefficient or PRODUCT_ONLY, known_ratio)
+        laws.append((opening, _size(opening, discharge_coefficient)))
     if sources and all("mass_flow" in source.recording for source in sources):
         return _steady_leak(sources, laws, tolerances, confidence)
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
-    sources, remarks = without_wrong_samples(sources, PROCEDURE, CHANNELS, start, end)
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS)
-    for source in sources:
-        # A chamber that is open to the room has a constant pressure.
-        check_moves(source, PROCEDURE, max(CHANNELS, key=lambda name: float(np.ptp(source.recording[name]))))
-    decays = tuple(chamber_decay(source, start, end, number) for number, source in enumerate(sources, start=1))
-    if len({(decay.fuller, decay.changing) for decay in decays}) > 1:
-        raise IdentificationError(
-            "chamber 1 empties in some recordings and chamber 2 in others; give each chamber its own [[procedure]]"
-        )
     volumes = volume_1, volume_2
-    result = _closed_leak(sources, decays, laws, volumes, volume_deviation, tolerances, confidence)
-    return replace(result, remarks=(*remarks, *result.remarks))
-
-
-def _law(
-    gas: GasAt, law: Law, discharge_coefficient: float | None, critical_ratio: float | None
-) -> tuple[Opening, ReportedNumber]:
-    """Return the law of the leak and its reported size: path in a set, unit and description."""
-    # An orifice has the form of the set; the law ``iso6358`` seeks b.
-    is_standard = law == "orifice" and critical_ratio is not None
-    known_ratio = None if law == "iso6358" else critical_ratio
-    opening = Opening(gas, "iso6358" if is_standard else law, discharge_coefficient or PRODUCT_ONLY, known_ratio)
-    return opening, _size(opening, discharge_coefficient)
+    return _closed_leak(sources, (start, end), laws, volumes, volume_deviation, tolerances, confidence)
 
 
 def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumber:
@@ -442,7 +374,10 @@ def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumb
 
 
 def _steady_leak(
-    sources: tuple[RecordingSource, ...], laws: _Laws, tolerances: Tolerances, confidence: float
+    sources: tuple[RecordingSource, ...],
+    laws: _Laws,
+    tolerances: Tolerances,
+    confidence: float,
 ) -> BenchResult:
     """Identify the leak from steady flow at several pressures, which separate the zero of the flow meter."""
     channels = (*CHANNELS, "mass_flow")
@@ -474,7 +409,7 @@ def _steady_leak(
     curve = curve_mark(LAW_NAMES[chosen.opening.law], difference, chosen.model)
     marks = readings_mark("measured", difference, flow), curve
     axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind("Flow", "kg/s", "mass flow")
-    return _result(
+    return _compared(
         sources,
         fits,
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
@@ -484,7 +419,7 @@ def _steady_leak(
     )
 
 
-def _result(
+def _compared(
     sources: tuple[RecordingSource, ...],
     fits: list[LawFit],
     summary: str,
@@ -492,23 +427,73 @@ def _result(
     remarks: tuple[str, ...],
     scatter: float = math.nan,
 ) -> BenchResult:
-    """Return the result of the first of ``fits``, compared with its rival if there is one."""
-    chosen, rival = fits[0], fits[1] if len(fits) > 1 else None
-    remedy = _REMEDY.format(next_law(chosen, rival))
+    """Return the result of the first of ``fits``, with the verdicts that its rival allows if there is one.
+
+    If the rival explains the readings clearly better, that is a conflict. If neither does, a remark says so, and values
+    that depend on whether there is a gap hold for this model only.
+    """
+    chosen, rival = fits[0], fits[-1]
+    # An orifice in the form of the set, with its critical ratio.
+    advice = NEXT_LAW["orifice" if chosen.opening.law == "iso6358" else chosen.opening.law]
+    advantage = rival.fitted.log_likelihood - chosen.fitted.log_likelihood
+    if rival is not chosen:
+        is_better = rival.is_sound and advantage > -_CLEAR
+        advice = f"try law = '{rival.opening.law}'" if is_better else _NEITHER
+    remedy = f"{advice}, or give a start and an end; gas may leak elsewhere, or exchange heat with the walls"
     result = result_of(PROCEDURE, sources, chosen.fitted, chosen.reported, summary, panels, remedy, remarks, scatter)
-    return result if rival is None else with_rival(result, chosen, rival, remedy)
+    if rival is chosen:
+        return result
+    if advantage >= _CLEAR:
+        better = (
+            f"{rival.text} explains the readings better than law = '{chosen.opening.law}' (log-likelihood higher by "
+            f"{advantage:.1f})"
+        )
+        unexplained = result.conflict or f"{better}, but not all of them; {remedy}"
+        advice = f"{better}; give law = '{rival.opening.law}'"
+        return result.for_this_model_only(advice if rival.is_sound else unexplained)
+    with_gap = rival if chosen.opening.has_sought_ratio else chosen
+    if (
+        advantage <= -_CLEAR
+        or not any(estimate.is_usable and estimate.value > 0.0 for estimate in result.estimates)
+        or result.conflict
+        or rival.fitted.conflict is not None
+        # Without a gap, an orifice with the set's b is ISO 6358 with another b.
+        or (with_gap.opening.critical_ratio is not None and not with_gap.has_gap)
+    ):
+        return result
+    remark = (
+        f"the readings do not tell law = '{chosen.opening.law}' from {rival.text}: the log-likelihoods differ by "
+        f"{abs(advantage):.1f}, less than {_CLEAR:.1f}; less noise, or more pressures, may tell them apart"
+    )
+    result = replace(result, remarks=(*result.remarks, remark))
+    # Without a gap, both laws are an orifice.
+    return result.for_this_model_only("") if with_gap.has_gap else result
 
 
 def _closed_leak(
     sources: tuple[RecordingSource, ...],
-    decays: tuple[ChamberDecay, ...],
+    window: tuple[float | None, float | None],
     laws: _Laws,
     volumes: tuple[float | None, float | None],
     volume_deviation: float,
     tolerances: Tolerances,
     confidence: float,
 ) -> BenchResult:
-    """Identify the leak from the pressures in closed chambers; ``volumes`` are V of chambers 1 and 2 [m^3]."""
+    """Identify the leak from the pressures in closed chambers between two times [s], the ``window``.
+
+    ``volumes`` are V of chambers 1 and 2 [m^3].
+    """
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    sources, remarks = without_wrong_samples(sources, PROCEDURE, CHANNELS, *window)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS)
+    for source in sources:
+        # A chamber that is open to the room has a constant pressure.
+        check_moves(source, PROCEDURE, max(CHANNELS, key=lambda name: float(np.ptp(source.recording[name]))))
+    decays = tuple(chamber_decay(source, *window, number) for number, source in enumerate(sources, start=1))
+    if len({(decay.fuller, decay.changing) for decay in decays}) > 1:
+        raise IdentificationError(
+            "chamber 1 empties in some recordings and chamber 2 in others; give each chamber its own [[procedure]]"
+        )
     # The chamber whose pressure determines the leak empties, or fills from a room.
     chamber = decays[0].fuller if decays[0].changing == 0 else 3 - decays[0].fuller
     volume, other_volume = volumes if chamber == 1 else volumes[::-1]
@@ -526,7 +511,10 @@ def _closed_leak(
         *tolerance(_VOLUME, volume_deviation if volume else 0.0),
         *(zero for sensor, _ in decays[0].sensors for zero in within(f"zero of {sensor}", tolerances.zero_of_pressure)),
     )
-    readings, fits = _readings(sources, decays), list[LawFit]()
+    # A wrong law gives different sizes early and late in a fall.
+    halves = (int(np.argmax(decay.first - decay.second < 0.5 * sum(decay.ends))) for decay in decays)
+    parts = zip(halves, (decay.fitted for decay in decays), strict=True)
+    readings, fits = halved_readings(sources, parts, ("the early fall", "the late fall")), list[LawFit]()
     for opening, size in laws:
         start, alone = _rough_sizes(decays, opening, assumed_volume)
         reported, paths = reported_parts(opening, size, gap, alone)
@@ -540,18 +528,18 @@ def _closed_leak(
     names = [LAW_NAMES[laws[0][0].law], *[""] * (len(times) - 1)]
     marks = [readings_mark("measured", time, readings.measured)]
     marks += [curve_mark(*curve) for curve in zip(names, times, models, strict=True)]
-    is_room = all(decay.room is not None for decay in decays)
-    room = (f"the pressure in chamber {3 - chamber} is constant, so it is treated as a reservoir",) if is_room else ()
+    if all(decay.room is not None for decay in decays):
+        remarks = (*remarks, f"the pressure in chamber {3 - chamber} is constant, so it is treated as a reservoir")
     longest = max(float(decay.time[-1]) for decay in decays)
     fall = max(1.0 - last / first for first, last in (decay.ends for decay in decays))
-    return _result(
+    return _compared(
         sources,
         fits,
         f"{count_of(len(decays), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
         with_residuals(
             "Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, readings.measured - model
         ),
-        room,
+        remarks,
     )
 
 
@@ -640,17 +628,3 @@ def _shown_pressures(
                 relaxed = 1.0 + at[_RELAXED_BY.format(sensor, decay.number)] * faded
                 shown.append(pressure * relaxed + at[f"zero of {sensor}"])
     return np.concatenate(shown)
-
-
-def _readings(sources: tuple[RecordingSource, ...], decays: tuple[ChamberDecay, ...]) -> PooledReadings:
-    """Return the samples of all decays, labelled by sensor and by half of the pressure fall."""
-    series, sensors, halves = list[Floats](), list[str](), list[str]()
-    for decay in decays:
-        half = int(np.argmax(decay.first - decay.second < 0.5 * sum(decay.ends)))
-        for sensor, values in decay.fitted:
-            series.append(values)
-            sensors += [sensor] * values.size
-            # A wrong law gives different sizes early and late in a fall.
-            halves += ["the early fall"] * half + ["the late fall"] * (values.size - half)
-    counts = [decay.time.size * len(decay.fitted) for decay in decays]
-    return PooledReadings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
