@@ -72,8 +72,6 @@ _SWING_SECTION = (
     '"initial.pressure_2=atmosphere", "actuator.dead_volume_1=10 L", "actuator.dead_volume_2=10 L"], recording = '
 )
 """Fit of a swing on a spring, with chambers open to the atmosphere; with little friction the first run swings too."""
-# How a vane slows down without pressure: equation (1) as angle and speed over time, from a push to standstill.
-
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 """Nodes and weights of three-point Gauss-Legendre quadrature, used in each step of the speed."""
 _STEPS = 240
@@ -309,8 +307,22 @@ def free_decay(
         speeds = [] if decay.velocity is None else [(VELOCITY, decay.velocity)]
         parts.append((half, [(ANGLE, decay.angle), *speeds]))
     readings = halved_readings(sources, parts, ("the first half of the travel", "the second half of the travel"))
-    fit, model = solve(lambda at: _shown_motion(at, decays, paths, assumed_inertia), readings, numbers, confidence)
-    slowing = _slowing(fit.by_name, paths, assumed_inertia)
+
+    def slowing_of(at: Values, inertia: float) -> Slowing:
+        damping_rate, deceleration = (max(at[path], 0.0) / inertia for path in paths)
+        return Slowing(damping_rate, deceleration, math.expm1(at.get(_RISE, 0.0)), at.get(_RISE_VELOCITY, 0.0))
+
+    def law(at: Values) -> Floats:
+        slowing, series = slowing_of(at, assumed_inertia * (1.0 + at[_INERTIA])), []
+        for number, decay in enumerate(decays, start=1):
+            _, swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
+            series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
+            if decay.velocity is not None:
+                series.append(decay.sign * speed)
+        return np.concatenate(series)
+
+    fit, model = solve(law, readings, numbers, confidence)
+    slowing = slowing_of(fit.by_name, assumed_inertia)
     at_rest = sum(
         float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
         for number, decay in enumerate(decays, start=1)
@@ -329,27 +341,6 @@ def free_decay(
         "another torque acts, such as gravity, an end stop or friction that depends differently on speed",
         remarks,
     )
-
-
-def _slowing(at: Values, paths: tuple[str, str], inertia: float) -> Slowing:
-    """Return the deceleration law for values of the unknowns; ``paths`` name damping and friction in the fit."""
-    return Slowing(
-        damping_rate=max(at[paths[0]], 0.0) / inertia,
-        deceleration=max(at[paths[1]], 0.0) / inertia,
-        rise=math.expm1(at.get(_RISE, 0.0)),
-        rise_velocity=at.get(_RISE_VELOCITY, 0.0),
-    )
-
-
-def _shown_motion(at: Values, decays: tuple[FreeDecay, ...], paths: tuple[str, str], inertia: float) -> Floats:
-    """Return the readings of angle [rad] and recorded velocity [rad/s] over all decays, for values of the unknowns."""
-    slowing, series = _slowing(at, paths, inertia * (1.0 + at[_INERTIA])), []
-    for number, decay in enumerate(decays, start=1):
-        _, swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
-        series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
-        if decay.velocity is not None:
-            series.append(decay.sign * speed)
-    return np.concatenate(series)
 
 
 def _unknowns(

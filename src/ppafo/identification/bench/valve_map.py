@@ -34,7 +34,6 @@ from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.valves.proportional import spool_position
 from ppafo.report.kind import Kind
-from ppafo.report.panels import Mark
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 
@@ -168,15 +167,30 @@ def valve_map(
     is_clear = bool((sweep.command > _CLEAR_COMMAND).any() and (sweep.command < -_CLEAR_COMMAND).any())
     one_way = "only one direction of flow was recorded: the other direction may behave differently"
     no_play = "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
+    reported = [
+        ReportedNumber(band, "", "Dead band: command below which no gas flows, in both directions", _SMALL_COMMAND),
+        ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
+    ]
+    # Near the highest command there is no saturation to be seen, and no backlash in commands of one direction.
+    if values[_SATURATION] < sweep.highest_command - _SATURATES:
+        reported.append(ReportedNumber(_SATURATION, "", "Saturation: command beyond which the opening is constant"))
+    if sweep.is_two_way:
+        width = "Hysteresis: width between rising and falling command"
+        reported.append(ReportedNumber(_PLAY, "", width, _SMALL_COMMAND))
+    marks = []
+    for role, name, on in (("rising", "fitted", sweep.branch == 1.0), ("falling", "", sweep.branch == -1.0)):
+        if on.any():
+            marks.append(readings_mark(f"command {role}", sweep.command[on], sweep.flow[on], role))
+            marks.append(curve_mark(name, sweep.command[on], model[on]))
     axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
     return result_of(
         PROCEDURE,
         sources,
         fitted,
-        _reported(sweep, band, values[_SATURATION]),
+        reported,
         f"{sweep.command.size} readings; dead band {values[band]:.3g}, {values[_GAIN] * 1e6:.4g} mm^2 per command; "
         f"scatter {scatter:.2%} of the largest flow",
-        with_residuals("Valve map", *axes, _marks(sweep, model), sweep.command, residuals),
+        with_residuals("Valve map", *axes, marks, sweep.command, residuals),
         remedy,
         (*remarks, *(() if is_clear else (one_way,)), *(() if sweep.is_two_way else (no_play,))),
     )
@@ -201,33 +215,6 @@ def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, areas: Floats, 
         sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()),
     )
-
-
-def _reported(sweep: _Sweep, band: str, saturation: float) -> list[ReportedNumber]:
-    """Return the quantities to report; no saturation [-] near the highest command, no backlash for one-way commands."""
-    reported = [
-        ReportedNumber(band, "", "Dead band: command below which no gas flows, in both directions", _SMALL_COMMAND),
-        ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
-    ]
-    if saturation < sweep.highest_command - _SATURATES:
-        reported.append(ReportedNumber(_SATURATION, "", "Saturation: command beyond which the opening is constant"))
-    if sweep.is_two_way:
-        reported.append(
-            ReportedNumber(_PLAY, "", "Hysteresis: width between rising and falling command", _SMALL_COMMAND)
-        )
-    return reported
-
-
-def _marks(sweep: _Sweep, model: Floats) -> list[Mark]:
-    """Return the plot marks of readings and fitted flow over command, separately for rising and falling commands."""
-    marks = []
-    for role, sign in (("rising", 1.0), ("falling", -1.0)):
-        is_on_branch = sweep.branch == sign
-        if is_on_branch.any():
-            marks.append(readings_mark(f"command {role}", sweep.command[is_on_branch], sweep.flow[is_on_branch], role))
-            name = "fitted" if sign > 0.0 else ""
-            marks.append(curve_mark(name, sweep.command[is_on_branch], model[is_on_branch]))
-    return marks
 
 
 def area_of_command(

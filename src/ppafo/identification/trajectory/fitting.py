@@ -55,8 +55,6 @@ _FELT = 1.0e-3
 """Least residuals that are tested as bursts [ranges of the samples]; smaller ones are the engine's."""
 _BURST = 6.0
 """Ratio of residuals to the noise that lasts [-] from which they are no noise; slow noise has up to 5.5."""
-_INSIDE = 1.0e-3
-"""Relative distance from the edge of successful runs [-] at which a bound is suggested."""
 _OWN_SHARE = 0.2
 """Weight in an undetermined combination [-] from which a parameter itself counts as not identifiable."""
 _AT_BOUND = 1.0e-6
@@ -216,8 +214,7 @@ def _fit_of(problem: TrajectoryProblem, numbers: tuple[FitNumber, ...], report: 
         excesses = [row for row, variable in enumerate(variables) if variable.base]
         if all(free[row].low <= fitted.values[row] <= free[row].high for row in excesses):
             break
-    outliers = _outlier_remarks(fitted, blocks, {run.label: run.time for run in runs})
-    return _result(problem, numbers, runs, fitted, tuple(outliers))
+    return _result(problem, numbers, runs, blocks, fitted)
 
 
 def _excess(static: FitVariable, dynamic: FitVariable) -> FitVariable:
@@ -236,24 +233,71 @@ def _result(
     problem: TrajectoryProblem,
     numbers: tuple[FitNumber, ...],
     runs: Sequence[PreparedExperiment],
+    blocks: Sequence[ResidualBlock],
     fitted: Fit,
-    outliers: tuple[str, ...],
 ) -> TrajectoryFit:
     """Return the result of a finished search: estimates, updated tolerances, and the model beside each recording."""
+    models, measurements, channels, outliers = list[Recording](), list[Recording](), list[ChannelFit](), list[str]()
+    signals = signals_of(runs, numbers, fitted.values[:, None])
+    for experiment, run, columns in zip(problem.experiments, runs, signals, strict=True):
+        units = {name: CHANNELS[name].unit for name in columns}
+        modelled = {name: Channel(column[:, 0], units[name]) for name, column in columns.items()}
+        samples = {channel.name: Channel(channel.values, units[channel.name]) for channel in run.channels}
+        models.append(Recording(f"model of {run.label}", run.time, modelled, kind="simulated"))
+        measurements.append(Recording(experiment.label, run.time, samples, kind=experiment.recording.kind))
+        for channel in run.channels:
+            residuals = channel.values - columns[channel.name][:, 0]
+            channels.append(
+                ChannelFit(
+                    experiment=run.label,
+                    channel=channel.name,
+                    unit=units[channel.name],
+                    noise=fitted.noise[channel.name],
+                    order=fitted.correlation[channel.name],
+                    rms=float(np.sqrt(np.mean(residuals * residuals))),
+                    largest=float(np.max(np.abs(residuals))),
+                    span=float(np.ptp(channel.values)),
+                )
+            )
+    times = {run.label: run.time for run in runs}
+    for block in blocks:
+        left_out = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
+        if left_out:
+            count, first = count_of(len(left_out), "outlier"), times[block.recording][left_out[0]]
+            text = f"{count} of {block.channel} left out, the first at {first:.6g} s"
+            outliers.append(f"experiment '{block.recording}': {text}")
     remedy = "the model is incomplete"
     is_free = any(number.path == _STATIC and not number.is_tolerance for number in numbers)
     if fitted.conflict is not None and fitted.conflict.group == "angle" and not is_free:
         remedy += f", or {_STATIC} is to be fitted too"
-    models, measurements, channels = _comparison(problem, numbers, runs, fitted)
     conflict = conflict_in_words(fitted, remedy) or _wandering(fitted, numbers) or _bursting(measurements, models)
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
     rows = [row for row, number in enumerate(numbers) if not number.is_tolerance]
     estimates = tuple(_estimate(problem, fitted, numbers[row], row, conflict) for row in rows)
     errors = np.sqrt(np.diag(fitted.covariance))
     covariance = fitted.covariance[np.ix_(rows, rows)]
-    tolerances = ((row, number) for row, number in enumerate(numbers) if number.is_tolerance)
-    known = [_known(fitted, number, row, float(errors[row]), estimates) for row, number in tolerances]
+    known = list[NuisanceParameter]()
+    for row, number in enumerate(numbers):
+        if number.is_tolerance:
+            name, free = number.free.name, number.free
+            shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
+            widens = max(shares, key=lambda path: shares[path], default="")
+            pairs = [(free.start, free.deviation), (float(fitted.values[row]), float(errors[row]))]
+            if number.is_logarithm:
+                pairs = [(math.exp(value), math.exp(value) * deviation) for value, deviation in pairs]
+            known.append(NuisanceParameter(name, number.unit, *pairs[0], *pairs[1], widens, shares.get(widens, 0.0)))
     scenarios = tuple(with_numbers(run.scenario, numbers_in(run.label, numbers, fitted.values)) for run in runs)
+    remarks = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
+    texts = {item.path: f"{item.value:.4g} {item.unit}".rstrip(" -") for item in estimates}
+    if fitted.edge:
+        sides = {path: "above" if side > 0 else "below" for path, side in fitted.edge.items()}
+        wanted = " and ".join(f"{path} {sides[path]} {text}" for path, text in texts.items() if path in sides)
+        remarks.append(f"the recordings favour {wanted}, where every run fails; check recordings, scenario and set")
+    elif not fitted.has_converged:
+        reached = ", ".join(f'start = "{text}" of {path}' for path, text in texts.items())
+        remarks.append(
+            f"the search stopped after {fitted.evaluations} runs before it converged; it goes on from {reached}"
+        )
     return TrajectoryFit(
         problem=problem,
         numbers=numbers,
@@ -267,82 +311,9 @@ def _result(
         measurements=tuple(measurements),
         scenarios=scenarios,
         conflict=conflict,
-        remarks=_remarks(fitted, scenarios, estimates),
-        outliers=outliers,
+        remarks=tuple(remarks),
+        outliers=tuple(outliers),
     )
-
-
-def _comparison(
-    problem: TrajectoryProblem, numbers: Sequence[FitNumber], runs: Sequence[PreparedExperiment], fitted: Fit
-) -> tuple[list[Recording], list[Recording], list[ChannelFit]]:
-    """Return the fitted runs at the sample times, the samples, and the residual statistics of their channels."""
-    models, measurements, channels = list[Recording](), list[Recording](), list[ChannelFit]()
-    signals = signals_of(runs, numbers, fitted.values[:, None])
-    for experiment, run, columns in zip(problem.experiments, runs, signals, strict=True):
-        modelled = {name: Channel(column[:, 0], CHANNELS[name].unit) for name, column in columns.items()}
-        samples = {channel.name: Channel(channel.values, CHANNELS[channel.name].unit) for channel in run.channels}
-        models.append(Recording(f"model of {run.label}", run.time, modelled, kind="simulated"))
-        measurements.append(Recording(experiment.label, run.time, samples, kind=experiment.recording.kind))
-        for channel in run.channels:
-            residuals = channel.values - columns[channel.name][:, 0]
-            channels.append(
-                ChannelFit(
-                    experiment=run.label,
-                    channel=channel.name,
-                    unit=CHANNELS[channel.name].unit,
-                    noise=fitted.noise[channel.name],
-                    order=fitted.correlation[channel.name],
-                    rms=float(np.sqrt(np.mean(residuals * residuals))),
-                    largest=float(np.max(np.abs(residuals))),
-                    span=float(np.ptp(channel.values)),
-                )
-            )
-    return models, measurements, channels
-
-
-def _remarks(fitted: Fit, scenarios: Sequence[Scenario], estimates: Sequence[Estimate]) -> tuple[str, ...]:
-    """Return remarks on violated rules of the fitted device and on a search that did not converge."""
-    remarks = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
-    texts = {item.path: f"{item.value:.4g} {item.unit}".rstrip(" -") for item in estimates}
-    if fitted.edge:
-        wanted, bounds = [], []
-        for estimate in (item for item in estimates if item.path in fitted.edge):
-            side = fitted.edge[estimate.path]
-            wanted.append(f"{estimate.path} {'above' if side > 0 else 'below'} {texts[estimate.path]}")
-            inside = estimate.value - side * _INSIDE * abs(estimate.value)
-            bound = f"{inside:.4g} {estimate.unit}".rstrip(" -")
-            bounds.append(f'{"high" if side > 0 else "low"} = "{bound}" of {estimate.path}')
-        remarks.append(
-            f"the recordings favour {' and '.join(wanted)}, where every run fails; check recordings, "
-            f"scenario and set, or give {' and '.join(bounds)} as a bound"
-        )
-    elif not fitted.has_converged:
-        starts = ", ".join(f'start = "{text}" of {path}' for path, text in texts.items())
-        remarks.append(
-            f"the search stopped after {fitted.evaluations} runs before it converged; to continue, give the parameters "
-            f"{starts}"
-        )
-    return tuple(remarks)
-
-
-def _outlier_remarks(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mapping[str, Floats]) -> Iterator[str]:
-    """Yield a remark on the outliers of each channel of each recording; ``times`` [s] are the sample times."""
-    for block in blocks:
-        samples = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
-        if samples:
-            outliers, first = count_of(len(samples), "outlier"), times[block.recording][samples[0]]
-            yield f"experiment '{block.recording}': {outliers} of {block.channel} left out, the first at {first:.6g} s"
-
-
-def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Sequence[Estimate]) -> NuisanceParameter:
-    """Return a tolerance after the fit, with the unknown whose interval it widens most."""
-    name, free = number.free.name, number.free
-    shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
-    widens = max(shares, key=lambda path: shares[path], default="")
-    known = [(free.start, free.deviation), (float(fitted.values[row]), error)]
-    if number.is_logarithm:
-        known = [(math.exp(value), math.exp(value) * deviation) for value, deviation in known]
-    return NuisanceParameter(name, number.unit, *known[0], *known[1], widens, shares.get(widens, 0.0))
 
 
 def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
