@@ -319,17 +319,25 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
 
 def _tasks_in_order(reader: _RecordingReader) -> list[_Task]:
     """Return the procedures of a problem with their recordings, each after the procedures whose results it uses."""
-    from ppafo.identification.procedures import PROCEDURES, FlowProblem
+    from ppafo.identification.procedures import PROCEDURES, FlowProblem, check_needed_channels
+    from ppafo.signals.recording import TIME
 
-    tasks, wrong = [], list[PpafoError]()
+    tasks = []
     for number, procedure in enumerate(reader.problem.procedure, start=1):
         row_time, gas = _ROW_TIMES.get(procedure.kind), procedure.gas if isinstance(procedure, FlowProblem) else None
         sources: list[RecordingSource] = []
         for recording in procedure.recordings:
+            wrong = list[PpafoError]()
             with noted_in(wrong):
                 sources += reader.read(recording, procedure.columns, row_time, gas)
+            if wrong and procedure.columns is not None:
+                # What the map lacks is said with what is wrong in it.
+                mapped = reader.problem.columns[procedure.columns]
+                names = [name for name in mapped.channels if name != TIME]
+                with noted_in(wrong):
+                    check_needed_channels(recording, procedure, [*names, *(["direction"] if mapped.direction else [])])
+            raise_noted(wrong)
         tasks.append(_Task(procedure, tuple(sources), f"{reader.file}: procedure {number}, {procedure.kind}"))
-    raise_noted(wrong)
     return sorted(tasks, key=lambda task: PROCEDURES.index(task.procedure.kind))
 
 

@@ -87,32 +87,6 @@ class ProcedureContext:
 
         Raises IdentificationError for an unknown species, and for a flow recorded as one of another gas.
         """
-        gas = self._gas(problem)
-        for source in sources:
-            channel = source.recording.channels.get("mass_flow")
-            stated = "" if channel is None else channel.stated
-            metered = molar_mass_in(stated)
-            if metered is None or abs(metered / gas.molar_mass - 1.0) < _SAME_GAS:
-                continue
-            used = f"the set's, {gas.molar_mass:.4g} kg/mol" if problem.gas is None else problem.gas
-            names = [name for name, each in SPECIES.items() if abs(each.molar_mass / metered - 1.0) < _SAME_GAS]
-            name = names[0] if names else ""
-            remedy = f"; give gas = '{name}' in the procedure, or correct the unit of the flow" if name else ""
-            raise IdentificationError(
-                f"{source.name}: mass_flow in '{stated}' is a flow of {name or 'another gas'}, "
-                f"{metered:.4g} kg/mol, but the gas of {self.label} is {used}{remedy}"
-            )
-        return gas
-
-    def gas_text(self, problem: "FlowProblem", gas: GasAt) -> str:
-        """Return species and temperature of the gas of the bench as text, such as ``CO2 of the set, 22 degC``."""
-        names = [name for name, each in SPECIES.items() if abs(each.molar_mass / gas.molar_mass - 1.0) < _SAME_GAS]
-        name = names[0] if names else f"{gas.molar_mass:.4g} kg/mol"
-        origin = " of the set" if problem.gas is None else ""
-        return f"{name}{origin}, {from_si(gas.temperature, 'degC', 'K'):.4g} degC"
-
-    def _gas(self, problem: "FlowProblem") -> GasAt:
-        """Return the gas that the procedure or the set states."""
         temperature = quantity_in(problem, "temperature", "K", self.label, _COLDEST, _HOTTEST)
         if temperature is None:
             (temperature,) = self.numbers("gas.temperature")
@@ -121,13 +95,28 @@ class ProcedureContext:
             limit = self.tolerances.gas_temperature
             deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
         if problem.gas is None:
-            molar_mass, heat_capacity_ratio = self.numbers("gas.molar_mass", "gas.heat_capacity_ratio")
-            return GasAt(molar_mass, heat_capacity_ratio, temperature, deviation)
-        if problem.gas not in SPECIES:
-            names = known_names(problem.gas, SPECIES)
-            raise IdentificationError(f"{self.label}: gas = {problem.gas!r} is unknown{names}")
-        species = SPECIES[problem.gas]
-        return GasAt(species.molar_mass, species.heat_capacity_ratio, temperature, deviation)
+            kind = self.numbers("gas.molar_mass", "gas.heat_capacity_ratio")
+        elif (species := SPECIES.get(problem.gas)) is None:
+            raise IdentificationError(
+                f"{self.label}: gas = {problem.gas!r} is unknown{known_names(problem.gas, SPECIES)}"
+            )
+        else:
+            kind = [species.molar_mass, species.heat_capacity_ratio]
+        gas = GasAt(kind[0], kind[1], temperature, deviation)
+        for source in sources:
+            channel = source.recording.channels.get("mass_flow")
+            stated = "" if channel is None else channel.stated
+            metered = molar_mass_in(stated)
+            if metered is None or abs(metered / gas.molar_mass - 1.0) < _SAME_GAS:
+                continue
+            used = f"the set's, {gas.molar_mass:.4g} kg/mol" if problem.gas is None else problem.gas
+            name = _species_of(metered)
+            remedy = f"; give gas = '{name}' in the procedure, or correct the unit of the flow" if name else ""
+            raise IdentificationError(
+                f"{source.name}: mass_flow in '{stated}' is a flow of {name or 'another gas'}, "
+                f"{metered:.4g} kg/mol, but the gas of {self.label} is {used}{remedy}"
+            )
+        return gas
 
     def deviation(self, path: str, value: float, unit: str) -> float:
         """Return the standard deviation [unit] of a parameter of given ``value``: from bench, set, or defaults."""
@@ -137,6 +126,11 @@ class ProcedureContext:
     def valve_path(self, name: str | None) -> str:
         """Return the path of a valve in the set, such as ``valves.main``; None means the chosen valve."""
         return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
+
+
+def _species_of(molar_mass: float) -> str:
+    """Return the name of the species of a molar mass [kg/mol], empty if it is of none."""
+    return next((name for name, gas in SPECIES.items() if abs(gas.molar_mass / molar_mass - 1.0) < _SAME_GAS), "")
 
 
 class StaticTorqueProblem(StrictTable):
@@ -165,10 +159,9 @@ class FreeDecayProblem(StrictTable):
 
     def inertia_of(self, context: ProcedureContext) -> tuple[float | None, float]:
         """Return the inertia and its standard deviation [kg m^2], by default from the set; None if unknown."""
-        path = "foot_plate.inertia"
         if self.inertia == _UNKNOWN:
             return None, 0.0
-        inertia = positive_in(self, "inertia", "kg m^2", context.label)
+        path, inertia = "foot_plate.inertia", positive_in(self, "inertia", "kg m^2", context.label)
         if inertia is not None:
             return inertia, context.tolerances.deviation_of(path, inertia, 0.0)
         inertia = number_in_si(context.parameter_set, path)
@@ -200,8 +193,7 @@ class FreeDecayProblem(StrictTable):
         # Near standstill, the friction of a seal is at most the static friction.
         rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
         start, end = times_of(self, context.label)
-        inertia = self.inertia_of(context)
-        return free_decay(sources, start, end, *inertia, rise, self.confidence, context.tolerances)
+        return free_decay(sources, start, end, *self.inertia_of(context), rise, self.confidence, context.tolerances)
 
 
 class OpenValveFlowProblem(StrictTable):
@@ -374,7 +366,10 @@ def run_procedure(
     gas_used = ""
     if isinstance(problem, FlowProblem):
         with noted_in(wrong):
-            gas_used = f"; gas: {context.gas_text(problem, context.gas(problem, sources))}"
+            gas = context.gas(problem, sources)
+            name = _species_of(gas.molar_mass) or f"{gas.molar_mass:.4g} kg/mol"
+            origin = " of the set" if problem.gas is None else ""
+            gas_used = f"; gas: {name}{origin}, {from_si(gas.temperature, 'degC', 'K'):.4g} degC"
     raise_noted(wrong)
     try:
         result = problem.run(sources, context)

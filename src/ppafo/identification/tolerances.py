@@ -48,20 +48,10 @@ _OTHER_SETTING = 0.1
 _LARGEST_FRACTION = 0.5
 """Largest relative limit [-] that may be stated; beyond it a sensor is broken rather than inaccurate."""
 _UNITS = {
-    "load": "1",
-    "supply": "Pa_d",
-    "zero_of_angle": "rad",
-    "zero_of_pressure": "Pa_d",
-    "gain": "1",
-    "lag": "s",
-    "start_of_angle": "rad",
-    "start_of_pressure": "Pa_d",
-    "gas_temperature": "K",
-    "gas_law": "1",
-    "stribeck_velocity": "rad/s",
-    "zero_of_flow": "1",
-    "friction": "1",
-    "held": "1",
+    **dict.fromkeys(("load", "gain", "gas_law", "zero_of_flow", "friction", "held"), "1"),
+    **dict.fromkeys(("supply", "zero_of_pressure", "start_of_pressure"), "Pa_d"),
+    **dict.fromkeys(("zero_of_angle", "start_of_angle"), "rad"),
+    **{"lag": "s", "gas_temperature": "K", "stribeck_velocity": "rad/s"},
 }
 Columns = Annotated[Text | None, Field(description="name of a column map; default: units in the header of the file")]
 Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals; default 0.95")]
@@ -70,61 +60,47 @@ Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of t
 class BenchSection(StrictTable):
     """Table [bench] of a problem file: tolerances as limits (+-); 0 for an exact value."""
 
-    load: Annotated[
-        Text | None, Field(description="tolerance of the external torque, for each recording; default 2 %")
-    ] = None
-    supply: Annotated[
-        Text | None, Field(description="tolerance of each supply pressure, for each recording; default 1 psi_d")
-    ] = None
-    zero_of_angle: Annotated[
-        Text | None, Field(description="tolerance of the zero of the angle sensor; default 0.5 deg")
-    ] = None
-    zero_of_pressure: Annotated[
-        Text | None, Field(description="tolerance of the zero of each pressure sensor; default 0.3 psi_d")
-    ] = None
-    gain: Annotated[
-        Text | None, Field(description="tolerance of the gain of each sensor; default 0.5 %, 0 % for the angle sensor")
-    ] = None
-    lag: Annotated[
-        Text | None,
-        Field(description="tolerance of the time constant of each sensor; default 20 ms, 1 ms for the angle sensor"),
-    ] = None
-    start_of_angle: Annotated[
-        Text | None,
-        Field(
-            description="tolerance of the initial angle of each recording, unless at a stop; default 0.05 deg if it is "
-            "read from the recording, else as zero_of_angle"
-        ),
-    ] = None
-    start_of_pressure: Annotated[
-        Text | None,
-        Field(description="tolerance of both initial pressures; default: the noise of a sample if they are measured"),
-    ] = None
-    each_recording: Annotated[
-        tuple[Sensed, ...],
-        Field(strict=False, description="sensor errors that differ between recordings: 'zero', 'gain'; default: none"),
-    ] = ()
-    gas_temperature: Annotated[
-        Text | None, Field(description="tolerance of the gas temperature; default: from the set, else 15 K")
-    ] = None
-    gas_law: Annotated[Text | None, Field(description="deviation of the gas from the ideal gas law; default 1 %")] = (
-        None
+    load: Text | None = Field(None, description="tolerance of the external torque, for each recording; default 2 %")
+    supply: Text | None = Field(
+        None, description="tolerance of each supply pressure, for each recording; default 1 psi_d"
     )
-    stribeck_velocity: Annotated[
-        Text | None,
-        Field(description="speed up to which static friction may last, unless an effect gives it; default 0.5 rad/s"),
-    ] = None
-    zero_of_flow: Annotated[
-        Text | None,
-        Field(description="tolerance of the zero of the flow meter, relative to its largest reading; default 5 %"),
-    ] = None
-    friction: Annotated[
-        Text | None,
-        Field(description="variation of friction between recordings; default 5 % if a procedure has several"),
-    ] = None
-    held: Annotated[
-        Text | None, Field(description="uncertainty of values of the set that state none; default: 1 to 50 % by kind")
-    ] = None
+    zero_of_angle: Text | None = Field(None, description="tolerance of the zero of the angle sensor; default 0.5 deg")
+    zero_of_pressure: Text | None = Field(
+        None, description="tolerance of the zero of each pressure sensor; default 0.3 psi_d"
+    )
+    gain: Text | None = Field(
+        None, description="tolerance of the gain of each sensor; default 0.5 %, 0 % for the angle sensor"
+    )
+    lag: Text | None = Field(
+        None, description="tolerance of the time constant of each sensor; default 20 ms, 1 ms for the angle sensor"
+    )
+    start_of_angle: Text | None = Field(
+        None,
+        description="tolerance of the initial angle of each recording, unless at a stop; default 0.05 deg if it is "
+        "read from the recording, else as zero_of_angle",
+    )
+    start_of_pressure: Text | None = Field(
+        None, description="tolerance of both initial pressures; default: the noise of a sample if they are measured"
+    )
+    each_recording: tuple[Sensed, ...] = Field(
+        (), strict=False, description="sensor errors that differ between recordings: 'zero', 'gain'; default: none"
+    )
+    gas_temperature: Text | None = Field(
+        None, description="tolerance of the gas temperature; default: from the set, else 15 K"
+    )
+    gas_law: Text | None = Field(None, description="deviation of the gas from the ideal gas law; default 1 %")
+    stribeck_velocity: Text | None = Field(
+        None, description="speed up to which static friction may last, unless an effect gives it; default 0.5 rad/s"
+    )
+    zero_of_flow: Text | None = Field(
+        None, description="tolerance of the zero of the flow meter, relative to its largest reading; default 5 %"
+    )
+    friction: Text | None = Field(
+        None, description="variation of friction between recordings; default 5 % if a procedure has several"
+    )
+    held: Text | None = Field(
+        None, description="uncertainty of values of the set that state none; default: 1 to 50 % by kind"
+    )
 
 
 @dataclass(frozen=True, slots=True)

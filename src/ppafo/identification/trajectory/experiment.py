@@ -41,7 +41,7 @@ from ppafo.simulation.scenario import (
     vane_motion,
     with_control,
 )
-from ppafo.wording import first_twice, known_names, nearest_name
+from ppafo.wording import first_twice, known_names
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
 """Channels that a fit can compare with a recording [rad], [Pa], [Pa]."""
@@ -115,41 +115,30 @@ def check_experiment(experiment: FittedExperiment) -> None:
     where, recording, inputs = f"experiment '{experiment.label}'", experiment.recording, experiment.inputs
     if len(recording) < 2:
         raise IdentificationError(f"{where}: {recording.label} has only one sample; a fit needs two or more")
-    for name in experiment.channels:
-        if name not in FITTED_CHANNELS:
-            raise IdentificationError(f"{where}: channel '{name}' cannot be fitted; use {', '.join(FITTED_CHANNELS)}")
-    for name in inputs:
-        if name not in ALL_INPUTS:
-            hint = nearest_name(name, ALL_INPUTS)
-            raise IdentificationError(f"{where}: '{name}' is not a measured input{hint}; use {', '.join(ALL_INPUTS)}")
-    for key, names, use in (("channels", experiment.channels, ""), ("inputs", inputs, " to follow")):
-        recorded = [name for name in (FITTED_CHANNELS if key == "channels" else inputs) if name in recording]
+    for key, names, allowed, fault, use in (
+        ("channels", experiment.channels, FITTED_CHANNELS, "cannot be fitted", ""),
+        ("inputs", inputs, ALL_INPUTS, "is not a measured input", " to follow"),
+    ):
+        kind, wanted = ("channel ", FITTED_CHANNELS) if key == "channels" else ("", inputs)
+        there = json.dumps([name for name in wanted if name in recording])
         for name in names:
+            if name not in allowed:
+                raise IdentificationError(f"{where}: {kind}'{name}' {fault}{known_names(name, allowed)}")
             if name not in recording:
-                raise IdentificationError(
-                    f"{where}: {recording.label} has no channel '{name}'{use}; available: "
-                    f"{', '.join(recording.names)}; give {key} = {json.dumps(recorded)}"
-                )
+                has = f"available: {', '.join(recording.names)}; give {key} = {there}"
+                raise IdentificationError(f"{where}: {recording.label} has no channel '{name}'{use}; {has}")
     scenario, has_torque = experiment.scenario, EXTERNAL_TORQUE in inputs
     motion, follows = vane_motion(scenario), {ANGLE} & set(inputs) & set(experiment.channels)
+    is_prescribed = motion.profile is not None
     is_python = scenario.controller.is_outside and COMMAND not in inputs
     refuse_first(
         where,
         (not experiment.channels, "has no channel to compare; give channels"),
         (bool(follows), "the recording prescribes the angle, which cannot be compared; remove it from channels"),
-        (
-            experiment.channels == (ANGLE,) and motion.profile is not None,
-            "the angle of the vane is prescribed and carries no information; add a pressure to channels",
-        ),
+        (experiment.channels == (ANGLE,) and is_prescribed, "the angle is prescribed; add a pressure to channels"),
         (is_python, "a Python controller cannot be fitted; use a controller kind of the catalogue"),
-        (
-            has_torque and motion.profile is not None,
-            "a torque has no effect on a vane whose angle is prescribed; remove it from inputs",
-        ),
-        (
-            has_torque and motion.leg is not None,
-            "the leg of the motion prescribes T_ex; remove it from inputs, or set motion.kind = 'free'",
-        ),
+        (has_torque and is_prescribed, "the angle is prescribed, so that a torque does nothing; remove it from inputs"),
+        (has_torque and motion.leg is not None, "the leg prescribes T_ex; remove it from inputs, or free the motion"),
         *(
             (not 0.0 < deviation < math.inf, f"the noise of '{name}' must be above 0, not {deviation!r}")
             for name, deviation in experiment.noise.items()
@@ -348,7 +337,13 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
         # Of how a run begins the recording may say more than the scenario.
         is_state = path.partition(".")[0] in _STATE
         start = number_at(scenario_of(experiments[0]) if is_state else scenarios[0], path)
-    low, high = _bounds(parameter, path, start, quantity)
+    low, high = quantity.minimum, quantity.maximum
+    if path == TIME_OFFSET:
+        low, high = -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
+    elif start > 0.0:
+        # A number above 0 is bounded by factors: with 0 as its lower bound a valve or an effect would be another model.
+        low, high = max(low, start / _FURTHEST) if low >= 0.0 else low, min(high, start * _FURTHEST)
+    low, high = (low if parameter.low is None else parameter.low), (high if parameter.high is None else parameter.high)
     bounds = f"{low:.6g} and {high:.6g}"
     has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
     is_allowed = quantity.minimum <= low and high <= quantity.maximum
@@ -389,17 +384,6 @@ def _is_off_at_zero(scenario: Scenario, path: str, value: float) -> bool:
     return models[0] != models[1]
 
 
-def _bounds(parameter: FreeParameter, path: str, start: float, quantity: Quantity) -> tuple[float, float]:
-    """Return the lower and upper bound of the search [SI]: given by the parameter, or default."""
-    if path == TIME_OFFSET:
-        low, high = -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
-    else:
-        # A number above 0 is bounded by factors: with 0 as its lower bound a valve or an effect would be another model.
-        low = max(quantity.minimum, start / _FURTHEST) if start > 0.0 <= quantity.minimum else quantity.minimum
-        high = min(quantity.maximum, start * _FURTHEST) if start > 0.0 else quantity.maximum
-    return (low if parameter.low is None else parameter.low), (high if parameter.high is None else parameter.high)
-
-
 def reach_of(chosen: Sequence[FitNumber]) -> float:
     """Return the largest time offset [s] that the bounds of the parameters allow; 0 if none is fitted."""
     bounds = [bound for number in chosen if number.path == TIME_OFFSET for bound in (number.free.low, number.free.high)]
@@ -426,8 +410,8 @@ class TrajectoryProblem:
         for parameter in self.parameters:
             for label in parameter.recordings:
                 if label not in labels:
-                    hint = nearest_name(label, labels)
-                    raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{hint}")
+                    known = known_names(label, labels)
+                    raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{known}")
         _refuse_twice("parameter", [number.free.name for number in numbers_of(self)])
 
 
