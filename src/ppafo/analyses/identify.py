@@ -288,7 +288,7 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
         valve = chosen_valve(before, device.valve)
         reader = _RecordingReader(problem=problem, folder=folder, file=file, parameter_set=before)
         tasks = _tasks_in_order(reader)
-        used = _used_recordings(tasks, before, valve, file)
+        used = _used_recordings(tasks, file)
         tolerances = tolerances_of(problem.bench, file)
         results: list[BenchResult] = []
         for task in tasks:
@@ -319,12 +319,12 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
 
 def _tasks_in_order(reader: _RecordingReader) -> list[_Task]:
     """Return the procedures of a problem with their recordings, each after the procedures whose results it uses."""
-    from ppafo.identification.procedures import PROCEDURES, FlowProblem, check_needed_channels
+    from ppafo.identification.procedures import PROCEDURES, FlowProcedure, check_needed_channels
     from ppafo.signals.recording import TIME
 
     tasks = []
     for number, procedure in enumerate(reader.problem.procedure, start=1):
-        row_time, gas = _ROW_TIMES.get(procedure.kind), procedure.gas if isinstance(procedure, FlowProblem) else None
+        row_time, gas = _ROW_TIMES.get(procedure.kind), procedure.gas if isinstance(procedure, FlowProcedure) else None
         sources: list[RecordingSource] = []
         for recording in procedure.recordings:
             wrong = list[PpafoError]()
@@ -341,21 +341,23 @@ def _tasks_in_order(reader: _RecordingReader) -> list[_Task]:
     return sorted(tasks, key=lambda task: PROCEDURES.index(task.procedure.kind))
 
 
-def _used_recordings(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:
+def _used_recordings(tasks: Sequence[_Task], file: str) -> tuple[UsedRecording, ...]:
     """Return the use of each recording by each procedure.
 
     A recording may serve two different procedures. Raises IdentificationError if a procedure uses a recording twice.
     """
-    from ppafo.identification.procedures import ProcedureContext, window_of
+    from ppafo.identification.procedures import TimedProcedure
     from ppafo.identification.source import UsedRecording, double_use
 
     by_procedure: dict[str, list[UsedRecording]] = {}
     for task in tasks:
         kind = task.procedure.kind
-        window = window_of(task.procedure, ProcedureContext(before, valve, task.label))
+        # Steady readings have no times: each counts by itself.
+        first, last = task.procedure.times(task.label) if isinstance(task.procedure, TimedProcedure) else (None, None)
+        ends = -math.inf if first is None else first, math.inf if last is None else last
         for number, source in enumerate(task.sources, start=1):
             name = f"recording {number} of procedure {kind}"
-            used = UsedRecording(name, source.trace, source.recording, frozenset(), *window)
+            used = UsedRecording(name, source.trace, source.recording, frozenset(), *ends)
             by_procedure.setdefault(kind, []).append(used)
     for recordings in by_procedure.values():
         if used_twice := double_use(recordings):

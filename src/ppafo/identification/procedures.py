@@ -44,15 +44,16 @@ from ppafo.units import from_si
 from ppafo.units.reference import molar_mass_in
 from ppafo.wording import known_names, said_missing
 
-PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"
-"""Identification procedures in the recommended order."""
-_Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
-_Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
-_End = Annotated[Text | None, Field(description="last time to use, such as '8 s'")]
-_Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: the set's")]
-_Temperature = Annotated[Text | None, Field(description="of the gas on the bench, '17 degC'; default: the set's")]
+_NEEDED = {
+    "static-torque": (TORQUE, "pressure_difference", "direction"),
+    "free-decay": (ANGLE,),
+    "open-valve-flow": OPEN_VALVE_CHANNELS,
+    "valve-map": VALVE_MAP_CHANNELS,
+    "vane-leak": CHAMBER_PRESSURES,
+}
+"""Channels that every recording of a procedure needs, by procedure in the recommended order."""
+PROCEDURES = tuple(_NEEDED)
 _Valve = Annotated[Text | None, Field(description="name of a valve of the set; default: the chosen one")]
-
 _UNKNOWN = "unknown"
 _COLDEST, _HOTTEST = 150.0, 600.0
 """Lowest and highest gas temperature [K] of a bench."""
@@ -82,7 +83,7 @@ class ProcedureContext:
             raise IdentificationError(f"{self.label}: {said_missing(missing)} in {self.parameter_set.file}")
         return [value for value in found.values() if value is not None]
 
-    def gas(self, problem: "FlowProblem", sources: tuple[RecordingSource, ...]) -> GasAt:
+    def gas(self, problem: "FlowProcedure", sources: tuple[RecordingSource, ...]) -> GasAt:
         """Return the gas of the bench; species and temperature default to the values of the set.
 
         Raises IdentificationError for an unknown species, and for a flow recorded as one of another gas.
@@ -133,28 +134,46 @@ def _species_of(molar_mass: float) -> str:
     return next((name for name, gas in SPECIES.items() if abs(gas.molar_mass / molar_mass - 1.0) < _SAME_GAS), "")
 
 
-class StaticTorqueProblem(StrictTable):
+class Procedure(StrictTable):
+    """Keys that every procedure has."""
+
+    recordings: tuple[Text, ...] = Field(strict=False, min_length=1, description="files, relative to this one")
+    columns: Columns = None
+    confidence: Confidence = 0.95
+
+
+class TimedProcedure(Procedure):
+    """Keys of a procedure over time."""
+
+    start: Text | None = Field(None, description="first time to use, such as '2 s'")
+    end: Text | None = Field(None, description="last time to use, such as '8 s'")
+
+    def times(self, label: str) -> tuple[float | None, float | None]:
+        """Return first and last time [s] used, None for an end of the recording; ``label`` is of messages."""
+        return quantity_in(self, "start", "s", label), quantity_in(self, "end", "s", label)
+
+
+class FlowProcedure(Procedure):
+    """Keys of a procedure in which gas flows."""
+
+    gas: Text | None = Field(None, description="species of the gas on the bench; default: the set's")
+    temperature: Text | None = Field(None, description="of the gas on the bench, '17 degC'; default: the set's")
+
+
+class StaticTorqueProblem(Procedure):
     """Table of procedure static-torque: torque constant and static friction from rising and falling pressure."""
 
     kind: Literal["static-torque"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
         """Identify torque constant and static friction from recordings."""
         return static_torque(sources, self.confidence, context.tolerances)
 
 
-class FreeDecayProblem(StrictTable):
+class FreeDecayProblem(TimedProcedure):
     """Table of procedure free-decay: viscous damping and Coulomb friction from the decay after an impulse."""
 
     kind: Literal["free-decay"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
-    start: _Start = None
-    end: _End = None
     inertia: Text | None = Field(None, description="such as '8.4 g m^2', or 'unknown'; default: the set's")
 
     def inertia_of(self, context: ProcedureContext) -> tuple[float | None, float]:
@@ -192,19 +211,14 @@ class FreeDecayProblem(StrictTable):
         static, dynamic = (number_in_si(context.parameter_set, path) for path in paths)
         # Near standstill, the friction of a seal is at most the static friction.
         rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
-        start, end = times_of(self, context.label)
+        start, end = self.times(context.label)
         return free_decay(sources, start, end, *self.inertia_of(context), rise, self.confidence, context.tolerances)
 
 
-class OpenValveFlowProblem(StrictTable):
+class OpenValveFlowProblem(FlowProcedure):
     """Table of procedure open-valve-flow: Cd, or C and b of ISO 6358, of the fully open valve."""
 
     kind: Literal["open-valve-flow"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
-    gas: _Gas = None
-    temperature: _Temperature = None
     valve: _Valve = None
     law: Annotated[Law, Field(description="flow law, also the form in which the set gives it")] = "orifice"
 
@@ -223,17 +237,10 @@ class OpenValveFlowProblem(StrictTable):
         )
 
 
-class VaneLeakProblem(StrictTable):
+class VaneLeakProblem(FlowProcedure, TimedProcedure):
     """Table of procedure vane-leak: area, conductance or laminar coefficient from decaying pressure or steady flow."""
 
     kind: Literal["vane-leak"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
-    gas: _Gas = None
-    temperature: _Temperature = None
-    start: _Start = None
-    end: _End = None
     angle: Text | None = Field(None, description="vane angle, from which the set's volumes follow")
     law: Literal["orifice", "iso6358", "laminar", "both"] = Field(
         "orifice",
@@ -277,7 +284,7 @@ class VaneLeakProblem(StrictTable):
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
         """Identify the leak between the chambers from recordings."""
         first, second, deviation = self.volumes_of(context)
-        start, end = times_of(self, context.label)
+        start, end = self.times(context.label)
         gas = context.gas(self, sources)
         result = vane_leak(
             sources,
@@ -299,24 +306,18 @@ class VaneLeakProblem(StrictTable):
             return result
         # The flow of a laminar gap goes with 1 / (R T viscosity), that of an orifice needs no viscosity.
         remark = (
-            f"{GAP} is not written to the set: the coefficient is for the gas of the bench, and the gas of the set is "
-            f"another; multiply it by {own / gas.molar_mass:.3g} (ratio of the molar masses) and by the viscosity of "
-            "the gas of the bench over the viscosity of the gas of the set, and give the product in device.overrides"
+            f"{GAP} is not written to the set, whose gas is not that of the bench: give it in device.overrides, "
+            f"times {own / gas.molar_mass:.3g} (molar masses) and the viscosity of the gas of the bench over the set's"
         )
         of_bench = replace(gap, path="vane_leak.laminar_coefficient")
         estimates = tuple(of_bench if item is gap else item for item in result.estimates)
         return replace(result, estimates=estimates, remarks=(*result.remarks, remark))
 
 
-class ValveMapProblem(StrictTable):
+class ValveMapProblem(FlowProcedure):
     """Table of procedure valve-map: dead band, gain, saturation and hysteresis from flow over command."""
 
     kind: Literal["valve-map"]
-    recordings: _Recordings
-    columns: Columns = None
-    confidence: Confidence = 0.95
-    gas: _Gas = None
-    temperature: _Temperature = None
     valve: _Valve = None
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
@@ -325,23 +326,7 @@ class ValveMapProblem(StrictTable):
         return valve_map(sources, gas, context.valve_path(self.valve), self.confidence, context.tolerances)
 
 
-def times_of(problem: FreeDecayProblem | VaneLeakProblem, label: str) -> tuple[float | None, float | None]:
-    """Return first and last time [s] used, None for an end of the recording; ``label`` is the prefix of messages."""
-    return quantity_in(problem, "start", "s", label), quantity_in(problem, "end", "s", label)
-
-
-FlowProblem = OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
-ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | FlowProblem
-
-
-_NEEDED = {
-    "static-torque": (TORQUE, "pressure_difference", "direction"),
-    "free-decay": (ANGLE,),
-    "open-valve-flow": OPEN_VALVE_CHANNELS,
-    "valve-map": VALVE_MAP_CHANNELS,
-    "vane-leak": CHAMBER_PRESSURES,
-}
-"""Channels that every recording of a procedure needs."""
+ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
 
 
 def check_needed_channels(where: str, problem: ProcedureProblem, read: Sequence[str]) -> None:
@@ -364,7 +349,7 @@ def run_procedure(
         with noted_in(wrong):
             check_needed_channels(source.name, problem, source.recording.names)
     gas_used = ""
-    if isinstance(problem, FlowProblem):
+    if isinstance(problem, FlowProcedure):
         with noted_in(wrong):
             gas = context.gas(problem, sources)
             name = _species_of(gas.molar_mass) or f"{gas.molar_mass:.4g} kg/mol"
@@ -387,17 +372,5 @@ def run_procedure(
     idle = [f"'{name}'" for name in context.tolerances.each_recording if name not in acting]
     if not idle or len(sources) == 1:
         return result
-    remark = (
-        f"bench.each_recording: {' and '.join(idle)} has no effect in {problem.kind}: one value is "
-        f"estimated for all {len(sources)} recordings; give each mounting of the sensors its own [[procedure]]"
-    )
+    remark = f"bench.each_recording: {' and '.join(idle)} has no effect in {problem.kind}: one value for all"
     return replace(result, remarks=(*result.remarks, remark))
-
-
-def window_of(problem: ProcedureProblem, context: ProcedureContext) -> tuple[float, float]:
-    """Return first and last time [s] that a procedure uses of its recordings; infinite if not limited."""
-    # Steady readings have no window: each counts by itself.
-    if not isinstance(problem, FreeDecayProblem | VaneLeakProblem):
-        return -math.inf, math.inf
-    first, last = times_of(problem, context.label)
-    return -math.inf if first is None else first, math.inf if last is None else last

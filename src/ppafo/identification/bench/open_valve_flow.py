@@ -9,7 +9,6 @@ tolerances.
 
 from collections import defaultdict
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -40,7 +39,6 @@ from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
-from ppafo.signals.recording import Floats
 
 PROCEDURE = "open-valve-flow"
 CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
@@ -91,13 +89,46 @@ def open_valve_flow(
     Raises:
         IdentificationError: recordings that do not determine the flow law; names file, sample and remedy
     """
-    readings = _open_readings(sources, gas, tolerances)
-    upstream, flow, ratio = readings.upstream, readings.flow, readings.downstream / readings.upstream
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS[:2])
+    for source in sources:
+        upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
+        # A saturated meter shows a constant flow although the pressures change the flow.
+        driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
+        check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
+    recordings = [source.recording for source in sources]
+    # In a recording without commands, the valve is taken to be open.
+    commands = [item["command"] if "command" in item else np.ones(len(item)) for item in recordings]
+    is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
+    if is_open.sum() < MINIMUM_SAMPLES:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} readings with the valve fully open "
+            f"(command 1 or -1), not {int(is_open.sum())}"
+        )
+    upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
+    is_crossed, zero, remarks = downstream >= upstream, tolerances.zero_of_flow, tuple[str, ...]()
+    # A log may begin before the gas supply is on: no flow without pressure difference is then no error of a column.
+    is_at_rest = is_open & is_crossed & (np.abs(flow) <= zero * float(np.abs(flow[is_open]).max()))
+    if is_at_rest.sum() > is_open.sum() // _FEW and (is_open & ~is_at_rest).sum() >= MINIMUM_SAMPLES:
+        remarks = (f"left out: {is_at_rest.sum()} of {is_open.sum()} readings without flow and pressure difference",)
+        is_open = is_open & ~is_at_rest
+    crossed = np.count_nonzero(is_crossed[is_open])
+    # Noise may exchange a few pressures that are nearly equal.
+    if crossed > is_open.sum() // _FEW:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE}: downstream_pressure is at or above upstream_pressure in {crossed} of "
+            f"{is_open.sum()} readings; are the two columns swapped?"
+        )
+    if np.ptp(flow[is_open]) <= 0.0:
+        check_moves(sources[0], PROCEDURE, "mass_flow")
+    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", (upstream, downstream), is_open)
+    _, used, meter_remarks = meter_readings(sources, PROCEDURE, upstream - downstream, zero, is_open)
+    upstream, downstream, flow = upstream[used], downstream[used], np.abs(flow[used])
+    ratio = downstream / upstream
     if law == "iso6358":
         check_both_regimes(ratio, sources[0].name, PROCEDURE)
     # In parallel with a laminar gap, b selects ISO 6358; the law ``iso6358`` estimates b.
     opening = Opening(gas, law, area or PRODUCT_ONLY, critical_ratio if law == "both" else None)
-    _, alone = opening.rough_sizes(upstream, readings.downstream, flow)
+    _, alone = opening.rough_sizes(upstream, downstream, flow)
     reported, paths = reported_parts(opening, _size(opening, area, path), _GAP, alone)
     # The nearer the pressures are to each other, the more their noise affects the computed flow.
     limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
@@ -105,8 +136,8 @@ def open_valve_flow(
     fitted, model = solve_flow(
         opening,
         paths,
-        {"upstream_pressure": upstream, "downstream_pressure": readings.downstream},
-        PooledReadings(flow, regimes, readings.labels),
+        {"upstream_pressure": upstream, "downstream_pressure": downstream},
+        PooledReadings(flow, regimes, np.array(recordings_of(sources))[used].tolist()),
         tolerances,
         confidence,
     )
@@ -129,82 +160,19 @@ def open_valve_flow(
         f"scatter {scatter:.2%} of the largest flow",
         with_residuals("Open-valve flow", *axes, marks, ratio, measured_ordinate - fitted_ordinate),
         f"{NEXT_LAW[law]}, or leave those readings out",
-        readings.remarks,
+        (*remarks, *meter_remarks),
         scatter,
     )
-    return _with_doubt(result, area)
-
-
-def _with_doubt(result: BenchResult, area: float | None) -> BenchResult:
-    """Return the result, with a remark if its discharge coefficient is impossible; ``area`` is the set's [m^2]."""
     coefficient, *others = result.estimates
     # Other sizes than a discharge coefficient have a unit.
     if area is None or coefficient.unit or coefficient.low <= _LARGEST_COEFFICIENT:
         return result
     doubt = (
-        f"Cd = {coefficient.value:.3g} is impossible, above 1: mass_flow or a pressure has a wrong unit (a flow per "
-        f"minute is 60 times a flow per second), or the valve is larger than the set's {area * 1e6:.4g} mm^2; Cd A is "
-        f"{coefficient.value * area * 1e6:.4g} mm^2"
+        f"Cd = {coefficient.value:.3g} is impossible, above 1: mass_flow or a pressure has a wrong unit, or the valve "
+        f"is larger than the set's {area * 1e6:.4g} mm^2"
     )
     doubted = replace(coefficient, verdict="holds for this model only")
     return replace(result, estimates=(doubted, *others), remarks=(doubt, *result.remarks))
-
-
-class _OpenReadings(NamedTuple):
-    """Readings at the open valve: absolute pressures [Pa], flow [kg/s], recording labels, remarks on omissions."""
-
-    upstream: Floats
-    downstream: Floats
-    flow: Floats
-    labels: list[str]
-    remarks: tuple[str, ...]
-
-
-def _open_readings(sources: tuple[RecordingSource, ...], gas: GasAt, tolerances: Tolerances) -> _OpenReadings:
-    """Return the plausible readings at the fully open valve.
-
-    Raises IdentificationError for exchanged pressures and a valve that is never open.
-    """
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS[:2])
-    for source in sources:
-        upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
-        # A saturated meter shows a constant flow although the pressures change the flow.
-        driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
-        check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
-    recordings = [source.recording for source in sources]
-    # In a recording without commands, the valve is taken to be open.
-    commands = [item["command"] if "command" in item else np.ones(len(item)) for item in recordings]
-    is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
-    if is_open.sum() < MINIMUM_SAMPLES:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} readings with the valve fully "
-            f"open (command 1 or -1), not {int(is_open.sum())}"
-        )
-    upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
-    is_crossed, zero, remarks = downstream >= upstream, tolerances.zero_of_flow, tuple[str, ...]()
-    # A log may begin before the gas supply is on: no flow without pressure difference is then no error of a column.
-    is_at_rest = is_open & is_crossed & (np.abs(flow) <= zero * float(np.abs(flow[is_open]).max()))
-    if is_at_rest.sum() > is_open.sum() // _FEW and (is_open & ~is_at_rest).sum() >= MINIMUM_SAMPLES:
-        remarks = (f"left out: {is_at_rest.sum()} of {is_open.sum()} readings without flow and pressure difference",)
-        is_open = is_open & ~is_at_rest
-    crossed = np.count_nonzero(is_crossed[is_open])
-    # Noise may exchange a few pressures that are nearly equal.
-    if crossed > is_open.sum() // _FEW:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: downstream_pressure is at or above upstream_pressure in {crossed} of "
-            f"{is_open.sum()} readings; are the two columns swapped?"
-        )
-    if np.ptp(flow[is_open]) <= 0.0:
-        check_moves(sources[0], PROCEDURE, "mass_flow")
-    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", (upstream, downstream), is_open)
-    _, used, meter_remarks = meter_readings(sources, PROCEDURE, upstream - downstream, zero, is_open)
-    return _OpenReadings(
-        upstream=upstream[used],
-        downstream=downstream[used],
-        flow=np.abs(flow[used]),
-        labels=np.array(recordings_of(sources))[used].tolist(),
-        remarks=(*remarks, *meter_remarks),
-    )
 
 
 def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:

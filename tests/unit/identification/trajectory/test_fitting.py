@@ -60,7 +60,7 @@ def test_the_noise_that_was_put_on_the_samples_is_found(three: TrajectoryFit, ex
     assert three.remarks == ()
 
 
-def test_a_search_that_ends_where_no_run_succeeds_says_which_bound_keeps_it_from_there(
+def test_a_search_that_ends_where_no_run_succeeds_says_which_number_is_favoured(
     three: TrajectoryFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ended = dataclasses.replace(three.fit, has_converged=False, edge={"foot_plate.inertia": 1})
@@ -68,7 +68,6 @@ def test_a_search_that_ends_where_no_run_succeeds_says_which_bound_keeps_it_from
     (remark,) = fit(three.problem).remarks
     value = three.estimate("foot_plate.inertia").value
     assert f"the recordings favour foot_plate.inertia above {value:.4g} kg m^2, where every run fails" in remark
-    assert f'give high = "{0.999 * value:.4g} kg m^2" of foot_plate.inertia' in remark
     assert "before it converged" not in remark
 
 
