@@ -24,18 +24,19 @@ if not __package__:
     sys.path[0] = str(Path(__file__).parents[1])
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.identification.trajectory import (
+from ppafo.identification.tolerances import Tolerances
+from ppafo.identification.trajectory.experiment import (
+    FITTED_CHANNELS,
     FittedExperiment,
     FreeParameter,
-    Tolerances,
-    TrajectoryFit,
     TrajectoryProblem,
-    fit,
+    number_at,
+    numbers_of,
+    stated_by,
     tolerance_parameters,
 )
-from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, number_at, numbers_of
+from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.identification.trajectory.runs import Floats, numbers_in, prepare, signals_of
-from ppafo.identification.trajectory.tolerances import stated_by
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.rig.experiments import record
 from ppafo.running import simulate

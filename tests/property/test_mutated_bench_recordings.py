@@ -8,14 +8,12 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from ppafo.errors import PpafoError
-from ppafo.identification.bench import (
-    free_decay,
-    open_valve_flow,
-    static_torque,
-    valve_map,
-    vane_leak,
-)
 from ppafo.identification.bench.flow import GasAt
+from ppafo.identification.bench.free_decay import free_decay
+from ppafo.identification.bench.open_valve_flow import open_valve_flow
+from ppafo.identification.bench.static_torque import static_torque
+from ppafo.identification.bench.valve_map import valve_map
+from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.source import RecordingSource
 from ppafo.storage import read_csv
 from ppafo.storage.column_map import ColumnMap

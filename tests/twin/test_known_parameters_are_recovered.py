@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 
-from ppafo.identification.trajectory import TrajectoryFit, fit
+from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from scripts.interval_coverage import SOUGHT, problem_of, recordings_of
 
 SEED = 7

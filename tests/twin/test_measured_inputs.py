@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.identify import identify
-from ppafo.identification.trajectory import TrajectoryFit
+from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.rig.experiments import record
 from ppafo.storage import write_csv
 

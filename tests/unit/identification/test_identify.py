@@ -17,8 +17,7 @@ from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import json_schema, parse_problem
 from ppafo.identification.procedures import FreeDecayProblem, ProcedureContext, VaneLeakProblem
 from ppafo.identification.tolerances import Tolerances
-from ppafo.identification.trajectory import FittedExperiment, tolerance_parameters
-from ppafo.identification.trajectory.tolerances import stated_by
+from ppafo.identification.trajectory.experiment import FittedExperiment, stated_by, tolerance_parameters
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.audit import findings_of
 from ppafo.parameters.audit.changes import changes

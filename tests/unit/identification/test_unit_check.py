@@ -9,8 +9,8 @@ from ppafo.analyses.identify import Identification, finding_of, identify
 from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.bench.law import BenchResult
 from ppafo.identification.estimate import Estimate
+from ppafo.identification.procedures import with_tried_units
 from ppafo.identification.source import RecordingSource
-from ppafo.identification.unit_check import with_tried_units
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.parameter_set import number_in_si
 from ppafo.signals import Channel, Recording

@@ -20,7 +20,9 @@ from ppafo.analyses.reproduce.torque_task import (
     torque_task_observations,
 )
 from ppafo.errors import DataError, ScenarioError, SimulationError
-from ppafo.identification.bench import BenchResult, free_decay, static_torque
+from ppafo.identification.bench.free_decay import free_decay
+from ppafo.identification.bench.law import BenchResult
+from ppafo.identification.bench.static_torque import static_torque
 from ppafo.identification.source import RecordingSource
 from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.audit import AuditFinding, findings_of

@@ -24,6 +24,8 @@ from ppafo.identification.trajectory.experiment import (
     declaration_of,
     full_path,
     refuse_first,
+    stated_by,
+    tolerance_parameters,
     use_of,
 )
 from ppafo.identification.trajectory.fitting import (
@@ -33,7 +35,6 @@ from ppafo.identification.trajectory.fitting import (
     expected_information,
     fit,
 )
-from ppafo.identification.trajectory.tolerances import stated_by, tolerance_parameters
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import ParameterSet

@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench import (
-    Tolerances,
-    open_valve_flow,
-    valve_map,
-    vane_leak,
-)
 from ppafo.identification.bench.flow import GasAt, Opening, OpeningSizes, iso6358_shape, orifice_shape
-from ppafo.identification.bench.vane_leak import pressures_of_fall
+from ppafo.identification.bench.open_valve_flow import open_valve_flow
+from ppafo.identification.bench.valve_map import valve_map
+from ppafo.identification.bench.vane_leak import pressures_of_fall, vane_leak
 from ppafo.identification.noise import burg
 from ppafo.identification.source import RecordingSource
+from ppafo.identification.tolerances import Tolerances
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
 from tests.unit.identification import planted
 

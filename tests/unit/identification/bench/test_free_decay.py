@@ -9,9 +9,9 @@ import pytest
 
 from ppafo.analyses.identify import identify
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench import Tolerances, free_decay
-from ppafo.identification.bench.free_decay import Slowing, course
+from ppafo.identification.bench.free_decay import Slowing, course, free_decay
 from ppafo.identification.source import RecordingSource
+from ppafo.identification.tolerances import Tolerances
 from tests.unit.identification import planted
 
 

@@ -9,9 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench import vane_leak
 from ppafo.identification.bench.flow import GasAt
 from ppafo.identification.bench.law import BenchResult
+from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.source import RecordingSource
 from ppafo.signals import Channel, Recording
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench import Tolerances, static_torque
+from ppafo.identification.bench.static_torque import static_torque
 from ppafo.identification.source import RecordingSource
+from ppafo.identification.tolerances import Tolerances
 from tests.unit.identification import planted
 
 GROWTH = "effects.seal_friction.static_per_pressure"

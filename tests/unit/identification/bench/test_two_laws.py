@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ppafo.identification.bench import open_valve_flow, vane_leak
 from ppafo.identification.bench.flow import GasAt
+from ppafo.identification.bench.open_valve_flow import open_valve_flow
+from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.source import RecordingSource
 from ppafo.signals import Channel, Recording
 

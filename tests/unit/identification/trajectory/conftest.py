@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ppafo.identification.trajectory import FittedExperiment
+from ppafo.identification.trajectory.experiment import FittedExperiment
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario

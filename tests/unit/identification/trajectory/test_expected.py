@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory import (
-    CandidateExperiment,
-    FittedExperiment,
-    FreeParameter,
-    TrajectoryFit,
-    TrajectoryProblem,
-    expected_information,
-    fit,
-)
+from ppafo.identification.trajectory.experiment import FittedExperiment, FreeParameter, TrajectoryProblem
+from ppafo.identification.trajectory.fitting import CandidateExperiment, TrajectoryFit, expected_information, fit
 from ppafo.simulation.loading import load_scenario
 from tests.unit.identification.trajectory.conftest import NOISE
 

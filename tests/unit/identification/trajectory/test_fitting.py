@@ -10,15 +10,16 @@ import pytest
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory import (
+from ppafo.identification.trajectory import fitting
+from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
     FreeParameter,
-    TrajectoryFit,
     TrajectoryProblem,
-    fit,
-    fitting,
+    number_at,
+    numbers_of,
+    with_numbers,
 )
-from ppafo.identification.trajectory.experiment import number_at, numbers_of, with_numbers
+from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.identification.trajectory.runs import FIT_TOLERANCE, prepare, run_with, signals_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Recording

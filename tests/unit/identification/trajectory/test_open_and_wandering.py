@@ -5,16 +5,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ppafo.identification.trajectory import (
+from ppafo.identification.tolerances import Tolerances
+from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
     FreeParameter,
-    Tolerances,
-    TrajectoryFit,
     TrajectoryProblem,
-    fit,
+    stated_by,
     tolerance_parameters,
 )
-from ppafo.identification.trajectory.tolerances import stated_by
+from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.rig.experiments import record
 from ppafo.signals.recording import Channel, Recording

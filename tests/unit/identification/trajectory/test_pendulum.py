@@ -7,15 +7,14 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.tolerances import Tolerances
-from ppafo.identification.trajectory import (
+from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
     FreeParameter,
-    TrajectoryFit,
     TrajectoryProblem,
-    fit,
+    tolerance_parameters,
+    with_numbers,
 )
-from ppafo.identification.trajectory.experiment import with_numbers
-from ppafo.identification.trajectory.tolerances import tolerance_parameters
+from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory import FittedExperiment, FreeParameter, TrajectoryProblem, fit
 from ppafo.identification.trajectory.experiment import (
     TIME_OFFSET,
+    FittedExperiment,
+    FreeParameter,
+    TrajectoryProblem,
     broken_rule,
     declaration_of,
     declared_numbers,
@@ -15,6 +17,7 @@ from ppafo.identification.trajectory.experiment import (
     numbers_of,
     with_numbers,
 )
+from ppafo.identification.trajectory.fitting import fit
 from ppafo.identification.trajectory.runs import prepare, run_with
 from ppafo.running import simulate
 from ppafo.signals.faults import noise_of

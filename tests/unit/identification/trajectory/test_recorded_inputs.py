@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError, IdentificationError
-from ppafo.identification.trajectory import FittedExperiment, FreeParameter, TrajectoryProblem, fit
-from ppafo.identification.trajectory.experiment import numbers_of
+from ppafo.identification.trajectory.experiment import FittedExperiment, FreeParameter, TrajectoryProblem, numbers_of
+from ppafo.identification.trajectory.fitting import fit
 from ppafo.identification.trajectory.runs import prepare, signals_at, signals_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording

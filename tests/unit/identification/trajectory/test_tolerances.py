@@ -11,11 +11,17 @@ from scipy.signal import lfilter
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import IdentificationError
 from ppafo.identification.tolerances import BenchSection, Tolerances, tolerances_of
-from ppafo.identification.trajectory import FittedExperiment, FreeParameter, TrajectoryProblem, fit
 from ppafo.identification.trajectory import runs as trajectory_runs
-from ppafo.identification.trajectory.experiment import number_at, with_numbers
+from ppafo.identification.trajectory.experiment import (
+    FittedExperiment,
+    FreeParameter,
+    TrajectoryProblem,
+    number_at,
+    tolerance_parameters,
+    with_numbers,
+)
+from ppafo.identification.trajectory.fitting import fit
 from ppafo.identification.trajectory.runs import prepare, signals_at
-from ppafo.identification.trajectory.tolerances import tolerance_parameters
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
