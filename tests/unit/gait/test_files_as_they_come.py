@@ -285,7 +285,11 @@ def test_a_plain_table_with_opensims_names_is_read(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("frame,shank\n1,two\n", "the first column must be 'time', not 'frame'"),
+        ("PacketCounter,shank\n1,two\n", "need it in a gait map, such as time = { rate = '100 Hz' }"),
+        (
+            "time,shank_angle [deg/s],ankle_angle [deg]\n" + "".join(f"{k},1,{75 + 5 * k}\n" for k in range(9)),
+            "; integrate the rate",
+        ),
         ("time,a,\n0,1,2\n", "a column has no name"),
         ("time,a\n0,1,2\n", "line 2 has 3 values for 2 columns"),
         ("time,a\n0,one\n", "line 2"),

@@ -18,6 +18,10 @@ from ppafo.wording import one_line
 
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
+_RATE = "rad/s"
+_NOT_INTEGRATED = (
+    "; integrate the rate over each stride, less its mean over the stride, and set the zero while standing"
+)
 _MOST_NAMES, _LONGEST_TEXT = 12, 160
 """Limits of an error message: number of column names, and characters of the names and of a remark."""
 _BOTH_ANGLES = (
@@ -61,13 +65,16 @@ class CurveColumns:
             raise DataError(f"{where} has no unit in the file; give {self.unit_key} in {gait_map}")
         parsed_unit = "" if unit == "-" else unit
         problem = ""
-        for si_unit in si_units:
+        for si_unit in (*si_units, _RATE):
             try:
                 # Units are affine: two conversions give scale and zero for a whole column.
                 zero, one = (to_si(number, parsed_unit, si_unit) for number in (0.0, 1.0))
             except UnitError as error:
                 problem = problem or str(error)
                 continue
+            if si_unit == _RATE:
+                problem += _NOT_INTEGRATED
+                break
             return zero + (one - zero) * values, si_unit
         raise DataError(f"{where} [{unit}]: {problem}")
 

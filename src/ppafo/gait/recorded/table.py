@@ -84,8 +84,11 @@ def mean_stride_table(table: MotionTable, stride_time: float) -> MotionTable:
     return replace(table, time=time, columns=columns, remarks=(*table.remarks, remark), problem="", is_mean_stride=True)
 
 
-COUNTERS = ("", "index", "frame", "frame#", "framenumber", "frame number", "sample")
-"""Column names of row counters, in lower case; the first is pandas' index."""
+COUNTERS = (
+    *("", "index", "frame", "frame#", "framenumber", "frame number"),
+    *("sample", "samplenumber", "sample number", "packetcounter", "packet counter", "counter"),
+)
+"""Column names of row counters, in lower case: pandas' index, frames of cameras, samples of inertial sensors."""
 
 
 def counted_table(table: MotionTable, rate: float) -> MotionTable:
