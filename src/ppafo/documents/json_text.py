@@ -27,6 +27,8 @@ def plain(value: Any) -> Any:
     """
     if hasattr(type(value), "json_document"):
         return value.json_document()
+    if hasattr(type(value), "tolist"):  # arrays of NumPy, and their numbers
+        value = value.tolist()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         # Links are no part of what is run: what is not compared is not shown.
         shown = {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}

@@ -30,24 +30,33 @@ _NEAREST = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Indices:
-    """Sensitivity indices by name, each (paths,), and the half widths of their bands, where available."""
+    """Sensitivity indices by name, each (paths,), and the half widths of their bands; the first ranks the inputs.
+
+    ``blocks``, ``used``: number of blocks of the part of the sample, and of those without a missing value
+    """
 
     values: Mapping[str, Floats]
     bands: Mapping[str, Floats]
+    blocks: int = 0
+    used: int = 0
+
+    @property
+    def ranking(self) -> Floats:
+        """Index that ranks the inputs, the first of them (paths,)."""
+        return next(iter(self.values.values()))
 
 
 @dataclass(frozen=True, slots=True)
 class EvaluatedBlocks:
     """Complete blocks of a design with the values of a metric.
 
-    ``fractions``, ``inputs`` (rows, paths): fractions in (0, 1) and inputs [SI]
+    ``inputs`` (rows, paths): values of the inputs [SI]
     ``values`` (rows,): values of the metric [SI]
     ``blocks``: numbers of the blocks
     ``ends`` (2, paths): 5 and 95 % quantile of each input [SI], nan for noise
     ``seed``: random seed of the design
     """
 
-    fractions: Floats
     inputs: Floats
     values: Floats
     blocks: NDArray[np.intp]
@@ -59,10 +68,9 @@ class EvaluatedBlocks:
 class Method:
     """Method of sensitivity analysis: design and evaluation.
 
-    ``shown``: names of the plotted indices; the first one determines the ranking
     ``takes_dependent``: True if the indices are meaningful for correlated values
     ``fewest``, ``most``: limits of the number of blocks
-    ``sizes_label``, ``block_label``: names of the blocks, and of one block
+    ``noun``: name of the blocks
     ``block_rows``: number of runs of a block for a number of values
     ``design``: function of uncertainty, number of blocks and seed; returns fractions in (0, 1), shape (blocks *
         block_rows, paths), block after block
@@ -70,12 +78,10 @@ class Method:
     """
 
     name: str
-    shown: tuple[str, ...]
     takes_dependent: bool
     fewest: int
     most: int
-    sizes_label: str
-    block_label: str
+    noun: str
     block_rows: Callable[[int], int]
     design: Callable[[Uncertainty, int, int], Floats]
     indices: Callable[[EvaluatedBlocks, float], Indices]
@@ -130,12 +136,10 @@ def _sobol_total_and_first(table: Floats) -> Floats:
 
 SOBOL = Method(
     name="sobol",
-    shown=("total", "first"),
     takes_dependent=False,
     fewest=64,
     most=2**17,
-    sizes_label="base points",
-    block_label="base point",
+    noun="base points",
     block_rows=lambda dimensions: dimensions + 2,
     design=_sobol_design,
     indices=_sobol_indices,
@@ -182,7 +186,7 @@ def _shapley_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
     """Return the index ``shapley`` with bands by the delta method over the orders."""
     from scipy.special import stdtrit
 
-    blocks, count = evaluated.blocks.size, evaluated.fractions.shape[1]
+    blocks, count = evaluated.blocks.size, evaluated.inputs.shape[1]
     table = evaluated.values.reshape(blocks, count - 1, _INNER)
     variances = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
     conditional = np.var(table, axis=2, ddof=1)
@@ -205,12 +209,10 @@ def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:
 
 SHAPLEY = Method(
     name="shapley",
-    shown=("shapley",),
     takes_dependent=True,
     fewest=64,
     most=2**17,
-    sizes_label="orders",
-    block_label="order",
+    noun="orders",
     block_rows=lambda dimensions: _INNER * (dimensions - 1),
     design=_shapley_design,
     indices=_shapley_indices,

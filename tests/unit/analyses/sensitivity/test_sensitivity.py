@@ -3,13 +3,13 @@
 import itertools
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 
 from ppafo.analyses.sensitivity.methods import METHODS
-from ppafo.analyses.sensitivity.question import sensitivity
-from ppafo.analyses.sensitivity.solve import Influences, SensitivitySettings, analyse
+from ppafo.analyses.sensitivity.question import Influences, analyse, sensitivity
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
 from ppafo.studies.draws import Uncertainty
@@ -22,9 +22,9 @@ Model = Callable[[Mapping[str, Floats]], Mapping[str, Floats]]
 ANGLES = Uncertainty(tuple(RandomValue(name, UniformBetween(-math.pi, math.pi)) for name in ("x1", "x2", "x3")))
 
 
-def analysed(model: Model, uncertainty: Uncertainty, method: str, settings: SensitivitySettings) -> Influences:
+def analysed(model: Model, uncertainty: Uncertainty, method: str, samples: int, **more: Any) -> Influences:
     """What comes of a formula in place of a simulation."""
-    return analyse(model_runs(model, [METRIC]), uncertainty, METHODS[method], settings)
+    return analyse(model_runs(model, [METRIC]), uncertainty, METHODS[method], samples, **more)
 
 
 def ishigami(columns: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -57,7 +57,7 @@ def failing(model: Model, rows: Floats) -> Model:
 
 
 def test_sobol_indices_of_ishigami_come_out_and_settle() -> None:
-    found = analysed(ishigami, ANGLES, "sobol", SensitivitySettings(4096)).metrics[0]
+    found = analysed(ishigami, ANGLES, "sobol", 4096).metrics[0]
     first, total = known_indices()
     assert found.indices.values["first"] == pytest.approx(first, abs=0.02)
     assert found.indices.values["total"] == pytest.approx(total, abs=0.02)
@@ -70,35 +70,33 @@ def test_sobol_indices_of_ishigami_come_out_and_settle() -> None:
 
 
 def test_the_result_is_the_same_every_time() -> None:
-    one, other = (analysed(ishigami, ANGLES, "sobol", SensitivitySettings(256, seed=5)) for _ in range(2))
+    one, other = (analysed(ishigami, ANGLES, "sobol", 256, seed=5) for _ in range(2))
     assert np.array_equal(one.metrics[0].indices.values["total"], other.metrics[0].indices.values["total"])
     assert np.array_equal(one.metrics[0].indices.bands["total"], other.metrics[0].indices.bands["total"])
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_failed_run_takes_its_whole_block_with_it(method: str) -> None:
-    settings = SensitivitySettings(128, maximum_failed=0.02)
     rows = METHODS[method].block_rows(3)
     broken = np.array([0, 5 * rows + 1, 5 * rows + 2, 127 * rows + rows - 1])
-    found = analysed(failing(ishigami, broken), ANGLES, method, settings)
+    found = analysed(failing(ishigami, broken), ANGLES, method, 128)
     assert (found.failed, found.metrics[0].runs_without_value, found.metrics[0].dropped_blocks) == (4, 4, 3)
     assert found.metrics[0].settling[-1].used == 125
-    whole = analysed(ishigami, ANGLES, method, settings).metrics[0]
-    name = METHODS[method].shown[0]
-    assert found.metrics[0].indices.values[name] == pytest.approx(whole.indices.values[name], rel=0.2, abs=0.05)
+    whole = analysed(ishigami, ANGLES, method, 128).metrics[0]
+    assert found.metrics[0].indices.ranking == pytest.approx(whole.indices.ranking, rel=0.2, abs=0.05)
 
 
 def test_a_sample_with_hardly_a_whole_block_says_nothing() -> None:
     rows = METHODS["sobol"].block_rows(3)
     model = failing(ishigami, np.arange(62) * rows)
     with pytest.raises(StudyError, match=r"only 2 of 64 base points have 'rms_error' in all their runs"):
-        analysed(model, ANGLES, "sobol", SensitivitySettings(64, maximum_failed=0.5))
+        analysed(model, ANGLES, "sobol", 64, maximum_failed=0.5)
 
 
 @pytest.mark.parametrize("blocks", [256, 1024])
 def test_the_bands_of_sobol_hold_and_are_not_far_too_wide(blocks: int) -> None:
     first, total = known_indices()
-    found = [analysed(ishigami, ANGLES, "sobol", SensitivitySettings(blocks, seed)) for seed in range(1, 61)]
+    found = [analysed(ishigami, ANGLES, "sobol", blocks, seed=seed) for seed in range(1, 61)]
     for name, known in (("first", first), ("total", total)):
         values = np.array([item.metrics[0].indices.values[name] for item in found])
         bands = np.array([item.metrics[0].indices.bands[name] for item in found])
@@ -119,7 +117,7 @@ def linear_in(slopes: Mapping[str, float]) -> Model:
 @pytest.mark.parametrize("method", METHODS)
 def test_the_change_of_ishigami_is_the_known_one_and_its_band_holds(method: str) -> None:
     known = np.array([2.0 * math.sin(0.9 * math.pi) * (1.0 + B * math.pi**4 / 5.0), 0.0, 0.0])
-    found = [analysed(ishigami, ANGLES, method, SensitivitySettings(512, seed)) for seed in range(1, 41)]
+    found = [analysed(ishigami, ANGLES, method, 512, seed=seed) for seed in range(1, 41)]
     away = np.array([np.array(item.metrics[0].change_from_5_to_95_percent) - known for item in found])
     bands = np.array([item.metrics[0].band_of_change for item in found])
     assert np.mean(np.abs(away) <= bands) >= 0.9
@@ -137,7 +135,7 @@ def test_the_change_of_a_linear_function_is_slope_times_distance_of_the_ends_wha
         )
     )
     model = linear_in({"x1": 1.0, "x2": -5.0, "x3": 2.0, "x4": 1.0})
-    found = analysed(model, mixed, "sobol", SensitivitySettings(4096)).metrics[0]
+    found = analysed(model, mixed, "sobol", 4096).metrics[0]
     normal = 1.6448536269514722
     known = [2.0 * 2.0 * normal, -5.0, 0.0, 2.0**normal - 2.0**-normal]
     assert found.change_from_5_to_95_percent == pytest.approx(known, abs=0.06)
@@ -148,7 +146,7 @@ def test_a_correlated_value_goes_along_in_the_change() -> None:
     # x2 does nothing by itself; where it is high, x1 is.
     drawn = (RandomValue("x1", NormalAround(0.0, 1.0)), RandomValue("x2", NormalAround(5.0, 3.0)))
     together = Uncertainty(drawn, ((1.0, 0.0), (-0.8, 0.6)))
-    found = analysed(linear_in({"x1": 2.0}), together, "shapley", SensitivitySettings(4096)).metrics[0]
+    found = analysed(linear_in({"x1": 2.0}), together, "shapley", 4096).metrics[0]
     whole = 2.0 * 2.0 * 1.6448536269514722
     assert found.change_from_5_to_95_percent == pytest.approx([whole, -0.8 * whole], abs=0.15)
 
@@ -180,12 +178,17 @@ def test_shapley_effects_of_correlated_values_are_the_known_ones_and_their_bands
     model = linear_in(dict(zip(names, slopes.tolist(), strict=True)))
     held = []
     for seed in range(1, 41):
-        settings = SensitivitySettings(1024, seed)
-        found = analysed(model, Uncertainty(drawn, factor), "shapley", settings).metrics[0].indices
+        found = analysed(model, Uncertainty(drawn, factor), "shapley", 1024, seed=seed).metrics[0].indices
         assert np.sum(found.values["shapley"]) == pytest.approx(1.0)
         held.append(np.abs(found.values["shapley"] - truth) <= found.bands["shapley"])
         assert np.all(found.bands["shapley"] < 0.1)
     assert np.mean(held) >= 0.9
+
+
+def test_a_metric_that_nothing_influences_is_named_and_leaves_the_others() -> None:
+    runs = model_runs(lambda columns: {METRIC: columns["x1"], "final_error": 0.0 * columns["x1"] + 2.0}, [METRIC])
+    found = analyse(runs, ANGLES, METHODS["sobol"], 64, metrics=(METRIC, "final_error"))
+    assert ([metric.metric for metric in found.metrics], found.constant) == ([METRIC], {"final_error": 2.0})
 
 
 STUDY = "torque-task-uncertainty"
