@@ -9,6 +9,7 @@ from ppafo.engine.source_text import Replacements
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 from ppafo.model.plant import PlantParameters, net_torque, viscous_torque
+from ppafo.model.ports import exhaust_path, supply_path
 from ppafo.model.valves.kind import valve_problem
 
 
@@ -20,7 +21,7 @@ def link_program(program: Program, replacements: Replacements) -> None:
     problem = valve_problem(program.valve)
     if problem:
         raise ProgramError(f"{place_of(program.valve.connect)}: {problem}")
-    check_net_torque()
+    check_ports()
     if program.actuator.plant is not PlantParameters:
         replacements.constructed[PlantParameters] = program.actuator.plant
     if not program.effects:
@@ -40,12 +41,16 @@ TEST_ANGLES = (1.0, 1.5)
 """Angles [rad] at which the torque on a joint at rest is tested; a spring is relaxed at one of them at most."""
 
 
-def check_net_torque() -> None:
-    """Raise ProgramError for a spring that acts on the net joint torque but is missing in ``load_torque``.
+def check_ports() -> None:
+    """Raise ProgramError for a flow through a closed valve, and a torque on a joint at rest beside ``load_torque``.
 
     ``load_torque`` is the load that friction and stops balance at rest: a spring missing there would move a joint at
     rest.
     """
+    for path in (supply_path, exhaust_path):
+        closed = path(0.0)
+        if closed != 0.0:
+            raise ProgramError(f"{place_of(path)}: {path.__name__} of a closed valve is {closed:.4g} kg/(s Pa), not 0")
     at_rest = [net_torque(0.0, 0.0, 0.0, 0.0, angle, 0.0) for angle in TEST_ANGLES]
     damping = viscous_torque(0.0, 0.0)
     if damping != 0.0:

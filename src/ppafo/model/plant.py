@@ -251,46 +251,52 @@ class BlendedPort(NamedTuple):
     is_relieving: float
 
 
-def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers for an opening [-], -1 to 1: positive feeds chamber 1 and vents 2. Equation (8)."""
-    conductance = abs(opening) * plant.valve_conductance
-    fed, vented = supply_path(conductance), exhaust_path(conductance)
-    # An opening of exactly 0 has no conductance: which chamber it takes to be fed does not matter.
-    feeds_1 = opening >= 0.0
-    node_1 = plant.supply_pressure if feeds_1 else plant.atmospheric_pressure
-    node_2 = plant.atmospheric_pressure if feeds_1 else plant.dorsiflexion_pressure
-    share_1 = 1.0 if feeds_1 else 0.0
-    back_1 = plant.relieving if feeds_1 else 1.0
-    back_2 = 1.0 if feeds_1 else plant.relieving
-    return SinglePort(
-        conductance=fed if feeds_1 else vented, node_pressure=node_1, source_fraction=share_1, is_relieving=back_1
-    ), SinglePort(
-        conductance=vented if feeds_1 else fed,
-        node_pressure=node_2,
-        source_fraction=1.0 - share_1,
-        is_relieving=back_2,
-    )
+def spool_openings(towards_1: float, towards_2: float) -> Openings:
+    """Openings [-] of one spool that opens towards chamber 1 or chamber 2, each 0 to 1. Equation (8)."""
+    # What opens chamber 1 to the source opens chamber 2 to the atmosphere.
+    return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1)
+
+
+def openings_of(opening: float) -> Openings:
+    """Openings [-] of a spool for an opening from -1 to 1 (clipped); positive feeds chamber 1."""
+    clipped = max(-1.0, min(1.0, opening))
+    return spool_openings(max(clipped, 0.0), max(-clipped, 0.0))
 
 
 def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPort, BlendedPort]:
     """Ports of both chambers for four openings, which may be mean values over a step. Equation (8)."""
     full, back = plant.valve_conductance, plant.relieving
     ambient = plant.atmospheric_pressure
-    port_1 = BlendedPort(
+    return BlendedPort(
         source_conductance=supply_path(openings.source_1 * full),
         source_pressure=plant.supply_pressure,
         vent_conductance=exhaust_path(openings.vent_1 * full),
         vent_pressure=ambient,
         is_relieving=back,
-    )
-    port_2 = BlendedPort(
+    ), BlendedPort(
         source_conductance=supply_path(openings.source_2 * full),
         source_pressure=plant.dorsiflexion_pressure,
         vent_conductance=exhaust_path(openings.vent_2 * full),
         vent_pressure=ambient,
         is_relieving=back,
     )
-    return port_1, port_2
+
+
+def open_path(port: BlendedPort, is_fed: bool) -> SinglePort:
+    """Path of a port to the source, or to the atmosphere, where the other one is closed."""
+    return SinglePort(
+        conductance=port.source_conductance if is_fed else port.vent_conductance,
+        node_pressure=port.source_pressure if is_fed else port.vent_pressure,
+        source_fraction=1.0 if is_fed else 0.0,
+        is_relieving=port.is_relieving if is_fed else 1.0,
+    )
+
+
+def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, SinglePort]:
+    """Open paths of ``blended_ports`` for an opening [-], -1 to 1: positive feeds chamber 1 and vents 2."""
+    port_1, port_2 = blended_ports(plant, spool_openings(max(opening, 0.0), max(-opening, 0.0)))
+    # An opening of exactly 0 has no conductance: which chamber it takes to be fed does not matter.
+    return open_path(port_1, opening >= 0.0), open_path(port_2, opening < 0.0)
 
 
 class PortFlow(NamedTuple):
@@ -321,9 +327,8 @@ def single_port_flow(pressure: float, port: SinglePort, curve: FlowCurve) -> tup
 
 def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> tuple[PortFlow, PortSlopes]:
     """Flow into a chamber at ``pressure`` [Pa absolute] through two open paths, and its derivatives. Eqs (6) to (8)."""
-    source, _, source_slope = orifice_flow(
-        port.source_pressure, pressure, port.source_conductance, port.is_relieving, curve
+    source, by_source = single_port_flow(pressure, open_path(port, True), curve)
+    vent, by_vent = single_port_flow(pressure, open_path(port, False), curve)
+    return PortFlow(source.total + vent.total, source.from_source), PortSlopes(
+        by_source.total + by_vent.total, by_source.from_source
     )
-    # The atmosphere gives gas as it takes it: no check valve on this path.
-    vent, _, vent_slope = orifice_flow(port.vent_pressure, pressure, port.vent_conductance, 1.0, curve)
-    return PortFlow(source + vent, source), PortSlopes(source_slope + vent_slope, source_slope)

@@ -16,8 +16,10 @@ from ppafo.model.plant import (
     SinglePort,
     blended_port_flow,
     blended_ports,
+    openings_of,
     single_port_flow,
     single_ports,
+    spool_openings,
 )
 from ppafo.model.valves.kind import ValveKind, ValveModel, never
 
@@ -140,9 +142,7 @@ def advance_moving(
     mean = max(-1.0, min(1.0, spool_mean if has_spool else requested_mean))
     towards_1 = towards_chamber_1(settled.opening, opening, mean)
     towards_2 = towards_chamber_1(-settled.opening, -opening, -mean)
-    return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1), SpoolState(
-        requested, opening, rate
-    )
+    return spool_openings(towards_1, towards_2), SpoolState(requested, opening, rate)
 
 
 def spool_acceleration(opening: float, rate: float, target: float, frequency: float, damping_ratio: float) -> float:
@@ -155,15 +155,6 @@ def shift_of_spool(state: SpoolState, next_state: SpoolState) -> float:
     """Change of the opening during a step divided by the larger of both openings [-]."""
     larger = max(abs(next_state.opening), abs(state.opening))
     return abs(next_state.opening - state.opening) / max(larger, TINY)
-
-
-def openings_of(opening: float) -> Openings:
-    """Fractions [-] of the full area for an opening from -1 to 1 (clipped); positive feeds chamber 1. Equation (8)."""
-    clipped = max(-1.0, min(1.0, opening))
-    # One spool: what opens chamber 1 to the source opens chamber 2 to the atmosphere.
-    towards_1 = max(clipped, 0.0)
-    towards_2 = max(-clipped, 0.0)
-    return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1)
 
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:

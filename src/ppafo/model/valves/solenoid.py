@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.declaration import EmptyRow, Number
-from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow
-from ppafo.model.ports import exhaust_path, opening_time, supply_path
+from ppafo.model.plant import Openings, PlantParameters, SinglePort, blended_ports, open_path, single_port_flow
+from ppafo.model.ports import opening_time
 from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel, never
 
 # Long ago, never, and two instants that are one [s]: times of a run are sums of floats, good to far below 1 ns.
@@ -73,27 +73,9 @@ def advance_ideal(
 
 
 def connect_positions(plant: PlantParameters, shown: PairPositions) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers for constant positions; one full area each. Equation (8)."""
-    open_a = shown.position_a > 0.5
-    open_b = shown.position_b > 0.5
-    node_1 = plant.supply_pressure if open_a else plant.atmospheric_pressure
-    node_2 = plant.dorsiflexion_pressure if open_b else plant.atmospheric_pressure
-    back_1 = plant.relieving if open_a else 1.0
-    back_2 = plant.relieving if open_b else 1.0
-    fed, vented = supply_path(plant.valve_conductance), exhaust_path(plant.valve_conductance)
-    port_1 = SinglePort(
-        conductance=fed if open_a else vented,
-        node_pressure=node_1,
-        source_fraction=1.0 if open_a else 0.0,
-        is_relieving=back_1,
-    )
-    port_2 = SinglePort(
-        conductance=fed if open_b else vented,
-        node_pressure=node_2,
-        source_fraction=1.0 if open_b else 0.0,
-        is_relieving=back_2,
-    )
-    return port_1, port_2
+    """Open paths of ``blended_ports`` for constant positions; one full area each."""
+    port_1, port_2 = blended_ports(plant, Openings(1.0, 1.0, 1.0, 1.0))
+    return open_path(port_1, shown.position_a > 0.5), open_path(port_2, shown.position_b > 0.5)
 
 
 def accept_time(coil: Coil, switching_interval: float, time: float) -> float:

@@ -18,8 +18,8 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows
 from ppafo.errors import ScenarioError
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
-from ppafo.model.valves.proportional import openings_of, spool_acceleration
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, openings_of
+from ppafo.model.valves.proportional import spool_acceleration
 from ppafo.report.finding import text_of
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import RegulatedLine, Scenario, SupplyLine
