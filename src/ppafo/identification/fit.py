@@ -117,12 +117,6 @@ def _groups(runs: FitRuns) -> Iterator[tuple[str, list[slice]]]:
                 yield name, rows
 
 
-def too_smooth(sensors: Mapping[str, Noise]) -> Conflict | None:
-    """Return a conflict for the channel with the smoothest residuals if they are too smooth to be noise, else None."""
-    channel, noise = min(sensors.items(), key=lambda item: item[1].innovation)
-    return Conflict(channel, SMOOTH, 1.0 / noise.innovation, 0.0) if noise.innovation < _SMOOTHEST else None
-
-
 def wrong_shape(sensor: str, series: Sequence[Floats]) -> Conflict | None:
     """Return a conflict if neighbouring residuals of a sensor follow each other, as noise does not; else None.
 
@@ -312,8 +306,14 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     # Effective degrees of freedom: samples less the trace of J C J', to which a prior contributes little.
     freedom = max(len(errors) - float(np.sum(jacobian * (jacobian @ covariance))), 1.0)
     low, high = interval_ends(runs, point, linear, float(student.ppf(0.5 + 0.5 * confidence, freedom)))
-    is_free = ~_is_at_bound(runs, point, errors @ jacobian)
-    conflict = conflict_of(runs, linear.rows, point, is_free, freedom) or too_smooth(linear.sensors)
+    # At a bound is what the squares would pull across it.
+    slope = errors @ jacobian + np.square(runs.prior) * (point - runs.start)
+    near = _AT_BOUND * np.maximum(1.0, np.abs(point))
+    is_free = ~(((point - runs.low < near) & (slope > 0.0)) | ((runs.high - point < near) & (slope < 0.0)))
+    conflict = conflict_of(runs, linear.rows, point, is_free, freedom)
+    smoothest, noise = min(linear.sensors.items(), key=lambda item: item[1].innovation)
+    if conflict is None and noise.innovation < _SMOOTHEST:
+        conflict = Conflict(smoothest, SMOOTH, 1.0 / noise.innovation, 0.0)
     for row, base in np.argwhere(runs.base).tolist():
         correlation = covariance[row, base] / math.sqrt(covariance[row, row] * covariance[base, base])
         for limits, sign in ((low, -1.0), (high, 1.0)):
@@ -329,6 +329,13 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
     is_positive = runs.low > 0.0
     is_positive |= runs.base @ is_positive > 0.0
     typical = np.where(runs.prior > 0.0, 1.0, np.where(is_positive, estimated, np.maximum(estimated, 1.0)))
+    names = [number.name for number in runs.numbers]
+    # A prior of standard deviation s_j contributes (C_ij / s_j)^2 / C_ii to the variance C_ii of variable i.
+    fractions = np.square(covariance * runs.prior) / np.diag(covariance)[:, None]
+    shares = {
+        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if runs.prior[other] > 0.0)
+        for name, row in zip(names, fractions, strict=True)
+    }
     return Fit(
         numbers=runs.numbers,
         values=point * runs.scale,
@@ -340,8 +347,8 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         residuals=end.residuals,
         outliers=tuple(outliers.tolist()),
         conflict=conflict,
-        unidentified=tuple(unidentified(covariance / np.outer(typical, typical), [item.name for item in runs.numbers])),
-        shares=_shares_of_variance(runs, covariance),
+        unidentified=tuple(unidentified(covariance / np.outer(typical, typical), names)),
+        shares=shares,
         evaluations=runs.evaluations,
         # A search whose steps all leave the region in which runs succeed has no minimum.
         has_converged=-math.inf < end.gain < _CONVERGED,
@@ -351,29 +358,6 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         confidence=confidence,
         edge={} if math.isfinite(end.gain) else _edge(runs, end.point, end.step),
     )
-
-
-def _is_at_bound(runs: FitRuns, point: Floats, gradient: Floats) -> Flags:
-    """Return flags of the variables at a bound that the sum of squares and priors would cross.
-
-    ``gradient`` is the derivative of half the squares of the whitened residuals by the scaled variables [-].
-    """
-    slope = gradient + np.square(runs.prior) * (point - runs.start)
-    near = _AT_BOUND * np.maximum(1.0, np.abs(point))
-    return np.asarray(((point - runs.low < near) & (slope > 0.0)) | ((runs.high - point < near) & (slope < 0.0)))
-
-
-def _shares_of_variance(runs: FitRuns, covariance: Floats) -> dict[str, tuple[tuple[str, float], ...]]:
-    """Return for each variable the tolerances that contribute to its variance, with fractions [-], largest first.
-
-    A prior of standard deviation s_j contributes (C_ij / s_j)^2 / C_ii to the variance C_ii of variable i.
-    """
-    names = [number.name for number in runs.numbers]
-    fractions = np.square(covariance * runs.prior) / np.diag(covariance)[:, None]
-    return {
-        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if runs.prior[other] > 0.0)
-        for name, row in zip(names, fractions, strict=True)
-    }
 
 
 def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:

@@ -281,8 +281,7 @@ class FreeDecayProblem(TimedProcedure):
             if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
                 raise IdentificationError(
                     f"{source.name}: free-decay: 'angle' covers {turned:.4g} rad ({turned / math.tau:.3g} turns), but "
-                    f"the stops in the parameter set are {math.degrees(high - low):.4g} deg apart; if 'angle' is in "
-                    "degrees, give it the unit deg"
+                    f"the stops are {math.degrees(high - low):.4g} deg apart; in degrees, give it the unit deg"
                 )
         paths = "friction.static_torque", "friction.dynamic_torque"
         static, dynamic = (number_in_si(context.parameter_set, path) for path in paths)
@@ -340,15 +339,13 @@ class VaneLeakProblem(FlowProcedure, TimedProcedure):
         if angle is not None:
             if context.parameter_set.actuator_kind != VANE:
                 raise IdentificationError(
-                    f"{context.label}: angle = {self.angle!r}: volumes can be computed from the angle only for a vane; "
-                    "give volume_1 and volume_2"
+                    f"{context.label}: angle = {self.angle!r} is for a vane; give volume_1 and volume_2"
                 )
             names = ("angle_min", "angle_max", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
             lower, upper, per_angle, dead_1, dead_2 = context.numbers(*(f"actuator.{name}" for name in names))
             if not lower <= angle <= upper:
                 raise IdentificationError(
-                    f"{context.label}: angle = {self.angle!r} lies beyond the stops in the parameter set; give an "
-                    "angle between the stops"
+                    f"{context.label}: angle = {self.angle!r} lies beyond the stops, {lower:.4g} to {upper:.4g} rad"
                 )
             # A volume that is given counts before one from the angle: its line may be another one.
             first = first or dead_1 + per_angle * (angle - lower)

@@ -91,7 +91,7 @@ def test_an_angle_in_degrees_that_is_called_radians_is_refused(bench: Path, solv
     write_csv(bench / "turned.csv", one.with_channel("angle", np.degrees(one["angle"]), "rad"))
     with pytest.raises(
         IdentificationError,
-        match=r"turned.csv: free-decay: 'angle' covers 2.* turns\), .*; if 'angle' is in degrees, give it the unit deg",
+        match=r"turned.csv: free-decay: 'angle' covers 2.* turns\), .*; in degrees, give it the unit deg",
     ):
         solved(DECAY.replace("decay.csv", "turned.csv"))
 

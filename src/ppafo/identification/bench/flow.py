@@ -167,9 +167,8 @@ def check_both_regimes(ratio: Floats, name: str, procedure: str) -> None:
     """
     if not has_both_regimes(ratio):
         raise IdentificationError(
-            f"{name}: {procedure}: C and b need readings with choked and with subsonic flow: the pressure ratios must "
-            f"cover a range of at least {_SPAN:g} and reach {_SUBSONIC:g}, but lie between {ratio.min():.3g} and "
-            f"{ratio.max():.3g}; measure at more pressures, or check the units of the pressures"
+            f"{name}: {procedure}: C and b need readings with choked and with subsonic flow: pressure ratios over "
+            f"{_SPAN:g} or more, up to {_SUBSONIC:g}, not from {ratio.min():.3g} to {ratio.max():.3g}"
         )
 
 

@@ -119,14 +119,12 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     part = window(source.recording, start, end)
     if len(part) < MINIMUM_SAMPLES:
         raise IdentificationError(
-            f"{source.name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} samples between start and end, "
-            f"not {len(part)}"
+            f"{source.name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} samples from start to end, not {len(part)}"
         )
     swept, noise = float(np.ptp(part[ANGLE])), noise_of(part[ANGLE])
     if swept < _MINIMUM_OVER_NOISE * noise:
         raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: no motion: the angle changes by only {swept:.3g} rad at a noise of "
-            f"{noise:.3g} rad; push the vane harder"
+            f"{source.name}: {PROCEDURE}: no motion: the angle changes by {swept:.3g} rad at a noise of {noise:.3g} rad"
         )
     skipped = check_no_gap(source, PROCEDURE, part)
     # A start that the user gave is after the push.
@@ -141,18 +139,16 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     last = first + int(back[0]) if back.size else part.time.size
     if last - first < MINIMUM_SAMPLES:
         raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: only {last - first} samples lie between the highest speed and the first "
-            f"reversal (or the end), but {MINIMUM_SAMPLES} are needed; record longer, or give a start and an end of "
-            "the decay"
+            f"{source.name}: {PROCEDURE}: {last - first} samples lie between the highest speed and the first reversal "
+            f"(or the end), but {MINIMUM_SAMPLES} are needed"
         )
     rows = slice(first, last)
     angle = part[ANGLE][rows]
     for plateau in plateaus(angle):
         if is_at_limit(angle, plateau):
             raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
-                f"{plateau.count} samples, from sample {skipped + first + plateau.first + 1}, although the vane still "
-                "moved before: the sensor is saturated or the vane is at a stop; give an end before this sample"
+                f"{source.name}: {PROCEDURE}: 'angle' stays at {plateau.value:g} rad for {plateau.count} samples, from "
+                f"sample {skipped + first + plateau.first + 1}: a saturated sensor or a stop; give an end before"
             )
     time, velocity = part.time[rows], None
     if VELOCITY in part:
@@ -163,8 +159,7 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
         gain = float(deviation @ moved / (deviation @ deviation))
         if abs(gain - 1.0) > _VELOCITY_MAY_DIFFER:
             raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times the derivative of 'angle'; "
-                f"check unit and sign of both channels"
+                f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times the derivative of 'angle'"
             )
     return FreeDecay(time=time - time[0], angle=angle, sign=sign, velocity=velocity)
 

@@ -181,9 +181,8 @@ def meter_readings(
         return flow, counted, ()
     source, before = _recording_with(sources, int(wrong[0]))
     remark = (
-        f"left out: {wrong.size} of {np.count_nonzero(counted)} readings with flow against the pressures "
-        f"and the command, which no valve can pass; the first is sample {int(wrong[0]) - before + 1} of "
-        f"{source.name}"
+        f"left out: {wrong.size} of {np.count_nonzero(counted)} readings with flow against the pressures and the "
+        f"command; the first is sample {int(wrong[0]) - before + 1} of {source.name}"
     )
     return flow, counted & ~against, (remark,)
 
@@ -232,8 +231,7 @@ def check_sources(
             worst = int(np.argmax(np.abs(values)))
             if abs(values[worst]) > _LARGEST_NUMBER:
                 raise IdentificationError(
-                    f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}, beyond any "
-                    f"sensor's range: the file is damaged there"
+                    f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}: impossible"
                 )
         if len(recording) < fewest:
             raise IdentificationError(
@@ -247,8 +245,7 @@ def check_sources(
             if recording[name][low] <= 0.0:
                 raise IdentificationError(
                     f"{source.name}: {procedure}: '{name}' is {source.shown(name, recording[name][low])} at sample "
-                    f"{low + 1}, which is impossible for an absolute pressure; give gauge pressures in psi_g, bar_g or "
-                    "kPa_g"
+                    f"{low + 1}, which is impossible for an absolute pressure; gauge is psi_g, bar_g, kPa_g"
                 )
             check_not_alone(source, procedure, name)
 
@@ -279,8 +276,7 @@ def check_moves(source: RecordingSource, procedure: str, name: str) -> None:
     values = source.recording[name]
     if values.max() == values.min():
         raise IdentificationError(
-            f"{source.name}: {procedure}: channel '{name}' is {source.shown(name, values[0])} throughout; "
-            f"the sensor is stuck, or nothing moved"
+            f"{source.name}: {procedure}: channel '{name}' is {source.shown(name, values[0])} throughout"
         )
 
 
@@ -304,8 +300,7 @@ def check_not_clipped(
     if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
         raise IdentificationError(
             f"{source.name}: {procedure}: channel '{name}' stays at {source.shown(name, values.max())} for "
-            f"{longest.count} samples, up to sample {longest.last + 1}, while '{driver}' moves: the sensor is "
-            f"saturated; leave those samples out"
+            f"{longest.count} samples, up to sample {longest.last + 1}, while '{driver}' moves: it is saturated"
         )
 
 
@@ -319,6 +314,6 @@ def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> in
         index, duration = gap
         raise IdentificationError(
             f"{source.name}: {procedure}: gap of {duration:.4g} s after {part.time[index]:.6g} s (sample "
-            f"{skipped + index + 1}); give a start or an end that excludes the gap"
+            f"{skipped + index + 1}), between start and end"
         )
     return skipped

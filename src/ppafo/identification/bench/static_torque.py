@@ -168,8 +168,7 @@ def _check_separable(
         if not (direction == sign).any():
             raise IdentificationError(
                 f"{', '.join(source.name for source in sources)}: {PROCEDURE}: the {name} branch is missing: no "
-                f"reading has direction {sign:+.0f}; friction and the zero of the scale can only be separated "
-                "with both branches"
+                f"reading has direction {sign:+.0f}"
             )
     if pressure.max() == pressure.min():
         check_moves(sources[0], PROCEDURE, "pressure_difference")
@@ -187,8 +186,7 @@ def _check_separable(
         why = f"{percentage(_SAME_LEVEL, 2)} of the highest" if width > zero_of_pressure else "[bench] zero_of_pressure"
         raise IdentificationError(
             f"{', '.join(source.name for source in sources)}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} "
-            f"different pressures or more, not {levels}; pressures closer than {shown:.3g} {unit} ({why}) count as "
-            "one: add recordings at other pressures"
+            f"different pressures or more, not {levels}; pressures closer than {shown:.3g} {unit} ({why}) count as one"
         )
 
 

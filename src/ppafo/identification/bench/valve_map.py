@@ -253,16 +253,14 @@ def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> F
     span = float(np.ptp(sweep.command))
     if span < _MINIMUM_RANGE:
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the command covers a range of only {span:.3g}; "
-            f"{_MINIMUM_RANGE:g} or more is needed to identify dead band and gain"
+            f"{sources[0].name}: {PROCEDURE}: the command covers a range of {span:.3g}, not {_MINIMUM_RANGE:g} or more"
         )
     drivers = sweep.command, sweep.branch
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", drivers, np.ones(sweep.flow.size, dtype=bool))
     shape = np.abs(orifice_shape(sweep.upstream, sweep.downstream, gas.heat_capacity_ratio))
     if not shape.any():
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: both pressures are equal in all readings, so nothing drives a flow; "
-            "check the pressure channels"
+            f"{sources[0].name}: {PROCEDURE}: both pressures are equal in all readings, so nothing drives a flow"
         )
     areas = np.where(shape > 0.0, sweep.flow / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
     if float(sweep.command @ areas) <= 0.0:

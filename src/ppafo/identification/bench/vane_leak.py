@@ -208,8 +208,8 @@ def chamber_decay(source: RecordingSource, start: float | None, end: float | Non
             if plateau.first < EDGE and stands_out(part[name], plateau):
                 raise IdentificationError(
                     f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
-                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and changes only afterwards: "
-                    "the sensor is saturated, or the chamber was not yet closed; give a start after this sample"
+                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}: it is saturated, or the "
+                    "chamber was not yet closed; give a start after this sample"
                 )
     decay = ChamberDecay(part.time, part["pressure_1"], part["pressure_2"], fuller=1, number=number)
     if not np.mean((decay.first - decay.second)[: decay.edge]) > 0.0:
@@ -221,8 +221,7 @@ def chamber_decay(source: RecordingSource, start: float | None, end: float | Non
     if count < MINIMUM_SAMPLES:
         raise IdentificationError(
             f"{source.name}: {PROCEDURE}: only {count} samples lie between the start and equal pressures, but "
-            f"{MINIMUM_SAMPLES} are needed; record at a higher sample rate, or give a start at which the pressures "
-            "differ"
+            f"{MINIMUM_SAMPLES} are needed"
         )
     time = decay.time[:count] - decay.time[0]
     return decay._replace(time=time, first=decay.first[:count], second=decay.second[:count])

@@ -106,7 +106,7 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
     if time.size < MINIMUM_SAMPLES:
         raise IdentificationError(
             f"{where}: {recording.label} has {time.size} samples from the start at {experiment.start:g} s on, but "
-            f"needs at least {MINIMUM_SAMPLES}; give an earlier start or a longer recording"
+            f"needs at least {MINIMUM_SAMPLES}"
         )
     channels = [
         FitChannel(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
@@ -121,8 +121,7 @@ def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: f
         if is_at_limit(channel.values, clipped) and not (rests or has_noise):
             raise IdentificationError(
                 f"{where}: channel '{channel.name}' stays at its {clipped.word} value for {clipped.count} of "
-                f"{channel.values.size} samples: the sensor is probably saturated; end the recording earlier, or, if "
-                "the sensor is not saturated, give its standard deviation in noise"
+                f"{channel.values.size} samples: the sensor is probably saturated; else give its noise"
             )
     scenario = scenario_of(experiment)
     scenario = replace(scenario, run=replace(scenario.run, duration=float(time[-1]) + reach))
