@@ -102,45 +102,43 @@ def result_of(
     ``remedy`` is the advice if some readings contradict the others; ``scatter`` is the field of the result.
     """
     origin = tuple(source.trace for source in sources)
+    estimates = list[Estimate]()
+    for item in reported:
+        index = [*fitted.by_name].index(item.path)
+        value, low, high = (float(column[index]) for column in (fitted.values, fitted.low, fitted.high))
+        number = fitted.numbers[index]
+        width = relative_half_width(value, low, high, item.size)
+        bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
+        # Not 1e-17 where 0 is meant.
+        value = value if bound is None else bound
+        # A part whose interval begins at its bound of zero cannot be distinguished from no part.
+        is_part = item.size is not None and number.low == 0.0 >= low
+        if is_part and high < _NONE * (item.size or 0.0):
+            value = bound = 0.0
+        verdict: Verdict = "identified"
+        sentence = f"{item.text}; {widened_by(fitted, item.path)}."
+        if bound == 0.0 and item.size is not None and width < UNKNOWN:
+            sentence = f"{item.text}: none; {widened_by(fitted, item.path)}."
+            verdict = "identified" if fitted.conflict is None else "holds for this model only"
+        elif bound is not None:
+            verdict = "at its bound"
+            sentence = f"{sentence} The readings favour a value at or beyond {value:.4g}; the interval ends there."
+        elif width >= UNKNOWN or is_part:
+            verdict, sentence = "not identifiable", f"{sentence} The interval includes zero or twice the value."
+        elif fitted.conflict is not None:
+            verdict = "holds for this model only"
+        path, unit, size = item.path, item.unit, item.size
+        estimates.append(Estimate(path, value, unit, low, high, verdict, sentence, origin, fitted.confidence, size))
     return BenchResult(
         procedure=procedure,
         summary=summary,
-        estimates=tuple(_estimate(fitted, number, origin) for number in reported),
+        estimates=tuple(estimates),
         panels=panels,
         kind=kind_of(source.recording.kind for source in sources),
         conflict=conflict_in_words(fitted, remedy),
         remarks=(*remarks, *remarks_on_readings(sources)),
         scatter=scatter,
     )
-
-
-def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) -> Estimate:
-    """Return one estimate of a fit with verdict and sentence; ``origin`` are references of the recordings used."""
-    index = [*fitted.by_name].index(reported.path)
-    value, low, high = (float(column[index]) for column in (fitted.values, fitted.low, fitted.high))
-    number = fitted.numbers[index]
-    width = relative_half_width(value, low, high, reported.size)
-    bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
-    # Not 1e-17 where 0 is meant.
-    value = value if bound is None else bound
-    # A part whose interval begins at its bound of zero cannot be distinguished from no part.
-    is_part = reported.size is not None and number.low == 0.0 >= low
-    if is_part and high < _NONE * (reported.size or 0.0):
-        value = bound = 0.0
-    verdict: Verdict = "identified"
-    sentence = f"{reported.text}; {widened_by(fitted, reported.path)}."
-    if bound == 0.0 and reported.size is not None and width < UNKNOWN:
-        sentence = f"{reported.text}: none; {widened_by(fitted, reported.path)}."
-        verdict = "identified" if fitted.conflict is None else "holds for this model only"
-    elif bound is not None:
-        verdict = "at its bound"
-        sentence = f"{sentence} The readings favour a value at or beyond {value:.4g}; the interval ends there."
-    elif width >= UNKNOWN or is_part:
-        verdict, sentence = "not identifiable", f"{sentence} The interval includes zero or twice the value."
-    elif fitted.conflict is not None:
-        verdict = "holds for this model only"
-    path, unit, size = reported.path, reported.unit, reported.size
-    return Estimate(path, value, unit, low, high, verdict, sentence, origin, fitted.confidence, size)
 
 
 def bench_figure(panels: Sequence[Panel], kind: RecordingKind) -> "Figure":

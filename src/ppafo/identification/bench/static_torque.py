@@ -134,7 +134,14 @@ def torque_readings(sources: tuple[RecordingSource, ...], zero_of_pressure: floa
     strokes = [item["repetition"] if "repetition" in item else np.zeros(len(item)) for item in recordings]
     pairs = np.stack([files, np.concatenate(strokes)[is_used]])
     clusters = np.unique(pairs, axis=1, return_inverse=True)[1].reshape(-1)
-    readings = _reading_indices(pressure, np.stack([direction, clusters]))
+    # Friction varies with position within a stroke, so that consecutive samples of a branch and a repetition at one
+    # pressure are no independent readings of the law.
+    marks, widest, start = np.stack([direction, clusters]), np.ptp(pressure) / _BINS / 2.0, 0
+    readings = np.zeros(pressure.size, dtype=np.int64)
+    for sample in range(1, pressure.size):
+        is_new = abs(pressure[sample] - pressure[start]) > widest or (marks[:, sample] != marks[:, sample - 1]).any()
+        start = sample if is_new else start
+        readings[sample] = readings[sample - 1] + is_new
     counts = np.bincount(readings)
     first = np.concatenate(([0], np.cumsum(counts)[:-1]))
     repetitions = int(clusters.max()) + 1
@@ -188,22 +195,6 @@ def _check_separable(
             f"{', '.join(source.name for source in sources)}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} "
             f"different pressures or more, not {levels}; pressures closer than {shown:.3g} {unit} ({why}) count as one"
         )
-
-
-def _reading_indices(pressure: Floats, labels: Floats) -> NDArray[np.int64]:
-    """Return the reading index of each sample; consecutive samples of a branch at the same pressure are one reading.
-
-    ``labels`` (labels, samples) are branch and repetition. Friction varies with position within a stroke, so that these
-    samples are not independent readings of the law.
-    """
-    widest = np.ptp(pressure) / _BINS / 2.0
-    start, indices = 0, np.zeros(pressure.size, dtype=np.int64)
-    for sample in range(1, pressure.size):
-        is_new = abs(pressure[sample] - pressure[start]) > widest
-        is_new = is_new or (labels[:, sample] != labels[:, sample - 1]).any()
-        start = sample if is_new else start
-        indices[sample] = indices[sample - 1] + is_new
-    return indices
 
 
 def _slides(sources: tuple[RecordingSource, ...]) -> bool:

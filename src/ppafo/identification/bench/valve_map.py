@@ -48,8 +48,6 @@ _SHUT, _HALF_OPEN = 0.05, 0.5
 """Fractions of the largest area [-]: below the first the valve is shut, above the second at least half open."""
 _SATURATES = 0.02
 """Least distance of the saturation from the highest command [-] to be identified."""
-_CLEAR_COMMAND = 0.1
-"""Least magnitude of a command with a clear direction [-]."""
 _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "valve_map.hysteresis", "valve_map.saturation_command"
@@ -126,10 +124,9 @@ def valve_map(
     measured, is_possible, remarks = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow)
     commands = tuple(source.recording["command"] for source in sources)
     sweep = _Sweep(commands, command, measured, upstream, downstream, np.concatenate(branches))
-    areas = _areas(sources, sweep, gas)
     band = f"{path}.dead_band"
     numbers = (
-        *_sought(sources, sweep, areas, band),
+        *_sought(sources, sweep, gas, band),
         *flow_tolerances(gas, tolerances, PRESSURES, float(np.abs(sweep.flow).max())),
     )
 
@@ -164,8 +161,6 @@ def valve_map(
             fitted = replace(fitted, conflict=Conflict("mass_flow", SHAPE, math.sqrt(2.0 * gain), 0.0))
     values, residuals = fitted.by_name, sweep.flow - model
     scatter = np.std(residuals) / np.abs(sweep.flow).max()
-    is_clear = bool((sweep.command > _CLEAR_COMMAND).any() and (sweep.command < -_CLEAR_COMMAND).any())
-    one_way = "only one direction of flow was recorded: the other direction may behave differently"
     no_play = "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
     reported = [
         ReportedNumber(band, "", "Dead band: command below which no gas flows, in both directions", _SMALL_COMMAND),
@@ -192,28 +187,7 @@ def valve_map(
         f"scatter {scatter:.2%} of the largest flow",
         with_residuals("Valve map", *axes, marks, sweep.command, residuals),
         remedy,
-        (*remarks, *(() if is_clear else (one_way,)), *(() if sweep.is_two_way else (no_play,))),
-    )
-
-
-def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, areas: Floats, band: str) -> tuple[FitVariable, ...]:
-    """Return the unknowns with first guesses from the effective area [m^2] of each reading; ``band`` is a path."""
-    size, largest, highest = np.abs(sweep.command), float(np.abs(areas).max()), sweep.highest_command
-    half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())
-    if not half > 0.0:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: at command 0, the valve has more than half of its largest flow; check "
-            "the zero of channel 'command', or omit the reading at command 0"
-        )
-    shut = size[np.abs(areas) < _SHUT * largest]
-    # Inside the bounds, so that the search can go either way.
-    start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
-    return (
-        sought(band, start, 0.0, half, highest),
-        sought(_GAIN, 0.5 * largest / (half - start), 0.0),
-        # Just inside the highest command, beyond which no reading changes with it.
-        sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
-        *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()),
+        (*remarks, *(() if sweep.is_two_way else (no_play,))),
     )
 
 
@@ -245,10 +219,11 @@ def spool_of(command: Floats, width: float) -> Floats:
     return np.array(positions)
 
 
-def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> Floats:
-    """Return the effective area [m^2] of each reading. Raises IdentificationError if the readings do not determine it.
+def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt, band: str) -> tuple[FitVariable, ...]:
+    """Return the unknowns with first guesses; ``band`` is a path. Raises IdentificationError if there are none.
 
-    The area is flow divided by flow per area at the measured pressures, so that a sagging supply is not saturation.
+    The effective area is flow divided by flow per area at the measured pressures, so that a sagging supply is not
+    saturation.
     """
     span = float(np.ptp(sweep.command))
     if span < _MINIMUM_RANGE:
@@ -268,4 +243,20 @@ def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> F
             f"{sources[0].name}: {PROCEDURE}: the flow into chamber 1 falls as the command rises; reverse the sign of "
             "'mass_flow' or 'command'"
         )
-    return np.asarray(areas)
+    size, largest, highest = np.abs(sweep.command), float(np.abs(areas).max()), sweep.highest_command
+    half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())
+    if not half > 0.0:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE}: at command 0, the valve has more than half of its largest flow; check "
+            "the zero of channel 'command', or omit the reading at command 0"
+        )
+    shut = size[np.abs(areas) < _SHUT * largest]
+    # Inside the bounds, so that the search can go either way.
+    start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
+    return (
+        sought(band, start, 0.0, half, highest),
+        sought(_GAIN, 0.5 * largest / (half - start), 0.0),
+        # Just inside the highest command, beyond which no reading changes with it.
+        sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
+        *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()),
+    )
