@@ -147,8 +147,8 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     for plateau in plateaus(angle):
         if is_at_limit(angle, plateau):
             raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: 'angle' stays at {plateau.value:g} rad for {plateau.count} samples, from "
-                f"sample {skipped + first + plateau.first + 1}: a saturated sensor or a stop; give an end before"
+                f"{source.name}: {PROCEDURE}: channel 'angle' stays at {plateau.value:g} rad in {plateau.count} rows, "
+                f"from sample {skipped + first + plateau.first + 1}: saturated, or at a stop; give an end before"
             )
     time, velocity = part.time[rows], None
     if VELOCITY in part:

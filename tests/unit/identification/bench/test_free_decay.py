@@ -174,7 +174,7 @@ def test_the_part_of_the_recordings_that_was_fitted_is_said() -> None:
 
 
 def test_too_few_samples_between_start_and_end_are_refused() -> None:
-    with pytest.raises(IdentificationError, match="at least 20 samples between start and end, not 2"):
+    with pytest.raises(IdentificationError, match="at least 20 samples from start to end, not 2"):
         free_decay((planted.decay(),), start=7.99)
 
 
