@@ -5,7 +5,7 @@ here, so that a setting has the same meaning in all of them.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -40,25 +40,19 @@ class LinkFunction:
     """Function from which the default of a number is computed; takes floats or arrays (runs,).
 
     The first sources fill ``rows``, NamedTuple classes that declare their numbers, and each row is one argument. The
-    remaining sources are single arguments. The scalar form can be translated to C. ``orifice`` is the section of an
-    orifice whose form selects the sources; ``in_other_form`` is the function for its other form. ``stages``, if any,
-    are two functions that give the same number: the first takes the same arguments and is common to several links, its
-    results are arguments of the second.
+    remaining sources are single arguments. The scalar form can be translated to C. ``stages``, if any, are two
+    functions that give the same number: the first takes the same arguments and is common to several links, its results
+    are arguments of the second.
     """
 
     sources: tuple[str, ...]
     function: PlainFunction = itself
     rows: tuple[type, ...] = ()
-    orifice: str = ""
-    in_other_form: "LinkFunction | None" = None
     stages: tuple[PlainFunction, PlainFunction] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the function by its recipe, since it may not be defined in a module."""
-        return _term, (
-            *(self.sources, recipe_of(self.function), self.rows, self.orifice, self.in_other_form),
-            recipe_of(self.stages),
-        )
+        return _term, (self.sources, recipe_of(self.function), self.rows, recipe_of(self.stages))
 
     def number(self, present: Callable[[str], Any], computed: dict[Any, Any] | None = None) -> Any:
         """Return the function value, with sources read by ``present``.
@@ -88,8 +82,8 @@ class LinkFunction:
         return arguments + rest
 
 
-def _term(sources: tuple[str, ...], recipe: Any, rows: Any, orifice: str, other: Any, stages: Any) -> LinkFunction:
-    return LinkFunction(sources, by_recipe(recipe), rows, orifice, other, by_recipe(stages))
+def _term(sources: tuple[str, ...], recipe: Any, rows: Any, stages: Any) -> LinkFunction:
+    return LinkFunction(sources, by_recipe(recipe), rows, by_recipe(stages))
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,43 +166,21 @@ def acting(graph: Graph, set_paths: Collection[str], turned: Collection[str] = (
 
 
 def resolved(
-    graph: Graph, replaced: Mapping[str, Any], present: Mapping[str, Any], orifices: Collection[str] = ()
+    graph: Graph, replaced: Mapping[str, Any], present: Mapping[str, Any], anew: Graph | None = None
 ) -> dict[str, Any]:
     """Return the given numbers and all numbers computed from them by the links that hold in ``present``.
 
-    The given ``orifices`` (section names) change from area form to ISO 6358 form or back.
+    Links in ``anew`` take the place of those that hold, as where an orifice is given in its other form.
     """
     held = holding(graph, present)
-    links = in_other_forms(held, orifices)
+    links = held | {path: link for path, link in (anew or {}).items() if path in held}
     turned = [path for path in held if links[path] != held[path]]
-    numbers, moved = {**present, **replaced}, dict(replaced)
+    moved = dict(replaced)
     # Sources precede their followers: a number that was a source of a first stage does not change after it.
     computed: dict[Any, Any] = {}
     for path, link in acting(links, replaced, turned).items():
-        numbers[path] = moved[path] = link.number(numbers.__getitem__, computed)
+        moved[path] = link.number(lambda source: moved[source] if source in moved else present[source], computed)
     return moved
-
-
-def paths_in(graph: Graph) -> set[str]:
-    """Return all paths in links: dependent numbers and sources, in both forms of an orifice."""
-    terms = [term for links in graph.values() for link in links for term in link.terms]
-    turned = [term.in_other_form for term in terms if term.in_other_form is not None]
-    return {*graph, *(source for term in (*terms, *turned) for source in term.sources)}
-
-
-def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
-    """Return the links with the given orifices (section names) converted between area form and ISO 6358 form."""
-    if not orifices:
-        return graph
-
-    def turned(term: LinkFunction) -> LinkFunction:
-        other = term.in_other_form if term.orifice in orifices else None
-        return term if other is None else replace(other, in_other_form=replace(term, in_other_form=None))
-
-    return {
-        path: tuple(replace(link, terms=tuple(map(turned, link.terms))) for link in links)
-        for path, links in graph.items()
-    }
 
 
 def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[LinkedDefault, ...]]:

@@ -4,10 +4,12 @@ Each mistake in the document raises an error of one line.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted
 from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import WHY_ONE_CHAMBER
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
@@ -18,7 +20,6 @@ from ppafo.simulation.declaration import (
     ACCURACY,
     AT_REST,
     INITIAL,
-    LOCKED_ANGLE,
     PURPOSE,
     SEED,
     SENSORS,
@@ -31,24 +32,19 @@ from ppafo.simulation.declaration import (
     line_quantities,
     reference_settings,
 )
-from ppafo.simulation.default_gains import default_gain_terms
+from ppafo.simulation.default_gains import default_links
 from ppafo.simulation.document import REFERENCE_OF, DocumentReader, ScenarioRequest, controlled_in
-from ppafo.simulation.following import read_followers
 from ppafo.simulation.hardware import Hardware, device_error, read_device, read_hardware
-from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_scenario
 from ppafo.simulation.motion_kind import MOTIONS, RunTimes
-from ppafo.simulation.nominal import nominal_terms
+from ppafo.simulation.numbers import number_at
 from ppafo.simulation.overrides import OverriddenDocument
 from ppafo.simulation.profiles import read_profile, reference_problem
 from ppafo.simulation.scenario import (
     PRESSURE_WORDS,
     Control,
-    FreeMotion,
     GasModel,
     Initial,
-    Motion,
     Origin,
-    PrescribedMotion,
     ProfileChoice,
     RegulatedLine,
     RunSettings,
@@ -92,7 +88,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         motion = section.read(reading, device, times.duration, times.step, request.folder)
         sensors = _sensors(reading, of_sensors, times)
         supply_line = read_supply_line(reading, device)
-        control, control_links = _control(reading, device, times.period, sensors, motion, reference)
+        kind = kind_at(document, "controller")
         as_written = DocumentReader(request.file, request.content)
         assumptions = read_assumptions(as_written, reading, hardware, request.overrides)
         scenario = Scenario(
@@ -102,28 +98,29 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
             run=RunSettings(times.duration, times.step, times.output_interval, tolerance),
             motion=motion,
             initial=initial,
-            controller=control,
+            controller=Control(kind, {}, times.period),
             reference=reference,
             sensors=sensors,
             assumptions=(*assumptions, *assumed_lines(reading)),
             origin=origin_of(request, changed, hardware),
             gas_model=read_gas_model(reading),
             supply_line=supply_line,
-            links={**initial_links, **reference_links, **control_links},
+            links={**initial_links, **reference_links},
             controlled=controlled,
             beyond_reach=str(value_at(document, PURPOSE) or ""),
         )
+        scenario = with_settings(reading, scenario, controller_settings(kind, controlled))
         problem = reference_problem(scenario)
         if problem:
             raise ScenarioError(f"{request.file}: {problem}")
-        law = CONTROLLERS[control.kind]
+        law = CONTROLLERS[kind]
         try:
             if supply_line is not None:
                 device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")
             if law.needs_reference and law.controls == (TORQUE,):
                 # These open the valve by their own idea of the device, where a command above 0 raises the torque.
                 able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
-                device.check_pressurised(f"the controller '{control.kind}'", f"; set controller.kind to one of {able}")
+                device.check_pressurised(f"the controller '{kind}'", f"; set controller.kind to one of {able}")
             if law.plan is not None:
                 device.check_torque_constant("a fixed-point controller")
         except ParameterError as error:
@@ -167,39 +164,24 @@ def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:
     return Initial(*pressures), {path: links for path, links in links.items() if links}
 
 
-def _control(
-    reading: DocumentReader,
-    device: Device,
-    period: float,
-    sensors: Sensors,
-    motion: Motion,
-    reference: ProfileChoice,
-) -> tuple[Control, Graph]:
-    """Return the controller, sampled at ``period`` [s], and the links of its settings [SI] to other numbers."""
-    kind = kind_at(reading.document, "controller")
-    controlled = controlled_in(reading.document)
-    items = controller_settings(kind, controlled)
-    if not any(quantity.follows for quantity in items):
-        return Control(kind, reading.section("controller", items), period), {}
-    leg = motion.leg if isinstance(motion, FreeMotion) else None
-    is_locked = isinstance(motion, PrescribedMotion) and motion.kind == "locked"
-    path = motion.profile if isinstance(motion, PrescribedMotion) and not is_locked else None
-    signals = seen_in_scenario(
-        controlled, leg is not None, is_locked, reference.kind, "" if path is None else path.kind
+def with_settings(reading: DocumentReader, scenario: Scenario, declared: tuple[Quantity, ...]) -> Scenario:
+    """Return the scenario with the settings of its controller [SI], and links of those that follow other numbers."""
+    links = default_links(
+        scenario, (item for item in declared if value_at(reading.document, f"controller.{item.name}") is None)
     )
-    terms = nominal_terms(device) | default_gain_terms(device, CONTROLLERS[kind], signals, controlled)
-    sources = {f"sensors.{quantity.name}": getattr(sensors, quantity.name) for quantity in SENSORS}
-    sources[PERIOD_PATH] = period
-    sources |= {f"reference.{name}": number for name, number in reference.settings.items()}
-    if is_locked:
-        sources[LOCKED_ANGLE] = motion.locked_angle
-    if path is not None:
-        sources |= {f"{MOVED}.{name}": number for name, number in path.settings.items()}
-    if leg is not None:
-        sources |= {path: getattr(leg, path.removeprefix("motion.")) for path in LEG_PATHS}
-    numbers, links = read_followers(reading, {"controller": items}, terms, device, sources)
-    settings = {path.removeprefix("controller."): number for path, number in numbers.items()}
-    return Control(kind, settings, period), links
+    settings: dict[str, float] = {}
+
+    def number(path: str) -> float:
+        # A setting may follow one before it.
+        return settings[path] if path in settings else number_at(scenario, path)
+
+    for item in declared:
+        path = f"controller.{item.name}"
+        decided = replace(item, default=float(links[path][0].number(number))) if path in links else item
+        settings[path] = reading.number(path, decided)
+    of_controller = {path.removeprefix("controller."): number for path, number in settings.items()}
+    control = replace(scenario.controller, settings=of_controller)
+    return replace(scenario, controller=control, links={**scenario.links, **links})
 
 
 def _controlled(reading: DocumentReader) -> str:

@@ -1,6 +1,6 @@
 """Default controller gains of a device: rules of ``control.torque_loop`` and ``angle_loop`` for its loop and joint."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from ppafo.control import angle_loop, torque_loop
@@ -11,12 +11,13 @@ from ppafo.model.actuators.kind import Range
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.model.declaration import PlainFunction
+from ppafo.model.declaration import PlainFunction, Quantity
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import LinkFunction
+from ppafo.parameters.graph import LinkedDefault, LinkFunction
 from ppafo.simulation.mean_chambers import Surroundings
 from ppafo.simulation.motion_kind import LawSignals
-from ppafo.simulation.nominal import VALVE, in_its_form
+from ppafo.simulation.nominal import nominal_terms
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import FlowNumbers, JointGainParts, loop_functions
 
 RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
@@ -161,29 +162,24 @@ def default_gain_terms(
     ``controlled`` is the controlled quantity, ``seen`` the signals of the controller.
     """
     controls_torque = TORQUE in law.controls
-    loops_in_forms = [loop_functions(device, seen, controlled, sonic) for sonic in (False, True)]
+    loops = loop_functions(device, seen, controlled)
 
     def term(gain: PlainFunction, rule: PlainFunction, *settings: str) -> LinkFunction:
-        links = []
-        for loops in loops_in_forms:
-            parts: _GainParts | JointGainParts
-            stages = None
-            if gain is gain_of_joint:
-                assert loops.joint is not None, "an angle controller has a joint"
-                parts = JointGainParts(loops.torque_loop, loops.joint, rule)
-                # In a study the loop costs more than the run: all gains of the joint have one.
-                shared = made_of(
-                    loop_and_joint, "loop_and_joint_of_device", _LoopAndJoint(loops.torque_loop, loops.joint)
-                )
-                stages = (shared, rule)
-            elif rule in _OF_REACH.values():
-                parts = _GainParts(loops.reach, rule)
-            else:
-                # A law of the angle alone has the torque loop inside it.
-                parts = _GainParts(loops.loop if controls_torque else loops.torque_loop, rule)
-            function = made_of(gain, f"{rule.__name__}_of_device", parts)
-            links.append(LinkFunction((*loops.sources, *settings), function, loops.rows, stages=stages))
-        return in_its_form(device, VALVE, *links)
+        parts: _GainParts | JointGainParts
+        stages = None
+        if gain is gain_of_joint:
+            assert loops.joint is not None, "an angle controller has a joint"
+            parts = JointGainParts(loops.torque_loop, loops.joint, rule)
+            # In a study the loop costs more than the run: all gains of the joint have one.
+            shared = made_of(loop_and_joint, "loop_and_joint_of_device", _LoopAndJoint(loops.torque_loop, loops.joint))
+            stages = (shared, rule)
+        elif rule in _OF_REACH.values():
+            parts = _GainParts(loops.reach, rule)
+        else:
+            # A law of the angle alone has the torque loop inside it.
+            parts = _GainParts(loops.loop if controls_torque else loops.torque_loop, rule)
+        function = made_of(gain, f"{rule.__name__}_of_device", parts)
+        return LinkFunction((*loops.sources, *settings), function, loops.rows, stages=stages)
 
     terms = {name: term(gain_of_device, rule) for name, rule in _OF_LOOP.items()}
     if not controls_torque:
@@ -198,3 +194,18 @@ def default_gain_terms(
     gain = next((quantity.name for quantity in law.quantities if torque_loop.PROPORTIONAL_GAIN in quantity.follows), "")
     terms[torque_loop.INTEGRAL_GAIN] = term(gain_with_setting, torque_loop.integral_gain, f"controller.{gain}")
     return terms
+
+
+def default_links(scenario: Scenario, settings: Iterable[Quantity]) -> dict[str, tuple[LinkedDefault, ...]]:
+    """Return the links of those controller settings that numbers of the device decide unless given, by path."""
+    following = [setting for setting in settings if setting.follows]
+    if not following:
+        return {}
+    device, kind = scenario.device, scenario.motion.motion_kind
+    gains = default_gain_terms(device, kind.law(scenario), kind.sees(scenario), scenario.controlled)
+    terms = nominal_terms(device) | gains
+    return {
+        f"controller.{item.name}": (LinkedDefault(tuple(terms[name] for name in item.follows), item.default or 0.0),)
+        for item in following
+        if terms.keys() >= set(item.follows)
+    }

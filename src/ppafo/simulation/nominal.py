@@ -1,7 +1,6 @@
 """Nominal device of a model-based controller, from the numbers of the actual device."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
@@ -11,7 +10,7 @@ from ppafo.model.binding import made_of
 from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
-from ppafo.parameters.device import VANE, Device, SonicOrifice
+from ppafo.parameters.device import VANE, Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import LinkFunction
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
 
@@ -109,34 +108,22 @@ def nominal_terms(device: Device) -> dict[str, LinkFunction]:
     terms = {name: LinkFunction((path,)) for name, path in _SAME_NUMBERS.items()} | _chamber_terms(device)
     terms |= {
         "gas_product": LinkFunction(_GAS_PRODUCT_PATHS, product_of),
-        "valve_conductance": _conductance(device, VALVE),
-        "leak_conductance": _conductance(device, LEAK),
-        "critical_ratio": in_its_form(
-            device, VALVE, LinkFunction(_GAS_PATHS[1:2], critical_pressure_ratio), LinkFunction(SONIC_PATHS[VALVE][1:])
-        ),
+        "valve_conductance": _conductance(VALVE, device.valve.orifice),
+        "leak_conductance": _conductance(LEAK, device.actuator.leak),
+        "critical_ratio": LinkFunction(SONIC_PATHS[VALVE][1:])
+        if isinstance(device.valve.orifice, SonicOrifice)
+        else LinkFunction(_GAS_PATHS[1:2], critical_pressure_ratio),
         "converter_range": LinkFunction(("supply.pressure", "supply.dorsiflexion_pressure"), converter_range),
         "dead_band": LinkFunction(("valve.dead_band",)) if device.valve.kind == "proportional" else _ZERO,
     }
     return {nominal_term(name): term for name, term in terms.items()}
 
 
-def _conductance(device: Device, section: str) -> LinkFunction:
+def _conductance(section: str, orifice: Orifice | SonicOrifice) -> LinkFunction:
     """Return the function that determines the conductance [kg/(s Pa)] of an orifice."""
-    return in_its_form(
-        device,
-        section,
-        LinkFunction((*_GAS_PATHS, *AREA_PATHS[section]), conductance_of_area),
-        LinkFunction((*_GAS_PRODUCT_PATHS, SONIC_PATHS[section][0]), conductance_of_sonic),
-    )
-
-
-def in_its_form(device: Device, section: str, of_area: LinkFunction, of_sonic: LinkFunction) -> LinkFunction:
-    """Return the function for an orifice given as area or as sonic conductance, linked to the alternative."""
-    orifice = device.valve.orifice if section == VALVE else device.actuator.leak
-    of_area, of_sonic = replace(of_area, orifice=section), replace(of_sonic, orifice=section)
     if isinstance(orifice, SonicOrifice):
-        return replace(of_sonic, in_other_form=of_area)
-    return replace(of_area, in_other_form=of_sonic)
+        return LinkFunction((*_GAS_PRODUCT_PATHS, SONIC_PATHS[section][0]), conductance_of_sonic)
+    return LinkFunction((*_GAS_PATHS, *AREA_PATHS[section]), conductance_of_area)
 
 
 def _chamber_terms(device: Device) -> dict[str, LinkFunction]:

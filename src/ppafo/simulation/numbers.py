@@ -22,9 +22,10 @@ from ppafo.parameters.declaration import (
 )
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
-from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
+from ppafo.parameters.graph import Graph, LinkedDefault, holding, left, resolved
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.simulation.declaration import LOCKED_ANGLE
+from ppafo.simulation.default_gains import default_links
 from ppafo.simulation.profiles import disordered_knots, profiles_of
 from ppafo.simulation.scenario import (
     Control,
@@ -159,20 +160,16 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     changes to that form; both numbers of the form are then required.
     """
     replaced = {chosen_path(path, scenario): number for path, number in numbers.items()}
-    moved, changing = moving_together(scenario, replaced), _changing_form(scenario, replaced)
+    moved, changed, anew = _moved(scenario, replaced)
     # All links that are left are the scenario's own, for what is replaced follows nothing any more.
     if replaced:
-        device = replace(scenario.device, links={})
-        links = left(in_other_forms(scenario.graph, changing), replaced)
-        scenario = replace(scenario, device=device, links=links)
-    for section in changing:
-        form = other_form(scenario.device, section)
-        in_form = {name: moved.pop(f"{section}.{name}") for name in form}
-        kind = SonicOrifice if "sonic_conductance" in form else Orifice
-        scenario = _replace_number(scenario, ORIFICES[section], kind(**in_form))
+        links = left({**scenario.graph, **anew}, replaced)
+        changed = replace(changed, device=replace(changed.device, links={}), links=links)
+    absent = _numbers_of_other_form(scenario.device)
     for path, number in moved.items():
-        scenario = _replace_number(scenario, _attributes(path, scenario), number)
-    return scenario
+        if path not in absent:
+            changed = _replace_number(changed, _attributes(path, changed), number)
+    return changed
 
 
 def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str, Any]:
@@ -182,21 +179,39 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
     """
     # What follows the sample period follows a rate that is given for it.
     period = {_PERIOD: 1.0 / replaced[_RATE]} if _RATE in replaced and _PERIOD not in replaced else {}
-    changing = _changing_form(scenario, replaced)
-    moved = resolved(scenario.graph, {**replaced, **period}, _numbers_of_graph(scenario), changing)
+    moved, _, _ = _moved(scenario, {**replaced, **period})
     return {path: number for path, number in moved.items() if path not in period}
+
+
+def _moved(scenario: Scenario, replaced: Mapping[str, Any]) -> tuple[dict[str, Any], Scenario, Graph]:
+    """Return numbers with all that follow them, the scenario with orifices given in their other form, and its links."""
+    changed, anew = scenario, dict[str, tuple[LinkedDefault, ...]]()
+    for section in _changing_form(scenario, replaced):
+        form = other_form(scenario.device, section)
+        kind = SonicOrifice if "sonic_conductance" in form else Orifice
+        orifice = kind(**{name: replaced[f"{section}.{name}"] for name in form})
+        changed = _replace_number(changed, ORIFICES[section], orifice)
+    if changed is not scenario:
+        declared = scenario.motion.motion_kind.quantities(scenario)
+        anew = default_links(changed, [declared[path] for path in scenario.links if path in declared])
+    return resolved(scenario.graph, replaced, _Numbers(scenario), anew), changed, anew
 
 
 def links_that_hold(scenario: Scenario) -> Graph:
     """Return the links of a scenario that still apply: without numbers changed since it was loaded."""
-    return holding(scenario.graph, _numbers_of_graph(scenario))
+    return holding(scenario.graph, _Numbers(scenario))
 
 
-def _numbers_of_graph(scenario: Scenario) -> dict[str, Any]:
-    """Return the numbers that the links of a scenario name, keyed by path; for an orifice, in its present form."""
-    absent = _numbers_of_other_form(scenario.device)
-    present = (path for path in paths_in(scenario.graph) if path not in absent)
-    return {path: number_under(scenario, _attributes(path, scenario)) for path in present}
+class _Numbers(dict[str, Any]):
+    """Numbers of a scenario by path, each read when it is asked for."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__()
+        self.scenario = scenario
+
+    def __missing__(self, path: str) -> Any:
+        self[path] = number_under(self.scenario, _attributes(path, self.scenario))
+        return self[path]
 
 
 def number_at(scenario: Scenario, path: str) -> float:

@@ -17,7 +17,7 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Number, PlainFunction
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
-from ppafo.parameters.device import Device
+from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
 from ppafo.simulation.motion_kind import LawSignals
@@ -228,12 +228,9 @@ class _LoopFunctions(NamedTuple):
     joint: PlainFunction | None
 
 
-def loop_functions(device: Device, seen: LawSignals, controlled: str, sonic: bool) -> _LoopFunctions:
-    """Return the loop functions of a device for a controller with given signals.
-
-    ``sonic`` selects the valve's orifice as a sonic conductance instead of an area.
-    """
-    valve = VALVES[device.valve.kind]
+def loop_functions(device: Device, seen: LawSignals, controlled: str) -> _LoopFunctions:
+    """Return the loop functions of a device for a controller with given signals."""
+    valve, sonic = VALVES[device.valve.kind], isinstance(device.valve.orifice, SonicOrifice)
     chambers = chambers_of(device)
     settings = tuple(quantity.name for quantity in valve.quantities)
     if {"opening_delay", "closing_delay", "switching_interval"}.issubset(settings):

@@ -8,18 +8,12 @@ from ppafo.control.walking.catalog import walking_controllers
 from ppafo.errors import DataError, ParameterError, ScenarioError, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.parameters.declared import kind_at, value_at
-from ppafo.parameters.device import Device
-from ppafo.parameters.graph import Graph
 from ppafo.simulation.assumptions import assumed_lines
-from ppafo.simulation.building import origin_of, read_gas_model, read_supply_line
+from ppafo.simulation.building import origin_of, read_gas_model, read_supply_line, with_settings
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
-from ppafo.simulation.default_gains import default_gain_terms
 from ppafo.simulation.document import DocumentReader, ScenarioRequest
-from ppafo.simulation.following import read_followers
 from ppafo.simulation.hardware import read_device, read_hardware
-from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
 from ppafo.simulation.motion_kind import MOTIONS, WALK
-from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument
 from ppafo.simulation.scenario import Assumption, Control, Initial, RunSettings, Scenario, Sensors
 from ppafo.walking.bottle.supply import BottleSupply, read_bottle
@@ -62,7 +56,8 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     sensors = reading.section("sensors", WALK_SENSORS)
     motion = _motion(reading, request, bottle, sensors)
     step = reading.number("run.step", STEP)
-    controller, links = _control(reading, device, sensors)
+    kind = kind_at(document, "controller")
+    law = walking_controllers()[kind]
     atmosphere = device.supply.atmospheric_pressure
     scenario = Scenario(
         name=document["name"],
@@ -71,7 +66,8 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         run=RunSettings(DEFAULT_DURATION, step, record_interval(DEFAULT_DURATION)),
         motion=motion,
         initial=Initial(atmosphere, atmosphere),
-        controller=controller,
+        # A law that is named by its module keeps this name; a law of the catalogue has the name that it has in walking.
+        controller=Control(kind if ":" in kind else law.name, {}, _period(reading)),
         reference=NO_REFERENCE,
         sensors=Sensors(
             **{name: number for name, number in sensors.items() if name not in FORCES},
@@ -81,8 +77,9 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         origin=origin_of(request, changed, hardware),
         gas_model=read_gas_model(reading),
         supply_line=line,
-        links={**links, **links_of_stature(reading.document)},
     )
+    scenario = with_settings(reading, scenario, law.quantities)
+    scenario = replace(scenario, links={**scenario.links, **links_of_stature(reading.document)})
     # Numbers that are usable by themselves may contradict each other.
     check_walk(scenario, reading)
     return with_duration(scenario, _duration(reading, scenario))
@@ -110,24 +107,12 @@ def _motion(
     )
 
 
-def _control(reading: DocumentReader, device: Device, sensors: Mapping[str, float]) -> tuple[Control, Graph]:
-    """Return the controller with its settings [SI], and the links between the numbers.
-
-    Defaults may depend on valve, device and sensors; each such dependence is a link.
-    """
-    kind = kind_at(reading.document, "controller")
-    law = walking_controllers()[kind]
-    rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
-    seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
-    if rate is not None:
-        seconds = 1.0 / reading.number("controller.rate", RATE)
-    terms = nominal_terms(device) | default_gain_terms(device, law, IN_WALK)
-    present = {f"sensors.{name}": number for name, number in sensors.items()}
-    present[PERIOD_PATH] = seconds
-    numbers, links = read_followers(reading, {"controller": law.quantities}, terms, device, present)
-    settings = {path.partition(".")[2]: number for path, number in numbers.items()}
-    # A law that is named by its module keeps this name; a law of the catalogue has the name that it has in walking.
-    return Control(kind if ":" in kind else law.name, settings, seconds), links
+def _period(reading: DocumentReader) -> float:
+    """Return the sample period of the controller [s]."""
+    if value_at(reading.document, "controller.rate") is not None:
+        return 1.0 / reading.number("controller.rate", RATE)
+    is_given = value_at(reading.document, "controller.period") is not None
+    return reading.number("controller.period", PERIOD) if is_given else DEFAULT_PERIOD
 
 
 def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
