@@ -3,8 +3,8 @@
     python scripts/equations.py
     python scripts/equations.py ppafo.model.plant.net_torque
 
-Without a name it writes the lists of ``docs/equations.md`` from ``docs/equations.toml``. With names it changes each
-function in a copy of the source, its result by 1.2 and by the term of the list, and prints what a run then does.
+Without a name it writes the lists of ``docs/equations.md`` from ``tests/reference/equations.toml``. With names it
+changes each function in a copy of the source, its result by 1.2 and by the term of the list, and prints what runs do.
 """
 
 import ast
@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-PAGE, LIST = ROOT / "docs" / "equations.md", ROOT / "docs" / "equations.toml"
+PAGE, LIST = ROOT / "docs" / "equations.md", ROOT / "tests" / "reference" / "equations.toml"
 FACTOR = 1.2
 BULLET = "- [`"
 
