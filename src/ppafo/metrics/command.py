@@ -51,11 +51,10 @@ def update_reversals(state: Reversals, _course: ReferenceSummary, sample: Sample
 REVERSALS = MeterKind("reversals", Reversals, start_reversals, update_reversals)
 
 
-def command_reversals(recording: Recording, samples: slice | None = None) -> float:
-    """Number of command reversals in a recording, or in a slice of its samples."""
-    window = samples or slice(None)
-    command = recording["command"][window]
-    task = recording["controller_phase"][window] if "controller_phase" in recording else np.zeros(command.size)
+def command_reversals(recording: Recording) -> float:
+    """Number of command reversals in a recording."""
+    command = recording["command"]
+    task = recording["controller_phase"] if "controller_phase" in recording else np.zeros(command.size)
     ways = np.where((command > HALF_OPEN) & (command <= VENTS_ABOVE), 1, 0) - np.where(command < -HALF_OPEN, 1, 0)
     # What begins anew has a number of its own: reversals count between two ways of one number.
     begins = (np.diff(task, prepend=task[:1]) != 0.0) | (command > VENTS_ABOVE)

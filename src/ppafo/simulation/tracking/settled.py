@@ -7,35 +7,41 @@ worst of the earlier ones. In a walk, the judged part is all samples with a requ
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
-from ppafo.engine.in_python import over_samples
-from ppafo.metrics.command import Reversals, command_reversals, requested_samples
+from ppafo.engine.step.meters import NO_FOOT, NO_STRIDE
+from ppafo.metrics.command import requested_samples
 from ppafo.metrics.metric import Floats, Readings, controlled_in, extent, followed, hold_start, reference_of
 from ppafo.metrics.settled import (
-    LAG_TIME,
     LARGEST_LAG,
-    LARGEST_SHARE,
     SETTLED,
     SETTLED_METRICS,
     SUSTAINED,
-    PartSums,
     SettledSums,
-    allowed_lag,
-    badness,
+    start_settled,
+    update_settled,
 )
-from ppafo.metrics.switching import OSCILLATION_THRESHOLD, Swing, reversals
+from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.model.columns import first
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.helping import PUSH_OFF
 from ppafo.parameters.reach import torque_reach
 from ppafo.signals import Recording
-from ppafo.signals.meter import SAME_LEVEL, SLOW_RATE, ReferenceSummary, shortest_rest, start_up_of
+from ppafo.signals.meter import (
+    NO_ENERGY,
+    NO_GAS,
+    SAME_LEVEL,
+    SLOW_RATE,
+    ReferenceSummary,
+    Sample,
+    advance_part,
+    deciding_sample,
+    start_up_of,
+)
 from ppafo.simulation.profiles import limits_of, profile_bounds, profile_parameters, profile_values
 from ppafo.simulation.scenario import Scenario
 
@@ -51,7 +57,6 @@ _LONG_RAMP = 0.5
 """Share of the way of a reference from which its last part, in one direction, is a ramp that does not end [-]."""
 _TINY = 1.0e-300
 """Divisor in place of 0."""
-
 
 WHERE_REQUESTED, IN_PUSH_OFF = -1.0, -2.0
 """In place of the start of a judged part, for a walk."""
@@ -172,53 +177,64 @@ def settled_walk(recording: Recording, limit: float, available: float) -> Settle
 def task_parts(scenario: Scenario, recording: Recording) -> tuple[SettledPart, SettledPart]:
     """Last part of a task's reference, and the worst of the earlier ones, measured from a recording.
 
-    They are the two that are measured in a run without recording, by the same sums (``metrics.settled``).
+    They are the two of a run without recording: its settled meter is fed with the recorded samples.
     """
-    reference, value = followed(recording)
-    course = _course(scenario, recording)
-    is_wave, lag = PROFILES[scenario.reference.kind].is_wave, _allowed_lag(course, recording)
-    whole = [ReferencePart(0, len(recording) - 1, 0, rests=False)]
-    parts = whole if is_wave else reference_parts(reference, course)
-    *earlier, (last, samples, _) = [_sums_of(part, course, recording, lag) for part in parts]
-    earlier = [each for each in earlier if each[0].rests or each[0].path > 0.0]
-    # At the start of a run the value may be on its way yet.
-    first_met = _first_met(value - reference, course)
-    on_its_way = min(first_met, course.start_up or first_met)
-    earlier = [each for each in earlier if each[0].start > 0.0 or each[2][1] > on_its_way or each[2][1] == first_met]
-    worst = max(earlier, key=lambda each: badness(each[0], course), default=None)
-    hold = int(max(course.hold_start, 0.0)) if course.hold_start < course.samples - 1.0 else 0
-    last_quarter, span = slice((hold + 3 * len(recording)) // 4, None), recording.time[samples]
-    ahead, below = (int(np.argmax(sign * (value - reference) <= 0.0)) for sign in (1.0, -1.0))
-    sums = SettledSums(
-        part=last,
-        worst=PartSums() if worst is None else worst[0],
-        worst_badness=0.0,
-        waits=0.0,
-        lagged=0.0,
-        met=0.0,
-        command=Reversals(0.0, 0.0, command_reversals(recording, last_quarter)),
-        begun=float(value[0]),
-        lowest=float(value.min()),
-        highest=float(value.max()),
-        met_upwards=0.0,
-        top=float(value[ahead:].max()),
-        met_downwards=0.0,
-        bottom=float(value[below:].min()),
-    )
+    course, end = _course(scenario, recording), len(recording) - 1
+    sums, worst_end = _metered(course, recording, is_cut=not PROFILES[scenario.reference.kind].is_wave)
     readings = Readings({SETTLED.name: sums}, course, np.asarray(course.interval), len(recording), {})
     numbers = {name: np.asarray(kind.read(readings)) for name, kind in SETTLED_METRICS.items()}
     last_part, worst_part = map(_single, settled_parts(scenario, numbers, smallest_change(scenario)))
+    samples, time = slice(end + 1 - int(sums.part.taken), None), recording.time
+    start = float(time[samples.start])
     last_part = last_part._replace(
         samples=samples,
-        start=float(span[0]),
-        duration=float(recording.time[-1] - span[0]),
+        start=start,
+        duration=float(time[-1] - start),
         command_reversal_rate=float(numbers["settled_reversals"]),
     )
-    if worst is not None:
-        _, judged, (begins, ends) = worst
-        start, end, first_judged = (float(recording.time[each]) for each in (begins, ends, judged.start))
-        worst_part = worst_part._replace(samples=judged, start=start, end=end, duration=end - first_judged)
+    if worst_end:
+        judged = slice(worst_end + 1 - int(sums.worst.taken), worst_end + 1)
+        begins, first_judged, until = (float(time[each]) for each in (int(sums.worst.start), judged.start, worst_end))
+        worst_part = worst_part._replace(samples=judged, start=begins, end=until, duration=until - first_judged)
     return last_part, worst_part
+
+
+def _metered(course: ReferenceSummary, recording: Recording, is_cut: bool) -> tuple[SettledSums, int]:
+    """State of the settled meter after all samples, and the last sample of the worst earlier part; 0 without one.
+
+    ``is_cut`` is true for a reference that has rests and moves.
+    """
+    reference, value = (series.tolist() for series in followed(recording))
+    series = (recording[name].tolist() for name in ("angular_velocity", "command"))
+    # The settled meter reads no other channel.
+    samples = [
+        Sample(
+            float(number),
+            0.0,
+            speed,
+            0.0,
+            0.0,
+            0.0,
+            command,
+            now,
+            wanted,
+            0.0,
+            0.0,
+            NO_GAS,
+            NO_ENERGY,
+            NO_FOOT,
+            NO_STRIDE,
+        )
+        for number, (speed, command, now, wanted) in enumerate(zip(*series, value, reference, strict=True))
+    ]
+    state, worst_end, last = start_settled(course, samples[0]), 0, len(samples) - 1
+    for before, sample in enumerate(samples[1:]):
+        if is_cut:
+            later = deciding_sample(course, sample)
+            course = advance_part(course, sample, later, reference[min(int(later), last)])
+        worst, state = state.worst, update_settled(state, course, sample)
+        worst_end = worst_end if state.worst is worst else before
+    return state, worst_end
 
 
 def _single(part: SettledPart) -> SettledPart:
@@ -251,88 +267,6 @@ def _start_up(scenario: Scenario, duration: float) -> float:
     single = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
     period = None if profile.period is None else profile.period(profile_parameters(single))
     return 0.0 if period is None else start_up_of(period, duration, profile.is_wave)
-
-
-class ReferencePart(NamedTuple):
-    """Stretch or move of a reference: the sample after which it begins, its last one, and the first that is judged."""
-
-    first: int
-    last: int
-    judged: int
-    rests: bool
-
-
-def reference_parts(reference: Floats, course: ReferenceSummary) -> list[ReferencePart]:
-    """Stretches and moves of a reference, as ``signals.meter.advance_part`` finds them sample by sample."""
-    end, change, parts, start = reference.size - 1, np.diff(reference), list[ReferencePart](), 0
-    begins = np.flatnonzero(np.concatenate([[True], np.abs(np.diff(change)) > course.tolerance]))
-    ends = np.append(begins[1:], end)
-    is_slow = np.abs(change[begins]) <= SLOW_RATE * course.largest * course.interval
-
-    def is_on_line(index: Any, later: Any) -> Any:
-        ahead = reference[np.minimum(later, end)] - reference[index] - change[index - 1] * (later - index)
-        return (later <= end) & (np.abs(ahead) <= course.tolerance * (later - index))
-
-    is_stretch = is_slow & is_on_line(begins + 1, begins + int(shortest_rest(course)))
-    for begin, last in zip(begins[is_stretch].tolist(), ends[is_stretch].tolist(), strict=True):
-        if begin > start:
-            parts.append(ReferencePart(start, begin, start + (start > 0), rests=False))
-        within = np.arange(begin + 1, last + 1)
-        waits = is_on_line(within, 2 * within - begin + 1)
-        waits[0] = True
-        parts.append(ReferencePart(begin, last, min(int(within[np.flatnonzero(waits)[-1]]) + 1, last), rests=True))
-        start = last
-    if start < end:
-        parts.append(ReferencePart(start, end, start + (start > 0), rests=False))
-    return parts
-
-
-def _first_met(error: Floats, course: ReferenceSummary) -> float:
-    """Number of the first sample with a value near its reference, in time for a repeated one; inf without any."""
-    met = np.abs(error[: math.ceil(course.start_up) or None]) <= LARGEST_SHARE * course.largest
-    return float(np.argmax(met)) if met.any() else math.inf
-
-
-def _allowed_lag(course: ReferenceSummary, recording: Recording) -> Floats:
-    """Error allowed at each sample beside that at rest [SI] (samples,), by the function of the settled meter."""
-    reference, share = reference_of(recording), course.interval / (LAG_TIME + course.interval)
-    late = np.array(list(accumulate(reference.tolist(), lambda late, now: late + (now - late) * share)))
-    change = np.diff(reference, prepend=reference[0])
-    lag = over_samples(allowed_lag, course, reference - late, change, recording["angular_velocity"])
-    return np.broadcast_to(np.asarray(lag), reference.shape)
-
-
-def _sums_of(
-    part: ReferencePart, course: ReferenceSummary, recording: Recording, lag: Floats
-) -> tuple[PartSums, slice, tuple[int, int]]:
-    """Sums over a part of a recorded reference, its judged samples, and its first and last sample."""
-    reference, value = followed(recording)
-    error, judged, half = value - reference, part.judged, course.samples - 1.0
-    if part.first == 0 and not part.rests:
-        first_met = _first_met(error, course)
-        met = int(first_met) if 2.0 * first_met < half else 0
-        judged = math.ceil(course.start_up * (2.0 if first_met < math.inf else 1.0)) or met
-        judged = next((each for each in (judged, met) if each <= part.last), 0)
-    samples = slice(judged, part.last + 1)
-    way, error, lag = reference[samples] - value[0], error[samples], lag[samples]
-    sums = PartSums(
-        start=float(part.first),
-        rests=float(part.rests),
-        squares=float(np.sum(error**2)),
-        total=float(np.sum(error)),
-        taken=float(error.size),
-        reference_squares=float(np.sum(way**2)),
-        reference_total=float(np.sum(way)),
-        lag_squares=float(np.sum(lag**2)),
-        lag_total=float(np.sum(lag)),
-        swing=Swing(0.0, 1.0 + reversals(error, OSCILLATION_THRESHOLD * course.largest), 0.0),
-        lowest_error=float(error.min()),
-        highest_error=float(error.max()),
-        first=float(reference[part.first]),
-        last=float(reference[part.last]),
-        path=float(np.sum(np.abs(np.diff(reference[part.first : part.last + 1])))),
-    )
-    return sums, samples, (part.first, part.last)
 
 
 def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: float) -> tuple[SettledPart, SettledPart]:
