@@ -19,7 +19,7 @@ from ppafo.engine.compilers import Compiler, offer
 from ppafo.version import __version__ as __version__
 
 _HOMES = {
-    "ppafo.analyses.compare.question": ("compare",),
+    "ppafo.analyses.compare": ("compare",),
     "ppafo.analyses.design.question": ("design",),
     "ppafo.analyses.find": ("find",),
     "ppafo.analyses.identify": ("Identification", "identify"),

@@ -1,6 +1,6 @@
 # Written by scripts/public_api.py
 
-from ppafo.analyses.compare.question import compare as compare
+from ppafo.analyses.compare import compare as compare
 from ppafo.analyses.design.problem import load_design as load_design
 from ppafo.analyses.design.question import design as design
 from ppafo.analyses.design.search import Sizing as Sizing

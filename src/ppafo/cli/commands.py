@@ -67,7 +67,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
             first_line="Run a study: many runs, one row each, resumable.",
         ),
         "compare": _of_scenario(
-            f"{_ANALYSES}.compare.question:compare", "Compare configurations, also over an uncertain device."
+            f"{_ANALYSES}.compare:compare", "Compare configurations, also over an uncertain device."
         ),
         "sensitivity": Command(
             f"{_ANALYSES}.sensitivity.question:sensitivity",

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import ppafo
-from ppafo.analyses.compare.question import compare
+from ppafo.analyses.compare import compare
 from ppafo.analyses.walk.question import walk_with_and_without
 from ppafo.errors import ArgumentError
 from ppafo.report.kind import Kind

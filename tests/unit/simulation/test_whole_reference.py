@@ -150,12 +150,12 @@ def test_a_walk_with_on_off_valves_is_judged_by_what_it_gives_in_push_off() -> N
 def test_a_comparison_says_in_how_many_draws_each_configuration_follows() -> None:
     level = ["reference.level=4.9 N m", "reference.ramp_time=2 s"]
     finding = ppafo.compare(study="torque-task-uncertainty", draws=32, overrides=level)
-    (task,) = finding.found.tasks
-    followed_in = {case.configuration: case.following for case in task.cases}
+    (cases,) = finding.found.tasks.values()
+    followed_in = {case.configuration: case.following for case in cases}
     # The nominal device is one draw of many: its pair of valves oscillates, and follows in some of them.
-    assert task.case("solenoid").word == "oscillates"
+    assert next(case.verdict for case in cases if case.configuration == "solenoid") == "oscillates"
     assert 0 < followed_in["solenoid"] < followed_in["proportional"] < 32
-    assert f"{task.cases[0].following} of 32" in str(finding)
+    assert f"{cases[0].following} of 32" in str(finding)
 
 
 def test_an_angle_that_is_stuck_on_its_way_out_and_back_does_not_follow() -> None:

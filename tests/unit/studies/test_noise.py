@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.compare.question import compare
+from ppafo.analyses.compare import compare
 from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.studies.draws import uncertainty_of
 from ppafo.studies.intervals import noise_interval
@@ -38,12 +38,12 @@ def changed(**changes: Any) -> dict[str, Any]:
 def test_scenarios_that_differ_in_nothing_but_their_seed_are_equal_in_every_draw(with_study: bool) -> None:
     one, other = (ppafo.load_scenario("torque-task-proportional", [*NOISY, f"sensors.seed={seed}"]) for seed in (1, 9))
     found = compare({"one": one, "other": other}, study=changed() if with_study else None, draws=64)
-    (task,) = found.found.tasks
-    error = next(item for item in task.pairs["other"] if item.metric == "rms_error")
+    (cases,) = found.found.tasks.values()
+    error = cases[1].pairs["rms_error"]
     assert error.equal == 1.0
     assert error.better is not None
     assert error.better.value == 0.0
-    rows = task.cases[0].rows
+    rows = cases[0].rows
     assert rows is not None
     assert np.unique(rows["rms_error"]).size == 64, "every draw has its own noise"
     drawn = "1 uncertain value and of the sensor noise" if with_study else "64 draws of the sensor noise"

@@ -73,11 +73,11 @@ def test_it_is_compared_over_an_uncertain_device_with_progress_and_overrides() -
     # A slow machine reports between the blocks too.
     assert done == sorted(done)
     assert {32, 64, 96, 128} <= set(done)
-    (task,) = found.found.tasks
-    (better,) = [item.better for item in task.pairs["stronger"] if item.metric == "rms_error"]
+    (cases,) = found.found.tasks.values()
+    better = cases[1].pairs["rms_error"].better
     assert better is not None
     assert better.value == 1.0
-    assert {case.scenario.reference.level for case in task.cases} == {2.0}
+    assert {case.scenario.reference.level for case in cases} == {2.0}
     with pytest.raises(StudyError, match=r"gain=1': scenario '.*' has a Python controller"):
         ppafo.compare(pair, overrides=["controller.proportional_gain=1"])
 

@@ -1,0 +1,790 @@
+"""Comparison of configurations: nominal runs, and runs over the same draws of uncertain values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ppafo.arguments import Confidence, MaximumFailed, Name, Overrides, Seed, Tasks, Threads, Whole, Word, checked
+from ppafo.errors import StudyError
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.progress import Report
+from ppafo.units.shown import shown_in
+from ppafo.wording import argument_text, count_of, first_twice, known_names, said_of_configuration, without_exponent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from ppafo.metrics import Metric
+    from ppafo.report.finding import Column, Finding, Section
+    from ppafo.report.kind import ConfidenceInterval
+    from ppafo.report.panels import Panel
+    from ppafo.simulation.scenario import Scenario
+    from ppafo.simulation.simulate import Result, Status
+    from ppafo.studies.distributions import Floats
+    from ppafo.studies.draws import Uncertainty
+    from ppafo.studies.study import Study
+    from ppafo.study.runs import Rows
+
+Configured = Annotated[
+    "Mapping[str, Scenario | str | Path] | Sequence[Scenario | str | Path]", Word("SCENARIO", is_repeated=True)
+]
+StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
+AS_WRITTEN = "as written"
+"""Task name of scenarios that run as written, without overrides of a task."""
+DEFAULT_DRAWS = 4096
+"""Default number of draws of the uncertain values."""
+_SAME = 1.0e-9
+"""Relative difference up to which two values count as equal."""
+_GAS = "gas_supplied"
+_COMPARED = {
+    _GAS: -1,
+    "mechanical_work": 0,
+    "gas_per_work": -1,
+    "switchings": -1,
+    "peak_torque": 0,
+    "command_reversals": 0,
+    "gas": -1,
+    "positive_push_off_work": 1,
+    "net_push_off_work": 1,
+    "push_off_error": -1,
+    "torque_error": -1,
+    "toe_clearance": 1,
+}
+"""Metrics that are compared beside the errors: -1 if smaller is better, 1 if larger is better, 0 if neither."""
+_OUTER_QUANTILES = (0.05, 0.95)
+"""Quantiles over the draws that tables show next to the median."""
+_READING = (
+    "The intervals of the mean difference and of the probability show how precisely the draws estimate them; they "
+    "shrink with more draws. The change from 5 to 95 % of the draws shows the effect of the uncertain values; it "
+    "does not shrink."
+)
+_NOISE = (
+    "sensors are noisy: every draw has its own noise, the same in all configurations; the nominal change is "
+    "one realisation"
+)
+_PARETO = (
+    "Marks: the nominal device; dots: draws. The line joins the configurations that no other configuration beats in "
+    "both error and gas."
+)
+_MARKS = "osD^vP"
+_MAXIMUM_DOTS = 1500
+_BINS = 40
+_TICKS_OF_CHANGE = 4
+"""Largest number of tick intervals on the axis of the change, so that labels such as -98.85 do not touch."""
+_SHOWN_PERCENTILES = (0.5, 99.5)
+"""Percentiles between which changes are plotted; a few distant ones would squeeze all others into one bar."""
+
+
+@dataclass(frozen=True, slots=True)
+class PairedMetric:
+    """Paired statistics of a metric of a configuration against the baseline, over the pairs in which both have a value.
+
+    - ``pairs``: number of pairs
+    - ``difference``: mean of configuration minus baseline [SI], with confidence interval
+    - ``change``: median over the draws of this difference divided by the baseline value, nan if the baseline is 0
+    - ``change_low``, ``change_high``: 5 and 95 % quantile of the same ratio; more draws do not narrow this range
+    - ``better``: probability that the configuration is better in a draw; None for a metric without preferred direction
+    - ``equal``: fraction of draws in which both values are equal
+    - ``effective_size``: effective sample size of the mean difference
+    - ``noise``: fraction of the variance of the difference that is due to sensor noise; None without noise
+    """
+
+    pairs: int
+    difference: ConfidenceInterval
+    change: float
+    change_low: float
+    change_high: float
+    better: ConfidenceInterval | None
+    equal: float
+    effective_size: float
+    noise: ConfidenceInterval | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ComparedCase:
+    """Result of a configuration on a task: nominal run, and runs over the draws.
+
+    - ``verdict``: end of the nominal run in a word; ``sentence``: its tracking verdict, with a tried remedy
+    - ``follows``: True if the nominal run completes and follows its reference, or misses it only as announced
+    - ``failed``, ``reason``: number of draws whose run failed, and reason of the first failure
+    - ``following``: number of draws whose run follows its reference; None without a verdict on any
+    - ``is_on_front``: True if the case follows and no other that follows beats it in both error and gas
+    - ``pairs``: statistics against the baseline by metric, ``best``: probability of being the best; empty without draws
+    - ``rows``, ``renoised``: runs over the draws, and the first of them repeated with other sensor noise; None without
+    """
+
+    configuration: str
+    status: Status
+    verdict: str
+    follows: bool
+    sentence: str
+    metrics: Mapping[str, Metric]
+    failed: int
+    following: int | None
+    is_on_front: bool
+    pairs: dict[str, PairedMetric]
+    best: dict[str, ConfidenceInterval]
+    reason: str = field(compare=False)
+    scenario: Scenario = field(compare=False, repr=False)
+    rows: Rows | None = field(compare=False, repr=False)
+    renoised: Rows | None = field(compare=False, repr=False)
+
+    def value(self, metric: str) -> float:
+        """Return a metric [SI] of the nominal run; nan if the run does not have the metric."""
+        return self.metrics[metric].value if metric in self.metrics else math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonResult:
+    """Comparison of configurations with a ``baseline``, by task; numbers in SI.
+
+    - ``draws``: number of draws, 0 without uncertainty
+    - ``varied``: uncertain paths except sensor noise
+    - ``confidence``: confidence level of the intervals
+    - ``error``: metric of the error of the controlled quantity; empty if the configurations have none in common
+    - ``metrics``: compared metrics, -1 if smaller is better, 1 if larger is better, 0 if neither
+    - ``task_overrides``: overrides of each task
+    """
+
+    units: str
+    configurations: list[str]
+    baseline: str
+    draws: int
+    seed: int
+    remarks: list[str]
+    varied: list[str]
+    has_noise: bool
+    confidence: float
+    error: str
+    metrics: dict[str, int]
+    task_overrides: dict[str, list[str]]
+    tasks: dict[str, list[ComparedCase]]
+
+
+@checked
+def compare(
+    configurations: Configured | None = None,
+    *,
+    study: StudyLike | None = None,
+    tasks: Tasks = (),
+    overrides: Overrides = (),
+    baseline: Name | None = None,
+    draws: Whole | None = None,
+    seed: Seed | None = None,
+    confidence: Confidence = 0.95,
+    maximum_failed: MaximumFailed = 0.01,
+    threads: Threads | None = None,
+    check: bool = False,
+    plugins: Plugins = (),
+    progress: Report | None = None,
+) -> Finding[ComparisonResult]:
+    """Compare configurations, also over an uncertain device.
+
+    All configurations get the same random numbers. ``configurations`` are scenarios by name (or a list of names, files
+    or Scenario objects). Draws are randomised Sobol replicates whatever the study's sampling method. With sensor noise,
+    each draw has its own noise stream, the same in all configurations; without a study, only the noise is drawn. A draw
+    that fails in a configuration is left out of its pairs.
+
+    Arguments:
+        configurations: names of scenarios or .toml files; default: the configurations of the study
+        study: study file that gives the distributions and, without others, the configurations
+        tasks: a task for all configurations, for example 'slow:reference.ramp_time=2 s'; default: as the scenarios are
+            written
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; of one configuration: 'NAME:PATH=VALUE'; may be
+            repeated
+        baseline: configuration that all others are compared with; default: the first
+        draws: draws of the uncertain values of the study, or of the noise, at least 32; default 4096, whatever the
+            runs of the study
+        seed: random seed; default: the file's
+        confidence: confidence of all intervals; default 95%
+        maximum_failed: fraction of the runs that may fail before the study is refused; default 1%
+        threads: number of threads; default: all cores
+        check: end with exit code 1 where a nominal run does not follow its reference
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is a ComparisonResult: the cases of each task with their metrics, and the
+        differences from the baseline
+
+    Raises:
+        StudyError: a study or a configuration that cannot be used, and more than ``maximum_failed`` of its runs fail
+
+    >>> import ppafo
+    >>> compared = ppafo.compare(["torque-task-proportional", "torque-task-solenoid"]).found
+    >>> (cases,) = compared.tasks.values()
+    >>> [(case.configuration, f"{case.metrics['rms_error'].value:.3f} N m") for case in cases]
+    [('torque-task-proportional', '0.869 N m'), ('torque-task-solenoid', '1.026 N m')]
+    """
+    name_plugins(plugins)
+    from ppafo.arguments.conversion import taken_tasks
+    from ppafo.metrics import METRICS
+    from ppafo.metrics.tracking import ONE_INSTANT, TRACKING
+    from ppafo.simulation.ensemble.running import lacking
+    from ppafo.simulation.numbers import NOISE_SEED
+    from ppafo.simulation.simulate import simulate_many
+    from ppafo.simulation.tracking.pair_step import unlimited_switching
+    from ppafo.studies.declaration import DEFAULT_SEED
+    from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, study_of, uncertainty_of
+    from ppafo.studies.limits import CONFIDENCE, check_fraction
+    from ppafo.studies.study import changes_of, choose_configurations, configurations_with
+
+    count = DEFAULT_DRAWS if draws is None else draws
+    if not FEWEST_DRAWS <= count <= MAXIMUM_DRAWS:
+        raise StudyError(f"draws = {count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
+    check_fraction(confidence, *CONFIDENCE)
+    check_fraction(maximum_failed, "maximum_failed")
+    loaded = study_of(study) if study is not None else None
+    chosen = choose_configurations(configurations or None, loaded, overrides)
+    names = [configuration.name for configuration in chosen]
+    if baseline is not None and baseline not in names:
+        raise StudyError(f"baseline: there is no configuration '{baseline}'{known_names(baseline, names)}")
+    named_tasks = list(taken_tasks(tasks)) or [(AS_WRITTEN, ())]
+    if (repeated := first_twice([name for name, _ in named_tasks])) is not None:
+        raise StudyError(f"two tasks are named '{repeated}'; give every task a different name")
+    scenarios = {
+        (task, configuration.name): configuration.scenario
+        for task, of_task in named_tasks
+        for configuration in configurations_with(chosen, of_task)
+    }
+    # The error of the controlled quantity first (of a walk the last), and what the study asks for.
+    errors = [*(name for name in TRACKING if name.startswith("rms_") and name.endswith("_error")), "torque_error"]
+    asked = () if loaded is None else loaded.outputs.metrics
+    better = {name: -1 for name in TRACKING if name not in ONE_INSTANT} | _COMPARED
+    # Without a reference there is no error.
+    lacks = {
+        name: any(lacking(scenario, METRICS[name]) for scenario in scenarios.values())
+        for name in dict.fromkeys((*errors, *asked, *better))
+    }
+    metrics = {name: better.get(name, 0) for name, is_lacking in lacks.items() if not is_lacking}
+    distributions = Uncertainty(()) if loaded is None or not loaded.paths else uncertainty_of(loaded)
+    uncertainty = distributions.with_noise_of(scenarios.values())
+    if not uncertainty.drawn and draws is not None:
+        raise StudyError(
+            f"draws = {count}: nothing in this comparison is random; omit draws, or give a study or sensors with noise"
+        )
+    if loaded is not None:
+        _check_different_values(loaded, scenarios)
+    if seed is None:
+        seed = DEFAULT_SEED if loaded is None else loaded.sample.seed
+    drawn = _drawn_runs(scenarios, [*metrics], loaded, uncertainty, (count, seed, maximum_failed), threads, progress)
+    # Nominal runs use the seed of each scenario: with noise, a nominal run is one realisation of the noise.
+    nominal = dict(zip(scenarios, simulate_many(list(scenarios.values()), threads), strict=True))
+    error = next((name for name in metrics if name in errors), "")
+    found = ComparisonResult(
+        units="SI: N m, kg, J; fractions from 0 to 1",
+        configurations=names,
+        baseline=baseline or names[0],
+        draws=count if drawn else 0,
+        seed=seed if drawn else 0,
+        remarks=[],
+        varied=[path for path in uncertainty.paths if path != NOISE_SEED],
+        has_noise=bool(drawn) and uncertainty.has_noise,
+        confidence=confidence,
+        error=error,
+        metrics=metrics,
+        task_overrides={task: list(of_task) for task, of_task in named_tasks},
+        tasks={},
+    )
+    for task, _ in named_tasks:
+        cases = [_case(name, nominal[task, name], metrics, **drawn.get((task, name), {})) for name in names]
+        found.tasks[task] = _judged_together(found, cases)
+    switching = ((task, name, unlimited_switching(result)) for (task, name), result in nominal.items())
+    remarks = [
+        *(f"outputs: '{name}' is left out: not every configuration has this metric" for name in asked if lacks[name]),
+        *(f"{name}, {task}: {text}" for task, name, text in switching if text),
+        *_remarks(found),
+    ]
+    if loaded is not None and loaded.drawn and draws is None and loaded.sample.runs != count:
+        remarks.append(
+            f"study '{loaded.name}': sample.runs = {loaded.sample.runs} applies to 'ppafo sweep' only; 'compare' used "
+            f"{count:,} draws, which {argument_text('draws')} changes"
+        )
+    device = next(iter(scenarios.values()))
+    with shown_in(device.device.shown if loaded is None else loaded.shown_for(device)):
+        changes = changes_of(chosen, None if configurations else loaded, overrides)
+        return _finding(replace(found, remarks=remarks), check, changes)
+
+
+def _check_different_values(study: Study, scenarios: Mapping[tuple[str, str], Scenario]) -> None:
+    """Raise StudyError for a path that the study draws once for scenarios whose declared values differ."""
+    from ppafo.simulation.numbers import NOISE_SEED
+    from ppafo.studies.varying import value_at, varied_path
+
+    for path in study.paths:
+        # Orifices of different valves are meant to differ: what the study draws replaces the value of each.
+        if path.startswith("valve.") or path == NOISE_SEED:
+            continue
+        declared = [value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)]
+        values = [value for value in declared if value is not None]
+        lowest, highest = min(values, default=0.0), max(values, default=0.0)
+        if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
+            varied = varied_path(path, next(iter(scenarios.values())))
+            raise StudyError(
+                f"the study draws '{path}' for every configuration, so the values {varied.quote(lowest)} and "
+                f"{varied.quote(highest)} of the configurations would be ignored; use a study that does not draw "
+                f"'{path}'"
+            )
+
+
+def _drawn_runs(
+    scenarios: Mapping[tuple[str, str], Scenario],
+    metrics: Sequence[str],
+    study: Study | None,
+    uncertainty: Uncertainty,
+    draws: tuple[int, int, float],
+    threads: int | None,
+    progress: Report | None,
+) -> dict[tuple[str, str], dict[str, Any]]:
+    """Return the runs of every scenario over the same draws; StudyError if too many of them fail.
+
+    ``draws`` are their number, the seed, and the fraction that may fail.
+    """
+    from ppafo.simulation.numbers import NOISE_SEED
+    from ppafo.studies.sampling import with_new_noise
+    from ppafo.study.runs import RunCounter, excess, scenario_runs, unvaried, with_companions
+
+    if not uncertainty.drawn:
+        return {}
+    count, seed, maximum_failed = draws
+    columns, drawn = uncertainty.replicated_columns(count, seed), {}
+    renoised_columns = with_new_noise(columns) if uncertainty.has_noise else {}
+    counter = RunCounter((count + len(renoised_columns.get(NOISE_SEED, ()))) * len(scenarios), progress)
+    for (task, name), scenario in scenarios.items():
+        runs = scenario_runs(scenario, with_companions(metrics, scenario), counter, uncertainty.gauge, threads)
+        # The noise is in all configurations, even if the study varies other paths in some of them only.
+        paths = [path for path in columns if study is None or path == NOISE_SEED or study.varies(path, name)]
+        varied = {path: columns[path] for path in paths} or unvaried(scenario, count)
+        rows = runs.run(varied)
+        runs.check(rows, maximum_failed, f"configuration '{name}', task '{task}'")
+        # Read before the runs with other noise, which may overwrite it.
+        failure = runs.reason
+        renoised = runs.run({path: renoised_columns[path] for path in paths}) if renoised_columns else None
+        verdicts = excess(rows, scenario, varied, uncertainty.gauge).follows
+        drawn[task, name] = {"rows": rows, "renoised": renoised, "reason": failure, "verdicts": verdicts}
+    return drawn
+
+
+def _case(
+    name: str,
+    nominal: Result,
+    metrics: Mapping[str, int],
+    rows: Rows | None = None,
+    renoised: Rows | None = None,
+    reason: str = "",
+    verdicts: Floats | None = None,
+) -> ComparedCase:
+    """Return a configuration on a task by itself; the remedy of a run that does not follow its reference is tried."""
+    import numpy as np
+
+    from ppafo.remedy_trials import tried
+    from ppafo.study.runs import FAILED
+
+    status = nominal.status
+    with said_of_configuration(name):
+        tracking = tried(nominal.scenario, nominal.tracking)
+        sentence = tracking.sentence
+    follows = status.is_completed and not tracking.is_useless
+    word: str = status.kind
+    if tracking.fails and status.is_completed:
+        word = "beyond reach" if follows else tracking.kind
+    is_known = verdicts is not None and np.isfinite(verdicts).any()
+    return ComparedCase(
+        configuration=name,
+        status=status,
+        verdict=word,
+        follows=follows,
+        sentence=sentence,
+        metrics={metric: value for metric, value in nominal.metrics.items() if metric in metrics},
+        failed=0 if rows is None else int(rows[FAILED].sum()),
+        following=int(np.count_nonzero(verdicts == 1.0)) if is_known else None,
+        is_on_front=False,
+        pairs={},
+        best={},
+        reason=reason,
+        scenario=nominal.scenario,
+        rows=rows,
+        renoised=renoised,
+    )
+
+
+def _judged_together(found: ComparisonResult, cases: list[ComparedCase]) -> list[ComparedCase]:
+    """Return the cases of a task with front, paired statistics and probabilities of being the best."""
+    import numpy as np
+
+    base = next(case for case in cases if case.configuration == found.baseline)
+    # A case that does not follow its reference is not among the best.
+    following = [case for case in cases if case.follows]
+    points = np.array([[case.value(name) for name in (found.error, _GAS)] for case in following]).reshape(-1, 2)
+    front = dict(zip([case.configuration for case in following], pareto_front(points).tolist(), strict=True))
+    best: dict[str, dict[str, ConfidenceInterval]] = {case.configuration: {} for case in cases}
+    drawn = [case.rows for case in following if case.rows is not None]
+    for name, better in found.metrics.items() if drawn else ():
+        # All at once: no pair says which of three is the best. Empty where no draw has a value of all.
+        shares = best_probabilities([rows[name] for rows in drawn], better, found.confidence) if better else []
+        for case, share in zip(following, shares, strict=False):
+            best[case.configuration][name] = share
+    judged = []
+    for case in cases:
+        pairs = {}
+        for name, better in found.metrics.items() if case is not base else ():
+            if base.rows is None or case.rows is None:
+                continue
+            noise = None
+            if base.renoised is not None and case.renoised is not None:
+                noise = base.renoised[name], case.renoised[name]
+            # Without a pair of values a metric has no statistics.
+            if pair := compare_pairs(base.rows[name], case.rows[name], better, found.confidence, noise):
+                pairs[name] = pair
+        is_on_front = front.get(case.configuration, False)
+        judged.append(replace(case, is_on_front=is_on_front, pairs=pairs, best=best[case.configuration]))
+    return judged
+
+
+def pareto_front(points: Floats) -> NDArray[Any]:
+    """Return a mask of the points (points, goals) that no other point dominates; every goal is minimised."""
+    import numpy as np
+
+    front = np.zeros(len(points), dtype=np.bool_)
+    for row, point in enumerate(points):
+        if np.all(np.isfinite(point)):
+            is_dominating = np.all(points <= point, axis=1) & np.any(points < point, axis=1)
+            front[row] = not bool(np.any(is_dominating))
+    return front
+
+
+def compare_pairs(
+    baseline: Floats,
+    other: Floats,
+    better: int,
+    confidence: float,
+    other_noise: tuple[Floats, Floats] | None = None,
+) -> PairedMetric | None:
+    """Return the paired statistics of values (draws,) [SI], nan for a missing value; None without any pair.
+
+    Draws are assigned to the replicates in turn. ``other_noise`` has the values of both configurations for the first
+    draws, repeated with other noise. ``better`` is -1 if a smaller value is better, 1 if a larger value is better, 0 if
+    neither. A draw with equal values counts for neither configuration.
+    """
+    import numpy as np
+
+    from ppafo.studies.draws import REPLICATES
+    from ppafo.studies.intervals import effective_sample_size, noise_interval, replicates_interval, share_interval
+
+    both = np.isfinite(baseline) & np.isfinite(other)
+    baseline_values, other_values = baseline[both], other[both]
+    if baseline_values.size == 0:
+        return None
+    # Relative to the size of the baseline, so that the sign is the difference's; a baseline of 0 has no fractions.
+    change = (other_values - baseline_values)[baseline_values != 0.0] / np.abs(baseline_values[baseline_values != 0.0])
+    low, middle, high = (
+        np.quantile(change, (_OUTER_QUANTILES[0], 0.5, _OUTER_QUANTILES[1])) if change.size else (np.nan,) * 3
+    )
+    difference = other - baseline
+    noise = None
+    if other_noise is not None:
+        noise = noise_interval(difference, other_noise[1] - other_noise[0], confidence)
+    # A tie is no win on either side: of equal configurations neither is better in any draw.
+    wins = np.where(both, better * (other - baseline) > 0.0, np.nan)
+    return PairedMetric(
+        pairs=baseline_values.size,
+        difference=replicates_interval(difference, REPLICATES, confidence),
+        change=float(middle),
+        change_low=float(low),
+        change_high=float(high),
+        better=share_interval(wins, REPLICATES, confidence) if better else None,
+        equal=float(np.mean(baseline_values == other_values)),
+        effective_size=effective_sample_size(other_values - baseline_values),
+        noise=noise,
+    )
+
+
+def best_probabilities(values: Sequence[Floats], better: int, confidence: float) -> list[ConfidenceInterval]:
+    """Return the probability of each configuration to be the best in a draw; a tie counts for all of the best."""
+    import numpy as np
+
+    from ppafo.studies.draws import REPLICATES
+    from ppafo.studies.intervals import share_interval
+
+    table = better * np.stack(values)
+    known = np.all(np.isfinite(table), axis=0)
+    if not known.any():
+        return []
+    # Draws in which one has no value say nothing about which is the best.
+    is_best = np.where(known, table == np.max(table, axis=0), np.nan)
+    return [share_interval(row, REPLICATES, confidence) for row in is_best]
+
+
+def _remarks(found: ComparisonResult) -> list[str]:
+    """Return remarks on differing tasks, failed runs, means that depend on few draws, and noise."""
+    from ppafo.simulation.gains import remark_on_following_gains
+    from ppafo.simulation.tracking.pair_step import coarse_pair
+    from ppafo.studies.intervals import is_carried
+
+    remarks, failed, uncertain = [], [], []
+    for task, cases in found.tasks.items():
+        followed = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in cases}
+        # Compared by reference and duration and not by file: two configurations may name one task differently.
+        others = [name for name, reference in followed.items() if reference != followed[found.baseline]]
+        if others:
+            follow, run = ("follows", "runs") if len(others) == 1 else ("follow", "run")
+            remarks.append(
+                f"task '{task}': {', '.join(others)} {follow} a different reference, or {run} for a different "
+                f"time, than {found.baseline}: the differences come partly from the task"
+            )
+        for case in cases:
+            where = f"{case.configuration}, {task}"
+            with said_of_configuration(case.configuration):
+                remarks += [coarse_pair(case.scenario), remark_on_following_gains(case.scenario, found.varied)]
+            if kept := case.scenario.origin.replaced:
+                remarks.append(f"{where}: {kept}")
+            if not case.follows:
+                remarks.append(f"{where}: {case.sentence}; not counted among the best")
+            if not case.status.is_completed:
+                failed.append(f"{where}: {case.status.message}")
+            if case.failed:
+                failed.append(
+                    f"{where}: {case.failed:,} of {found.draws:,} draws failed and are left out of every pair; the "
+                    f"first: {case.reason}"
+                )
+            uncertain += [
+                f"{case.configuration}, task '{task}': the mean difference of {metric} has an effective sample size "
+                f"of {pair.effective_size:.3g} of {pair.pairs:,} draws: do not trust its interval; the probability of "
+                "being better is not affected"
+                for metric, pair in case.pairs.items()
+                if not is_carried(pair.effective_size, pair.pairs)
+            ]
+    # Several tasks may have the same remark.
+    return [*dict.fromkeys(filter(None, remarks)), *failed, *uncertain, *([_NOISE] if found.has_noise else [])]
+
+
+def _finding(found: ComparisonResult, check: bool, overrides: Sequence[str]) -> Finding[ComparisonResult]:
+    """Return a comparison as a finding with sentences, tables and panels; ``check`` asks that all nominal runs follow.
+
+    Panels are made by functions with a name, since a lambda in a report cannot be pickled.
+    """
+    from ppafo.report.finding import Finding, Section
+
+    names, cases = found.configurations, [case for of_task in found.tasks.values() for case in of_task]
+    lead = f"{len(names)} configurations on {count_of(len(found.tasks), 'task')}, baseline {found.baseline}; "
+    if not found.draws:
+        lead += "the nominal device, without uncertainty"
+    elif not found.varied:
+        lead += f"the nominal device, over {found.draws:,} draws of the sensor noise"
+    else:
+        beside = " and of the sensor noise" if found.has_noise else ""
+        lead += f"{found.draws:,} draws of {count_of(len(found.varied), 'uncertain value')}{beside}, the same for all; "
+        lead += f"each interval with {100.0 * found.confidence:g} % confidence"
+    pareto = Section(
+        "Error against gas", panels=partial(_front_panels, found), name="pareto", caption=_PARETO, is_detail=True
+    )
+    change = Section(
+        "Spread of the change",
+        panels=partial(_change_panels, found),
+        name="change",
+        caption="Change against the baseline in each draw; the dashed line is the nominal device.",
+        across=2,
+        size=(3.0, 2.5),
+        is_detail=True,
+    )
+    return Finding(
+        name="compare",
+        kicker="Comparison",
+        title=" and ".join(names) if len(names) == 2 else f"{len(names)} configurations against {found.baseline}",
+        said=(lead,),
+        parts=(
+            *(part for task in found.tasks for part in _tables(found, task)),
+            *([pareto] if found.error else []),
+            *([change] if found.error and found.draws else []),
+            Section(remarks=found.remarks),
+            Section("How to read it", said=[_READING], is_detail=True) if found.draws else Section(),
+        ),
+        found=found,
+        passed=all(case.status.is_completed and (case.follows or not check) for case in cases),
+        overrides=overrides,
+    )
+
+
+def _tables(found: ComparisonResult, task: str) -> list[Section]:
+    """Return the tables of a task: metrics, changes against the baseline, probability of being the best."""
+    from ppafo.report.finding import Column, Section
+    from ppafo.report.kind import Kind, of_metric
+    from ppafo.simulation.gains import gains_of
+
+    cases, where = found.tasks[task], "" if len(found.tasks) == 1 else f", {task}"
+    # A column without any number, such as the error of a hold that no task has, says nothing.
+    held = (name for name in found.metrics if not all(math.isnan(case.value(name)) for case in cases))
+    kinds = {name: of_metric(name) for name in held}
+    following, best = [case for case in cases if case.follows], list[str]()
+    for metric in (name for name in kinds if name in (found.error, _GAS)):
+        shares = [
+            f"{case.configuration} {Kind(form='.4g').interval(case.best[metric])}"
+            for case in following
+            if metric in case.best
+        ]
+        values = [case.value(metric) for case in following]
+        if shares and len(cases) > 2:
+            best.append(f"best: {metric}: {', '.join(shares)}")
+        elif not found.draws and len(values) > 1 and all(map(math.isfinite, values)):
+            least = min(values)
+            named = ", ".join(case.configuration for case in following if case.value(metric) == least)
+            best.append(f"best: {metric}: {named} ({kinds[metric].text(least)})")
+    follow = ["-" if case.following is None else f"{case.following:,} of {found.draws:,}" for case in cases]
+    laws = ((case, case.scenario.law) for case in cases)
+    gains = ((case, gains_of(case.scenario, law)) for case, law in laws if law is not None)
+    return [
+        Section(
+            f"Task: {task}",
+            [
+                Column("configuration", [case.configuration for case in cases]),
+                *(Column(kind.words, [case.value(name) for case in cases], kind) for name, kind in kinds.items()),
+                Column("status", [case.verdict for case in cases]),
+                *([Column("draws that follow", follow)] if found.draws else []),
+            ],
+            remarks=[f"{case.configuration}: {used.sentence}" for case, used in gains if used is not None],
+        ),
+        *(
+            Section(f"{case.configuration} against {found.baseline}{where}", _paired(found, cases, case))
+            for case in cases
+            if case.pairs
+        ),
+        *([Section(remarks=best)] if best else []),
+    ]
+
+
+def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: ComparedCase) -> list[Column]:
+    """Return the columns of a table with a row for each metric: change, mean difference, probability of improvement."""
+    from ppafo.report.display_units import display_difference
+    from ppafo.report.finding import columns_of
+    from ppafo.report.kind import Kind, of_metric
+    from ppafo.studies.intervals import fraction_text
+
+    base = next(each for each in cases if each.configuration == found.baseline)
+    rows = []
+    for metric, pair in case.pairs.items():
+        kind, low, high = of_metric(metric, "+.3g"), _percent(pair.change_low), _percent(pair.change_high)
+        # Nothing is a percentage of what is zero within the accuracy of a run.
+        scale = abs(display_difference(base.value(metric), kind.quantity))
+        away = display_difference(case.value(metric) - base.value(metric), kind.quantity)
+        better = "-" if pair.better is None else Kind(form=".4g").interval(pair.better)
+        row = (
+            metric,
+            kind.shown_unit if kind.quantity else "",
+            _percent(away / scale) if scale else "-",
+            f"{_percent(pair.change)} ({low} to {high})" if math.isfinite(pair.change) and scale else "-",
+            kind.change_interval(pair.difference),
+            "equal in all" if pair.better is not None and pair.equal == 1.0 else better,
+        )
+        noise = "-" if pair.noise is None else fraction_text(pair.noise)
+        rows.append((*row, noise) if found.has_noise else row)
+    titles = ("metric", "unit", "nominal change", "change over the draws: median (5 to 95 %)", "mean difference")
+    probable = ("probability of being better", *(["spread due to noise"] if found.has_noise else []))
+    return columns_of((*titles, *probable), rows)
+
+
+def _percent(fraction: float) -> str:
+    return "" if math.isnan(fraction) else f"{without_exponent(100.0 * fraction, '+.3g')} %"
+
+
+def _colours(cases: Sequence[ComparedCase]) -> dict[str, str]:
+    """Return a colour for each configuration: colours of the valves if all differ, else of the palette in order."""
+    from ppafo.report.style import COLOURS, look_of_valve
+
+    colours = [look_of_valve(case.scenario.device.valve.kind).colour for case in cases]
+    if len(set(colours)) < len(colours):
+        colours = [COLOURS[row % len(COLOURS)] for row in range(len(colours))]
+    return dict(zip((case.configuration for case in cases), colours, strict=True))
+
+
+def _front_panels(found: ComparisonResult) -> list[Panel]:
+    """Return a panel for each task of error over gas: a mark for each completed case, a dot for each draw."""
+    import numpy as np
+
+    from ppafo.report.kind import of_metric
+    from ppafo.report.panels import Mark, Panel
+    from ppafo.report.style import GREY
+
+    panels = []
+    for task, cases in found.tasks.items():
+        colours, marks, completed = _colours(cases), [], [case for case in cases if case.status.is_completed]
+        for number, case in enumerate(completed):
+            colour, marker = colours[case.configuration], _MARKS[number % len(_MARKS)]
+            if case.rows is not None:
+                dots = {"linestyle": "", "marker": ".", "alpha": 0.35, "markersize": 4, "markeredgewidth": 0}
+                gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, found.error))
+                marks.append(Mark("line", gas, error, colour=colour, style=dots))
+            style = {"linestyle": "", "marker": marker, "markersize": 8, "markeredgecolor": "white"}
+            x, y = ([case.value(name)] for name in (_GAS, found.error))
+            marks.append(Mark("line", x, y, label=case.configuration, colour=colour, style=style))
+        # From left to right, so that the front is a line and no zigzag.
+        front = sorted((case.value(_GAS), case.value(found.error)) for case in completed if case.is_on_front)
+        x_front, y_front = np.array(front).reshape(-1, 2).T
+        marks.append(Mark("line", x_front, y_front, colour=GREY, style={"linewidth": 1.0, "zorder": 1}))
+        title = f"Task: {task}" if len(found.tasks) > 1 else ""
+        panels.append(Panel(of_metric(_GAS), of_metric(found.error), marks, title, legend="inside"))
+    return panels
+
+
+def _change_panels(found: ComparisonResult) -> list[Panel]:
+    return [_change(found, task, metric) for task in found.tasks for metric in (found.error, _GAS)]
+
+
+def _change(found: ComparisonResult, task: str, metric: str) -> Panel:
+    """Return a panel with histograms of the change of a metric against the baseline; dashed: nominal device."""
+    import numpy as np
+
+    from ppafo.report.kind import Kind, of_metric
+    from ppafo.report.panels import Mark, Panel
+    from ppafo.report.style import BLACK
+
+    cases, marks, ends = found.tasks[task], [], list[float]()
+    colours = _colours(cases)
+    base = next(case for case in cases if case.configuration == found.baseline)
+    for case in cases:
+        if case is base or case.rows is None or base.rows is None:
+            continue
+        change = _relative(base.rows[metric], case.rows[metric])
+        if change.size == 0:
+            continue
+        colour, (low, high) = colours[case.configuration], np.percentile(change, _SHOWN_PERCENTILES)
+        # Fewer bins for fewer draws, so that each has some of them.
+        counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
+        marks.append(Mark("bars", edges, counts, label=case.configuration, colour=colour))
+        nominal = _relative(*(np.array([side.value(metric)]) for side in (base, case)))
+        dashed = {"linestyle": "--", "linewidth": 1.2}
+        # One dashed line of the legend stands for all.
+        said = "" if ends else "nominal device"
+        marks += [Mark("at", value, label=said, colour=colour, style=dashed) for value in nominal]
+        ends += [float(low), float(high), *nominal.tolist()]
+    is_first = metric == found.error
+    title = f"Task: {task}" if len(found.tasks) > 1 and is_first else ""
+
+    def limit_changes(axes: Axes) -> None:
+        from matplotlib.ticker import MaxNLocator
+
+        # Zero is shown where it is near: far from all changes it would squeeze them into a few pixels.
+        low, high = min(ends, default=0.0), max(ends, default=0.0)
+        span = high - low or 1.0
+        if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
+            axes.axvline(0.0, color=BLACK, linewidth=0.8)
+            low, high = min(low, 0.0), max(high, 0.0)
+        axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
+        axes.xaxis.set_major_locator(MaxNLocator(_TICKS_OF_CHANGE))
+        axes.locator_params(axis="y", integer=True)
+
+    axis, draws = Kind(f"{of_metric(metric).words}, change from {found.baseline}", "%"), Kind("Draws" * is_first)
+    return Panel(axis, draws, marks, title, legend="" if is_first else "figure", then=limit_changes if ends else None)
+
+
+def _relative(baseline: Floats, other: Floats) -> Floats:
+    import numpy as np
+
+    # In pairs: a draw that failed on one side says nothing about a change.
+    both = np.isfinite(baseline) & np.isfinite(other) & (baseline != 0.0)
+    return np.asarray(100.0 * (other[both] - baseline[both]) / np.abs(baseline[both]))
