@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from ppafo.report.panels import Panel
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import Result, Status
+    from ppafo.simulation.tracking import Tracking
     from ppafo.studies.distributions import Floats
     from ppafo.studies.draws import Uncertainty
     from ppafo.studies.study import Study
@@ -110,7 +111,7 @@ class PairedMetric:
 class ComparedCase:
     """Result of a configuration on a task: nominal run, and runs over the draws.
 
-    - ``verdict``: end of the nominal run in a word; ``sentence``: its tracking verdict, with a tried remedy
+    - ``verdict``: end of the nominal run in a word; ``tracking``: how it follows, with a tried remedy
     - ``follows``: True if the nominal run completes and follows its reference, or misses it only as announced
     - ``failed``, ``reason``: number of draws whose run failed, and reason of the first failure
     - ``following``: number of draws whose run follows its reference; None without a verdict on any
@@ -123,7 +124,7 @@ class ComparedCase:
     status: Status
     verdict: str
     follows: bool
-    sentence: str
+    tracking: Tracking
     metrics: Mapping[str, Metric]
     failed: int
     following: int | None
@@ -389,7 +390,6 @@ def _case(
     status = nominal.status
     with said_of_configuration(name):
         tracking = tried(nominal.scenario, nominal.tracking)
-        sentence = tracking.sentence
     follows = status.is_completed and not tracking.is_useless
     word: str = status.kind
     if tracking.fails and status.is_completed:
@@ -400,7 +400,7 @@ def _case(
         status=status,
         verdict=word,
         follows=follows,
-        sentence=sentence,
+        tracking=tracking,
         metrics={metric: value for metric, value in nominal.metrics.items() if metric in metrics},
         failed=0 if rows is None else int(rows[FAILED].sum()),
         following=int(np.count_nonzero(verdicts == 1.0)) if is_known else None,
@@ -542,10 +542,10 @@ def _remarks(found: ComparisonResult) -> list[str]:
             where = f"{case.configuration}, {task}"
             with said_of_configuration(case.configuration):
                 remarks += [coarse_pair(case.scenario), remark_on_following_gains(case.scenario, found.varied)]
-            if kept := case.scenario.origin.replaced:
-                remarks.append(f"{where}: {kept}")
-            if not case.follows:
-                remarks.append(f"{where}: {case.sentence}; not counted among the best")
+                if kept := case.scenario.origin.replaced:
+                    remarks.append(f"{where}: {kept}")
+                if not case.follows:
+                    remarks.append(f"{where}: {case.tracking.sentence}; not counted among the best")
             if not case.status.is_completed:
                 failed.append(f"{where}: {case.status.message}")
             if case.failed:
