@@ -27,10 +27,6 @@ from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Betw
 from ppafo.storage.files import read_bytes, text_of, write_file
 from ppafo.wording import LONGEST_SHOWN, argument_text, first_twice, nearest_name, one_line
 
-_OTHERS = (
-    (";", "semicolons", 'delimiter = "semicolon", and decimal = "comma" if numbers have decimal commas'),
-    ("\t", "tabs", 'delimiter = "tab", and decimal = "comma" if numbers have decimal commas'),
-)
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
 _ONLY_SIMULATED = "supplied_mass"
@@ -66,17 +62,10 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
     for cell in cells:
         match = _HEADER.fullmatch(cell)
         if match is None:
-            bare, shown = cell.strip(), cell if len(cell) <= 40 else f"{cell[:36]} ..."
-            others = next((f"; {one} need a column map with {key}" for mark, one, key in _OTHERS if mark in cell), "")
-            if bare in CHANNELS:
-                remedy = f"; write '{bare} [{CHANNELS[bare].unit}]'"
-            elif others or not bare:
-                remedy = others or "; does the line end with a comma?"
-            else:
-                remedy = _column_map_remedy()
+            shown = one_line(cell if len(cell) <= 40 else f"{cell[:36]} ...")
             raise DataError(
-                f"the header must name columns as 'name [unit]', separated by commas, not as '{one_line(shown)}'"
-                f"{remedy}"
+                f"the header must name columns as 'name [unit]', separated by commas, not as '{shown}'"
+                f"{_column_map_remedy()}, for another delimiter or a decimal comma too"
             )
         name, unit, word = match[1], "Pa" if match[2] == _LEVEL else match[2], match[3]
         # Time itself does nothing between its samples.
@@ -114,25 +103,18 @@ def is_of_frame(cells: Sequence[str]) -> bool:
     return _ONLY_SIMULATED in names and names <= {TIME, *CHANNELS}
 
 
-def check_clock(time: Floats, lines: Sequence[int], noun: str = "line", may_have_trials: bool = True) -> None:
+def check_clock(time: Floats, lines: Sequence[int], noun: str = "line") -> None:
     """Raise DataError unless times [s] increase; ``lines`` are the line numbers of the rows in the file.
 
-    The message names the line, or the row in units of ``noun``. If the clock restarts, the message suggests a column
-    map for several trials, provided that the format ``may_have_trials``.
+    The message names the line, or the row in units of ``noun``.
     """
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
         index = int(stalled[0]) + 1
         word = "stands still" if time[index] == time[index - 1] else "goes backwards"
-        falls = np.flatnonzero(np.diff(time) < 0.0) + 1
-        # Each trial of a file begins about where the first one does.
-        are_trials = may_have_trials and falls.size > 0 and bool((time[falls] < time[1]).all())
-        trials = (
-            f"; to read its {falls.size + 1} trials, give trial = 1, or 'all', in a column map" if are_trials else ""
-        )
         raise DataError(
             f"{noun} {lines[index]}, column '{TIME}': the clock {word}: {time[index]:.9g} s follows "
-            f"{time[index - 1]:.9g} s; time must increase from sample to sample{trials}"
+            f"{time[index - 1]:.9g} s; time must increase from sample to sample"
         )
 
 
@@ -161,12 +143,6 @@ _MARKS: dict[RecordingKind, str] = {
 
 _MARK = re.compile(r"#\s*(\w+):.*")
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-
-SPLIT_NUMBERS = (
-    "commas seem to be both delimiter and decimal mark: write the file with decimal points, or with another delimiter "
-    'and read it through a column map with decimal = "comma"'
-)
-"""Message for rows with twice as many cells as columns."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _SIMILAR = 0.8
 """Similarity [-] above which a word counts as a misspelt kind; 'measurement: run 3' in a comment stays below."""
@@ -335,8 +311,7 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
         if blank is not None:
             raise DataError(f"line {blank} is blank, and rows follow; remove the line, or add its {len(header)} values")
         if len(row) != len(header):
-            remedy = f"; {SPLIT_NUMBERS}" if len(row) == 2 * len(header) else ""
-            raise DataError(f"line {line} has {len(row)} values for {len(header)} columns{remedy}")
+            raise DataError(f"line {line} has {len(row)} values for {len(header)} columns")
         try:
             values = [float(cell) for cell in row]
         except ValueError:
@@ -347,10 +322,7 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
         if not whole.isascii() or "_" in whole or not all(map(math.isfinite, values)):
             is_number = [cell.isascii() and finite_number(cell.strip()) is not None for cell in row]
             name, cell = header[is_number.index(False)].strip(), one_line(row[is_number.index(False)])[:LONGEST_SHOWN]
-            is_comma = _DECIMAL_COMMA.fullmatch(cell)
-            remedy = '; decimal commas need a column map with decimal = "comma"' if is_comma else ""
-            remedy = remedy if cell.strip() else "; remove the line or the column"
-            raise DataError(f"line {line}, column '{name}': {cell!r} is not a finite number{remedy}")
+            raise DataError(f"line {line}, column '{name}': {cell!r} is not a finite number, such as 1.5")
         numbers.extend(values)
     return np.array(numbers).reshape(-1, len(header))
 

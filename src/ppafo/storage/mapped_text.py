@@ -6,7 +6,7 @@ Error messages name line and column of the file, or the key of the map, and a re
 import csv
 import re
 from array import array
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.signals.recording import TIME
 from ppafo.storage.clock import is_clock
 from ppafo.storage.column_map import ColumnMap, MappedTable, in_map, shown_names
-from ppafo.storage.comma_separated import SPLIT_NUMBERS, finite_number, header_cells, kind_of_comments
+from ppafo.storage.comma_separated import finite_number, header_cells, kind_of_comments
 from ppafo.storage.files import text_of
 from ppafo.wording import LONGEST_SHOWN, nearest_name, one_line
 
@@ -36,9 +36,6 @@ _SERIAL_MONITOR = re.compile(r"(\d{1,2}:\d{2}:\d{2}[.,]\d{3}) -> ")
 _STAMP = "timestamp"
 """Column name of the time stamps of the serial monitor."""
 _STAMP_OF_HEADER = re.compile(r"^\d{1,2}:\d{2}:\d{2}\.\d{3}")
-_HEADER_WITHIN = 200
-"""Number of lines searched for a header that is not at its expected line."""
-
 _DIRECTION = "direction"
 _UPWARDS = (
     *("up", "rising", "rise", "increasing", "loading", "forward", "auf", "aufwärts", "steigend", "belastung"),
@@ -74,10 +71,10 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
         for name, mapped in columns.channels.items():
             with noted_in(faults):
                 if mapped.column is not None:
-                    indices[name] = _index_of(f"channels.{name}.column", mapped.column, table, lines)
+                    indices[name] = _index_of(f"channels.{name}.column", mapped.column, table)
         raise_noted(faults)
         date = columns.channels[TIME].date
-        date_index = None if date is None else _index_of(f"channels.{TIME}.date", date, table, lines)
+        date_index = None if date is None else _index_of(f"channels.{TIME}.date", date, table)
     time_index = indices.get(TIME)
     # A first row that is too short is refused with the others, below.
     is_time_of_day = (
@@ -95,7 +92,7 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
     stamps = array("q")
     # Row by row, so that no cell of a large file is kept as a text.
     for line, row in table.rows:
-        _check_width(row, line, table, last_index, columns)
+        _check_width(row, line, table, last_index)
         stamps.append(line)
         for column in numbers:
             column.values.append(column.number_in(row[column.index], line))
@@ -173,58 +170,22 @@ def _split(lines: list[str], columns: ColumnMap) -> Rows:
             raise DataError(f"line {number} cannot be read: {error}") from error
 
 
-def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str]) -> int:
+def _index_of(key: str, column: int | str, table: _StartedTable) -> int:
     """Return the index (from 0) of the column that the map gives at ``key``, by name or number from 1."""
-    names = table.names
-    if isinstance(column, int):
-        count = len(names or table.first_row)
-        if column > count:
-            remedy = _other_delimiter(names or table.first_row, lambda cells: len(cells) >= column)
-            raise DataError(f"{key} = {column}: the file has {count} columns{remedy}")
+    names = table.names or [str(number) for number in range(1, len(table.first_row) + 1)]
+    if isinstance(column, int) and column <= len(names):
         return column - 1
-    if not names:
-        raise DataError(
-            f"{key} = {column!r}: a file without header (header = false) has no column names; give the column number"
-        )
-    numbers = [number for number, name in enumerate(names, start=1) if name == column]
-    if not numbers:
-        head = enumerate(lines[:_HEADER_WITHIN])
-        remedy = _other_delimiter(names, lambda cells: column in cells)
-        if not remedy:
-            # A line further down may be the header.
-            split = (
-                (number, name, header_cells(line.split(mark), mark))
-                for number, line in head
-                for name, mark in _DELIMITERS.items()
-            )
-            remedy = next(
-                (
-                    f'; line {number + 1} contains this name: give skip_lines = {number} and delimiter = "{name}"'
-                    for number, name, cells in split
-                    if column in (stripped := [cell.strip() for cell in cells]) and stripped != names
-                ),
-                "",
-            )
-        hint = "" if remedy else nearest_name(column, names)
-        raise DataError(
-            f"{key} = {column!r}: the file has no such column{hint}; available: {shown_names(names)}{remedy}"
-        )
-    if len(numbers) > 1:
-        shown = " and ".join(map(str, numbers))
-        raise DataError(f"{key} = {column!r}: columns {shown} have this name; give the number of one of them")
-    return numbers[0] - 1
+    # A file without header has numbers alone.
+    if table.names and names.count(str(column)) == 1 and isinstance(column, str):
+        return names.index(column)
+    hint = "" if column in names else nearest_name(str(column), names)
+    raise DataError(
+        f"{key} = {column!r}: must be the number of a column of the file, or a name that is not there twice{hint}; "
+        f"available: {shown_names(names)}; if these are no columns, give delimiter, skip_lines or header"
+    )
 
 
-def _other_delimiter(cells: list[str], is_there: Callable[[list[str]], bool]) -> str:
-    """Return the remedy to use another delimiter if ``is_there`` accepts the cells split by it, else ""."""
-    for name, mark in _DELIMITERS.items():
-        split_again = [part.strip() for cell in cells for part in cell.split(mark)]
-        if split_again != cells and is_there(split_again):
-            return f'; give delimiter = "{name}"'
-    return ""
-
-
-def _check_width(row: list[str], line: int, table: _StartedTable, last_index: int, columns: ColumnMap) -> None:
+def _check_width(row: list[str], line: int, table: _StartedTable, last_index: int) -> None:
     """Raise DataError for a row with a wrong number of cells; empty cells at the end do not count."""
     width, first_width = len(row), len(table.first_row)
     expected = len(table.names) or first_width
@@ -233,11 +194,7 @@ def _check_width(row: list[str], line: int, table: _StartedTable, last_index: in
     # A header may name columns at its end that no row has.
     if width == expected or (width == first_width and first_width < expected and last_index < width):
         return
-    is_split = columns.delimiter == "comma" and width == 2 * expected
-    remedy = f"; {SPLIT_NUMBERS}" if is_split else ""
-    if line <= columns.skip_lines + 2 and not is_split:
-        remedy = "; if the table begins on a later line, give skip_lines"
-    raise DataError(f"line {line} has {len(row)} values for {expected} columns{remedy}")
+    raise DataError(f"line {line} has {len(row)} values for {expected} columns; else give delimiter or skip_lines")
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,14 +233,8 @@ class _Numbers:
         number = finite_number(text if self.decimal == "point" else text.replace(".", "?").replace(",", "."))
         if number is not None:
             return number
-        remedy = ""
-        if self.words:
-            remedy = f"; known words: {shown_names(self.words)}; add others in channels.{self.channel}.words"
-        elif self.decimal == "point" and "," in cell and finite_number(cell.strip().replace(",", ".")) is not None:
-            remedy = '; give decimal = "comma"'
-        elif is_clock(cell) and self.channel != TIME:
-            remedy = f"; a time of day is allowed only in channels.{TIME}"
-        raise DataError(f"{at}: {_shown(cell)} is not a finite number {key}{remedy}")
+        words = f" or a word of channels.{self.channel}.words: {shown_names(self.words)}" if self.words else ""
+        raise DataError(f"{at}: {_shown(cell)} is not a finite number with decimal = '{self.decimal}'{words} {key}")
 
 
 def _shown(cell: str) -> str:

@@ -97,7 +97,7 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> _OpenSimTable:
         while count > 1 and table[count - 1, 0] == table[count - 2, 0]:
             count -= 1
         time = table[:count, 0]
-        check_clock(time, row_lines[:count], may_have_trials=False)
+        check_clock(time, row_lines[:count])
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     twins = doubled(written[1:], labels[1:])

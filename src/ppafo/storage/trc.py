@@ -84,5 +84,5 @@ def _rows(lines: list[str], names: list[str]) -> tuple[Floats, list[Floats]]:
     if not rows:
         raise DataError("has no rows")
     values = np.array(rows)
-    check_clock(values[:, 0], numbers, may_have_trials=False)
+    check_clock(values[:, 0], numbers)
     return values[:, 0], [values[:, 1 + 3 * index : 4 + 3 * index].T for index in range(len(names))]

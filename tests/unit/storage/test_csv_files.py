@@ -82,7 +82,7 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
             "time [s],angle [rad]\n0,1\n1,nan\n",
             r"line 3, column 'angle \[rad\]': 'nan' is not a finite number",
         ),
-        ("time [s],angle [rad]\n0,1\n1, \n", "'' is not a finite number; remove the line"),
+        ("time [s],angle [rad]\n0,1\n1, \n", "'' is not a finite number"),
         ("time [s],command [V]\n0,1\n1,10\n", "'command' is dimensionless; give factor in a column map"),
         ("time [s],angle [rad]\n0,1\n1,1_000\n", r"line 3, column 'angle \[rad\]': '1_000' is not a finite number"),
         ("time [s],angle [rad]\n0,1\n1,\uff12\n", "line 3, column 'angle \\[rad\\]': '\uff12' is not a finite number"),

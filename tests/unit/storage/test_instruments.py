@@ -132,7 +132,7 @@ def test_a_unit_with_the_delimiter_is_one_cell_through_a_map_too(tmp_path: Path,
     assert np.allclose(found["mass_flow"], 1.185e-3)
     assert np.allclose(np.degrees(found["angle"]), [1.0, 2.0])
     if lines:
-        with pytest.raises(DataError, match=r"line 3 contains this name: give skip_lines = 2"):
+        with pytest.raises(DataError, match=r"give delimiter, skip_lines or header"):
             read_foreign(path, columns(channels))
 
 

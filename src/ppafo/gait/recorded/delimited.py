@@ -10,7 +10,7 @@ from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError, refused_as
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
-from ppafo.storage.comma_separated import SPLIT_NUMBERS, check_clock
+from ppafo.storage.comma_separated import check_clock
 from ppafo.storage.files import read_bytes
 from ppafo.storage.text_table import doubled, number_in, said_of_doubled, told_apart, without_copies
 
@@ -69,8 +69,7 @@ def rows_of(block: NumberBlock, names: Sequence[str], clock: Sequence[int] = ())
         while len(row) > width and not row[-1]:
             row.pop()
         if len(row) > width or (len(row) < width and not block.is_ragged):
-            remedy = f"; {SPLIT_NUMBERS}" if block.delimiter == "," and len(row) == 2 * width else ""
-            raise DataError(f"line {number} has {len(row)} values for {width} columns{remedy}")
+            raise DataError(f"line {number} has {len(row)} values for {width} columns")
         row += [""] * (width - len(row))
         if block.decimal != ".":
             row = [cell.replace(block.decimal, ".") for cell in row]
@@ -116,7 +115,7 @@ def table_of(
         time: Floats = values[:, time_column] if has_clock else np.arange(len(values), dtype=np.float64)
         first = 1.0 if has_clock else 0.0
         time = time * seconds if frame_rate is None else (time - first) / frame_rate
-        check_clock(time, numbers, may_have_trials=False)
+        check_clock(time, numbers)
     twins = {name: others for name, others in doubled(written, distinct).items() if name != clock}
     columns = without_copies(
         {name: values[:, column] for column, name in enumerate(distinct) if column != time_column}, twins

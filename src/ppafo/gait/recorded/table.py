@@ -101,7 +101,7 @@ def counted_table(table: MotionTable, rate: float) -> MotionTable:
     if name.lower() in COUNTERS:
         time = (counted - min(float(counted[0]), 1.0)) / rate
         with refused_as(DataError, table.file, DataError):
-            check_clock(time, range(1, time.size + 1), "row", may_have_trials=False)
+            check_clock(time, range(1, time.size + 1), "row")
     return replace(table, time=time, problem="")
 
 
