@@ -32,7 +32,7 @@ if not __package__:
     sys.path[0] = str(Path(__file__).parents[1])
 
 import ppafo
-from ppafo.analyses.validate.result import Validation, in_words
+from ppafo.analyses.validate import Validation
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import PpafoError
 from ppafo.model.catalog import EFFECTS, find_effects
@@ -239,7 +239,7 @@ def judged(fault: Fault, found: Validation, is_seen: bool = True) -> str:
     """One of ``VERDICTS``, without `refused`."""
     best = found.causes.found
     alike = () if best is None else (best, *best.same)
-    is_named = [in_words(one).startswith(fault.named) or one.name in fault.named for one in alike]
+    is_named = [one.in_words.startswith(fault.named) or one.name in fault.named for one in alike]
     if any(is_named):
         return "right" if is_named[0] else "listed"
     if best is not None and not best.is_usual:

@@ -21,8 +21,8 @@ from ppafo.analyses.sweep.solve import sweep as sweep
 from ppafo.analyses.tune.problem import list_tunings as list_tunings
 from ppafo.analyses.tune.problem import load_tuning as load_tuning
 from ppafo.analyses.tune.question import tune as tune
-from ppafo.analyses.validate.question import validate as validate
-from ppafo.analyses.validate.result import Validation as Validation
+from ppafo.analyses.validate import Validation as Validation
+from ppafo.analyses.validate import validate as validate
 from ppafo.errors import ArgumentError as ArgumentError
 from ppafo.errors import DataError as DataError
 from ppafo.errors import IdentificationError as IdentificationError

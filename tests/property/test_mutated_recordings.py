@@ -11,8 +11,7 @@ from ppafo.parameters import load_device
 from ppafo.storage.column_map import ColumnMap
 from ppafo.validation.agreement import compare_recording
 from ppafo.validation.measured import read_measured
-from ppafo.validation.replay import MOTIONS
-from ppafo.validation.settings import ReplaySettings
+from ppafo.validation.settings import MOTIONS, ReplaySettings
 from tests.repeatable import TOO_SLOW
 
 DEVICE = load_device("ppafo2011")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.identify import identify
-from ppafo.analyses.validate.question import validate
+from ppafo.analyses.validate import validate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv

@@ -55,7 +55,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
             first_line="Identify a parameter set, with uncertainty, from bench recordings.",
         ),
         "validate": Command(
-            f"{_ANALYSES}.validate.question:validate",
+            f"{_ANALYSES}.validate:validate",
             listing=_SETS,
             first_line="Compare a parameter set with recordings, channel by channel.",
         ),

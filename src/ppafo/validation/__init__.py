@@ -1,8 +1,7 @@
 """Validation of the model against recordings: replay, then errors channel by channel, in units and in percent."""
 
 from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement, compare_recording
-from ppafo.validation.compared import Thresholds, parse_thresholds
-from ppafo.validation.settings import ReplaySettings
+from ppafo.validation.settings import ReplaySettings, Thresholds, parse_thresholds
 
 __all__ = [
     "ChannelAgreement",

@@ -1,17 +1,16 @@
-"""Candidate causes of a disagreement with trial magnitudes, in one generator for each stage of the search."""
+"""Candidate causes of a disagreement: one table of rows (change of the model, trial magnitudes, prior, words)."""
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
-from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.recorded.misread_units import misread_units
@@ -24,11 +23,124 @@ from ppafo.simulation.recorded.usual_errors import (
 )
 from ppafo.units.shown import shown_in, shown_unit, shown_value
 from ppafo.validation.agreement import replay_of
-from ppafo.validation.change import SENSORS, CandidateCause, ModelChange, SensorModel
-from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import replayed_scenario
-from ppafo.validation.settings import ReplaySettings
+from ppafo.validation.settings import ANGLE, PRESSURE_1, PRESSURE_2, Motion, ReplaySettings
+
+SENSORS = (ANGLE, PRESSURE_1, PRESSURE_2)
+"""Channels with a sensor on the device; torque and pressure difference are computed from them."""
+SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
+"""Channel recorded under each name when the two chamber pressures are swapped."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorModel:
+    """Sensor model: gain [-] about the value ``about``, zero offset (both in the channel's unit), delay [s]."""
+
+    gain: float = 1.0
+    zero: float = 0.0
+    about: float = 0.0
+    delay: float = 0.0
+
+    def of(self, true: Floats) -> Floats:
+        """Return the readings of true values [unit of the channel]."""
+        return self.about + self.gain * (true - self.about) + self.zero
+
+    def true(self, readings: Floats) -> Floats:
+        """Return the true values of readings [unit of the channel]."""
+        return self.about + (readings - self.zero - self.about) / self.gain
+
+
+@dataclass(frozen=True, slots=True)
+class ModelChange:
+    """Difference between the recorded device and its parameter set; by default no difference.
+
+    ``sensors``: sensor models by channel. ``numbers``: changed parameters by path [SI]. ``effects``: settings of
+    effects by the name of the effect. ``is_swapped``: pressures 1 and 2 are exchanged. ``delay``: delay [s] of all
+    sensors with respect to the command. ``clock``: true rate of the recording's clock [-]. ``motion``: motion of the
+    vane, if another. ``start``: if not None, faulty samples are ignored, and a channel whose first samples are faulty
+    starts at this fraction [-] of its range.
+    """
+
+    sensors: Mapping[str, SensorModel] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    is_swapped: bool = False
+    delay: float = 0.0
+    clock: float = 1.0
+    motion: Motion | None = None
+    start: float | None = None
+
+    @property
+    def has_delay(self) -> bool:
+        """True if all sensors lag behind the command, by a sensor delay or the delay of the valve."""
+        return self.delay != 0.0 or any(path.endswith("delay") for path in self.numbers)
+
+
+def joined(first: ModelChange, second: ModelChange) -> ModelChange:
+    """Return the combination of two changes; ``first`` has precedence for parameters and settings in both."""
+    sensors = dict(first.sensors)
+    for name, other in second.sensors.items():
+        sensor = sensors.get(name, SensorModel())
+        sensors[name] = SensorModel(
+            gain=sensor.gain * other.gain,
+            zero=sensor.zero + other.zero,
+            # A zero and a delay turn about nothing, so that the gain's point stays.
+            about=other.about if other.gain != 1.0 else sensor.about,
+            delay=sensor.delay + other.delay,
+        )
+    numbers, effects = {**second.numbers, **first.numbers}, {**second.effects, **first.effects}
+    delay, clock = first.delay + second.delay, first.clock * second.clock
+    return replace(first, sensors=sensors, numbers=numbers, effects=effects, delay=delay, clock=clock)
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateCause:
+    """Candidate cause whose magnitude is still to be fitted.
+
+    ``words``: message with a placeholder for ``shown`` times the magnitude. ``change``: function from magnitude to
+    change. ``sizes``: trial magnitudes; a single one means that there is nothing to fit. ``is_ratio``: the magnitude is
+    a ratio, fitted as its logarithm. ``usual``: largest usual sensor error (of a ratio, its logarithm). ``is_usual``:
+    the cause has no magnitude and is usual on any bench. ``is_of_samples``: faulty samples, which are visible without a
+    model. ``is_of_unit``: misread unit, reported only if it explains the recordings. ``is_off``: the model lacks the
+    number or effect, so that a ratio of 1 is a change too. ``unit``: unit of the changed parameter.
+    """
+
+    name: str
+    words: str
+    change: Callable[[float], ModelChange]
+    sizes: tuple[float, ...] = (0.0,)
+    is_ratio: bool = False
+    shown: float = 1.0
+    usual: float = 0.0
+    is_usual: bool = False
+    is_of_samples: bool = False
+    is_of_unit: bool = False
+    is_off: bool = False
+    unit: str = ""
+
+    @property
+    def has_size(self) -> bool:
+        """True if the magnitude is fitted; a swap or a wrong sign has no magnitude."""
+        return len(self.sizes) > 1
+
+    @property
+    def is_of_bench(self) -> bool:
+        """True for a usual error of a single sensor; an error of a sensor group is a sum of single errors."""
+        return self.usual > 0.0 and len(self.at(self.usual).sensors) <= 1
+
+    @property
+    def grid(self) -> list[float]:
+        """Trial magnitudes, as logarithms if they are ratios."""
+        return [math.log(size) if self.is_ratio else size for size in self.sizes]
+
+    def at(self, size: float) -> ModelChange:
+        """Return the change of the model for a fitted magnitude (for ratios, its logarithm)."""
+        return self.change(math.exp(size) if self.is_ratio else size)
+
+    def in_words(self, size: float) -> str:
+        """Return the message for a fitted magnitude (for ratios, its logarithm)."""
+        return self.words.format(self.shown * (math.exp(size) if self.is_ratio else size))
 
 
 def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> ModelChange:
@@ -267,59 +379,40 @@ def _scaled(path: str, value: float, factor: float) -> ModelChange:
     return ModelChange(numbers={path: factor * value})
 
 
-class _UnknownEffect(NamedTuple):
-    """Effect that is off in the model and may be present in the device, with one magnitude to fit.
-
-    ``words`` describes the effect in messages. ``scaled`` are the settings equal to the magnitude, whose ``unit`` has
-    its trial values, and which is shown times ``shown``; ``constant`` are the constant settings.
-    """
-
-    name: str
-    words: str
-    scaled: tuple[str, ...]
-    unit: str
-    constant: Mapping[str, float] = MappingProxyType({})
-    shown: float = 1.0
-
-
 _EFFECTS = (
-    _UnknownEffect(
-        "stribeck",
-        "friction seems to be higher up to {:.2g} rad/s (Stribeck)",
-        ("velocity",),
-        "rad/s",
-        constant={"share": 0.9},
-    ),
-    _UnknownEffect(
-        "seal_friction",
+    ("stribeck", ("velocity",), "rad/s", 1.0, "friction seems to be higher up to {:.2g} rad/s (Stribeck)"),
+    (
+        *("seal_friction", ("static_per_pressure", "dynamic_per_pressure"), "N m/Pa", 1.0),
         "friction seems to grow with pressure by {:.2g} N m/Pa",
-        ("static_per_pressure", "dynamic_per_pressure"),
-        "N m/Pa",
     ),
-    _UnknownEffect("joint_load", "a spring of {:.2g} N m/rad seems to act at the joint", ("stiffness",), "N m/rad"),
-    _UnknownEffect(
-        "joint_load", "a drag of {:.2g} N m s^2/rad^2 seems to act at the joint", ("drag",), "N m s^2/rad^2"
+    ("joint_load", ("stiffness",), "N m/rad", 1.0, "a spring of {:.2g} N m/rad seems to act at the joint"),
+    ("joint_load", ("drag",), "N m s^2/rad^2", 1.0, "a drag of {:.2g} N m s^2/rad^2 seems to act at the joint"),
+    (
+        *("laminar_leak", ("coefficient",), "kg/(s Pa^2)", 1.0),
+        "a laminar leak of {:.2g} kg/(s Pa^2) seems to pass the seal",
     ),
-    _UnknownEffect(
-        "laminar_leak", "a laminar leak of {:.2g} kg/(s Pa^2) seems to pass the seal", ("coefficient",), "kg/(s Pa^2)"
-    ),
-    _UnknownEffect(
-        "line_resistance", "lines seem to throttle as an orifice of {:.2g} mm^2 does", ("area",), "m^2", shown=1e6
-    ),
+    ("line_resistance", ("area",), "m^2", 1e6, "lines seem to throttle as an orifice of {:.2g} mm^2 does"),
 )
+"""Effects that may be present in the device: settings equal to the magnitude, its unit, shown units in 1 SI, words."""
+_CONSTANT = {"stribeck": {"share": 0.9}}
+"""Constant settings of an effect."""
 _OF_A_GAS = 5
 """Number of trial values of a property of the gas, in geometric progression."""
 
 
 def effects(device: Device) -> Iterator[CandidateCause]:
     """Yield every effect that is off in the model of the device, with trial magnitudes."""
-    for effect in _EFFECTS:
-        if effect.name not in device.effects:
+    for effect, settings, unit, shown, words in _EFFECTS:
+        if effect not in device.effects:
+            constant = _CONSTANT.get(effect, {})
 
-            def change(size: float, effect: _UnknownEffect = effect) -> ModelChange:
-                return ModelChange(effects={effect.name: {**effect.constant, **dict.fromkeys(effect.scaled, size)}})
+            def change(
+                size: float,
+                effect: str = effect,
+                settings: tuple[str, ...] = settings,
+                constant: dict[str, float] = constant,
+            ) -> ModelChange:
+                return ModelChange(effects={effect: {**constant, **dict.fromkeys(settings, size)}})
 
-            name = effect.name if len(effect.scaled) > 1 or effect.constant else f"{effect.name}.{effect.scaled[0]}"
-            yield CandidateCause(
-                name, effect.words, change, _OFF[effect.unit], is_ratio=True, shown=effect.shown, is_off=True
-            )
+            name = effect if len(settings) > 1 or constant else f"{effect}.{settings[0]}"
+            yield CandidateCause(name, words, change, _OFF[unit], is_ratio=True, shown=shown, is_off=True)

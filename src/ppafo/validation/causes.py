@@ -2,13 +2,13 @@
 
 A cause is a model of a sensor, y = h(model; a) + e, or another value of a parameter. Causes are tried in stages, from
 errors that the samples themselves show to effects that the model lacks; the first stage with a cause that explains all
-recordings ends the search. ``change.py`` defines a change of the model, ``candidates.py`` lists the candidates,
+recordings ends the search. ``candidates.py`` lists them,
 ``record.py`` computes the residuals under a change, and ``search.py`` fits the magnitude of a change.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,14 +20,11 @@ from ppafo.simulation.recorded.channels import COMMAND
 from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.simulation.recorded.usual_errors import usual_errors
 from ppafo.validation.agreement import RecordingAgreement, compare_recording
-from ppafo.validation.candidates import effects, exchanges, numbers, sizes
-from ppafo.validation.change import SENSORS, CandidateCause, ModelChange
-from ppafo.validation.compared import ANGLE, EXPLAINED_FRACTION
+from ppafo.validation.candidates import SENSORS, CandidateCause, ModelChange, effects, exchanges, numbers, sizes
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.record import Record, ScaledResiduals, at_rate, record_of
-from ppafo.validation.replay import Motion
-from ppafo.validation.search import CauseSearch, SizedCause
-from ppafo.validation.settings import ReplaySettings
+from ppafo.validation.search import CauseSearch, ResidualCause
+from ppafo.validation.settings import ANGLE, EXPLAINED_FRACTION, Motion, ReplaySettings
 from ppafo.wording import argument_text
 
 _TIMES = {"milliseconds read as seconds": (1.0e3, "ms"), "seconds read as milliseconds": (1.0e-3, "s")}
@@ -62,27 +59,6 @@ _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 
 The two outermost values lie outside the range, and a best fit there is rejected.
 """
-
-
-@dataclass(frozen=True, slots=True)
-class ResidualCause:
-    """Possible cause of the residuals of a validation.
-
-    ``in_words`` describes the cause in a message. ``gain`` is its gain G [-] in explained error (see ``search.py``).
-    ``left`` is the largest RMS error of any channel divided by its noise [-] under the cause. ``numbers`` has the
-    changed parameters by path, each a value with its SI unit. ``is_usual`` is true if the error is within the usual
-    error of sensors. ``is_of_samples`` is true for faulty samples, which are visible without a model. ``same`` are
-    other causes that the recordings cannot distinguish from this one; of the nearest cause, the two next ones.
-    """
-
-    name: str
-    in_words: str
-    gain: float
-    left: float
-    numbers: Mapping[str, tuple[float, str]] = field(default_factory=dict)
-    is_usual: bool = False
-    is_of_samples: bool = False
-    same: "tuple[ResidualCause, ...]" = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +98,7 @@ def causes_of(
     none = search.evaluated([ModelChange()])[0]
     if none is None or none.is_noise:
         return Diagnosis(is_noise=none is not None)
-    tried = list[SizedCause]()
+    tried = list[ResidualCause]()
     for candidates in (_samples(records), _motions(records, settings)):
         tried += search.compared(candidates, none)
         if any(cause.explains for cause in tried):
@@ -201,7 +177,9 @@ def _units_of_moving(
     return {name: {recording.channels[name].stated for recording in recordings if name in recording} for name in moving}
 
 
-def _usual_errors(search: CauseSearch, none: ScaledResiduals, of_bench: Sequence[SizedCause]) -> ResidualCause | None:
+def _usual_errors(
+    search: CauseSearch, none: ScaledResiduals, of_bench: Sequence[ResidualCause]
+) -> ResidualCause | None:
     """Return a usual sensor error, or several together, that explains the recordings; None if no such error does.
 
     ``of_bench`` are the candidate errors of single sensors and sensor groups.
@@ -216,11 +194,11 @@ def _usual_errors(search: CauseSearch, none: ScaledResiduals, of_bench: Sequence
         least = max((cause.gain for cause in explaining), default=0.0) - search.penalty
         together = search.compared(search.together(candidates, none), none)
         usual = [cause for cause in together if cause.explains and cause.gain > least]
-    return _cause_of(usual, search.penalty) if usual else None
+    return _cause_of(usual, search) if usual else None
 
 
 def _explained(
-    search: CauseSearch, none: ScaledResiduals, tried: Sequence[SizedCause], sized: Sequence[CandidateCause]
+    search: CauseSearch, none: ScaledResiduals, tried: Sequence[ResidualCause], sized: Sequence[CandidateCause]
 ) -> Diagnosis:
     """Return the best cause with its alternatives, or a diagnosis without a cause if a second one is needed.
 
@@ -233,13 +211,13 @@ def _explained(
     # One Jacobian, at the first cause, shows what a second one would add and what could replace it.
     slopes = search.slopes(first.change, first.residuals, sized) if is_fitted else []
     if search.needs_another(first, slopes):
-        return Diagnosis(None, _cause_of([first], search.penalty), len(tried))
+        return Diagnosis(None, first, len(tried))
     # With errors of sensors that any bench has, other small changes may explain as much as one alone.
-    others = search.beside_usual(slopes, none, {cause.candidate.name for cause in explaining})
-    return Diagnosis(_cause_of(explaining, search.penalty, others), None, len(tried))
+    others = search.beside_usual(slopes, none, {cause.name for cause in explaining})
+    return Diagnosis(_cause_of(explaining, search, others), None, len(tried))
 
 
-def _unexplained(search: CauseSearch, tried: Sequence[SizedCause], kinds: str) -> Diagnosis:
+def _unexplained(search: CauseSearch, tried: Sequence[ResidualCause], kinds: str) -> Diagnosis:
     """Return the diagnosis without a cause, with the best of the causes ``tried``, of the ``kinds`` in words."""
     # What is wrong with samples is seen in them, whatever else is wrong; a misread unit is no hint beside other faults.
     hinting = [
@@ -248,10 +226,7 @@ def _unexplained(search: CauseSearch, tried: Sequence[SizedCause], kinds: str) -
         if not cause.candidate.is_of_unit and (cause.gain > 0.0 or cause.candidate.is_of_samples)
     ]
     hints = sorted(
-        (
-            replace(_cause_of([cause], search.penalty), left=left)
-            for cause, left in zip(hinting, search.left_by(hinting), strict=True)
-        ),
+        (replace(cause, left=left) for cause, left in zip(hinting, search.left_by(hinting), strict=True)),
         # Of those that leave the same, numbers of the set come first.
         key=lambda cause: (not cause.is_of_samples, float(f"{cause.left:.2g}"), not cause.numbers, cause.left),
     )
@@ -299,7 +274,8 @@ def _in_other_unit(
                 gain += 2.0 * len(as_read.measured) * math.log(ratio)
             left = max(left, after.in_noise)
     remedy = f'write time [{unit}] in the header, or unit = "{unit}" for time in a column map'
-    return ResidualCause(name, f"times seem to be in {name} ({remedy})", gain, left)
+    candidate = CandidateCause(name, f"times seem to be in {name} ({remedy})", lambda rate: ModelChange(clock=rate))
+    return ResidualCause(candidate, rate, ScaledResiduals(np.zeros(0), np.zeros(0)), gain, left)
 
 
 def _samples(records: Sequence[Record]) -> list[CandidateCause]:
@@ -343,29 +319,23 @@ def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candid
     return [CandidateCause("motion", words, lambda _: ModelChange(motion=motion))]
 
 
-def _cause_of(named: Sequence[SizedCause], penalty: float, others: Sequence[SizedCause] = ()) -> ResidualCause:
+def _cause_of(
+    named: Sequence[ResidualCause], search: CauseSearch, others: Sequence[ResidualCause] = ()
+) -> ResidualCause:
     """Return the best of the ``named`` causes, with all causes that the recordings cannot distinguish from it.
 
-    ``others`` explain the recordings only together with usual sensor errors, and are listed last.
+    These have about the same gain, or differ by no more than the engine errs. ``others`` explain the recordings only
+    together with usual sensor errors, and are listed last.
     """
-    best, alone = max(tried.gain for tried in named), {tried.candidate.name for tried in named}
+    best, alone = max(named, key=lambda cause: cause.gain), {cause.name for cause in named}
+
+    def is_alike(cause: ResidualCause) -> bool:
+        apart = cause.residuals.errors - best.residuals.errors
+        return cause.gain > best.gain - search.penalty or float(apart @ apart) <= search.of_engine
+
     # Of those that the recordings cannot tell apart, numbers of the set come first.
-    alike = sorted(
-        (tried for tried in [*named, *others] if tried.gain > best - penalty),
-        key=lambda tried: (tried.candidate.name not in alone, not tried.change.numbers, -tried.gain),
-    )
-    first, *rest = (
-        ResidualCause(
-            name=cause.candidate.name,
-            in_words=cause.candidate.in_words(cause.size),
-            gain=cause.gain,
-            left=math.sqrt(float(cause.residuals.squares.max())),
-            numbers={
-                path: (value, unit) for path, value in cause.change.numbers.items() if (unit := cause.candidate.unit)
-            },
-            is_usual=cause.is_usual,
-            is_of_samples=cause.candidate.is_of_samples,
-        )
-        for cause in alike
+    first, *rest = sorted(
+        filter(is_alike, [*named, *others]),
+        key=lambda cause: (cause.name not in alone, not cause.change.numbers, -cause.gain),
     )
     return replace(first, same=tuple(rest))

@@ -28,7 +28,7 @@ from ppafo.storage.foreign import read_foreign
 from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units.shown import in_units, shown_text
-from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
+from ppafo.validation.settings import COMPARED, PRESSURE_1, PRESSURE_2
 from ppafo.wording import count_of, nearest_name, override_text
 
 MINIMUM_SAMPLES = 10

@@ -24,11 +24,10 @@ from ppafo.validation.agreement import (
     noise_in,
     replay_of,
 )
-from ppafo.validation.change import SENSORS, SWAPPED, ModelChange, SensorModel
-from ppafo.validation.compared import ANGLE
+from ppafo.validation.candidates import SENSORS, SWAPPED, ModelChange, SensorModel
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import Replay, Replayed, replay_together
-from ppafo.validation.settings import ReplaySettings
+from ppafo.validation.settings import ANGLE, ReplaySettings
 from ppafo.wording import argument_text
 
 Flags = NDArray[np.bool_]

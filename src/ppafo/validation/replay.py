@@ -3,7 +3,6 @@
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -22,12 +21,8 @@ from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_h
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
 from ppafo.simulation.recorded.rest import ReplayStart
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario, vane_motion
-from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import MeasuredRecording
-
-Motion = Literal["free", "measured", "locked", "leg"]
-"""Motion of the vane in a replay: free, prescribed as recorded, locked, or with a foot."""
-MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")
+from ppafo.validation.settings import ANGLE, Motion
 
 MAXIMUM_STEPS = 20_000_000
 """Largest number of steps of a replay; more indicates a wrong time unit."""

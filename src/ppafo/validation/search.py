@@ -19,12 +19,14 @@ from scipy.stats import chi2
 from ppafo.errors import PpafoError
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report
+from ppafo.report.kind import Kind
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded.channels import COMMAND
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+from ppafo.units.shown import quantity_of_unit
 from ppafo.validation.agreement import agreement_of, replay_of
-from ppafo.validation.change import SWAPPED, CandidateCause, ModelChange, joined
+from ppafo.validation.candidates import SWAPPED, CandidateCause, ModelChange, joined
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.record import (
     ONLY_NOISE,
@@ -42,8 +44,12 @@ _TOGETHER = 32
 """Number of changes replayed in a batch, which limits memory and sets the rate of progress reports."""
 _DIFFERENCE = 0.02
 """Step of a finite difference as a fraction of the distance between two trial magnitudes [-]."""
-_BEST, _OF_BEST = 6, 2
-"""Number of candidates that are nearest after the steps of all, and their further Gauss-Newton steps."""
+_BEST, _OF_BEST, _OF_RISING = 6, 2, 4
+"""Number of candidates that are nearest after the steps of all, and their further Gauss-Newton steps.
+
+Of these a candidate takes up to four more while each gains more than separates two causes: else a true cause that is
+not yet at its best would lose to one that explains almost as much.
+"""
 _SHORTER = 0.35
 """Length of a step divided by that of one that went too far [-]."""
 _SMALL = 0.1
@@ -56,18 +62,51 @@ _SMALLEST = 1.0e-300
 """Lower bound of a sum of squares used as a divisor."""
 
 
-class SizedCause(NamedTuple):
-    """Candidate cause at its best magnitude (for ratios, its logarithm), with residuals and gain G [-]."""
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualCause:
+    """Candidate cause at its best magnitude (for ratios, its logarithm), with residuals and gain G [-].
+
+    ``left`` is the largest RMS error of any channel divided by its noise [-] under the cause. ``same`` are other causes
+    that the recordings cannot distinguish from this one; of the nearest cause, the two next ones.
+    """
 
     candidate: CandidateCause
     size: float
     residuals: ScaledResiduals
     gain: float
+    left: float = math.nan
+    same: "tuple[ResidualCause, ...]" = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the candidate."""
+        return self.candidate.name
 
     @property
     def change(self) -> ModelChange:
         """Change of the model at this magnitude."""
         return self.candidate.at(self.size)
+
+    @property
+    def numbers(self) -> dict[str, tuple[float, str]]:
+        """Changed parameters by path, each a value with its SI unit."""
+        unit = self.candidate.unit
+        return {path: (value, unit) for path, value in self.change.numbers.items() if unit}
+
+    @property
+    def in_words(self) -> str:
+        """Message, with values of the set in display units."""
+        said = self.candidate.in_words(self.size)
+        for value, unit in self.numbers.values():
+            # An atmosphere in gauge pressure says nothing.
+            quantity = "pressure change" if unit == "Pa_a" else quantity_of_unit(unit)
+            said += f" ({Kind('', '' if unit == '-' else unit, quantity).text(value)})"
+        return said
+
+    @property
+    def is_of_samples(self) -> bool:
+        """True for faulty samples, which are visible without a model."""
+        return self.candidate.is_of_samples
 
     @property
     def is_inside(self) -> bool:
@@ -105,6 +144,11 @@ class CauseSearch:
     def penalty(self) -> float:
         """Logarithm of the number of samples: penalty of a fitted magnitude, and least difference of two gains."""
         return math.log(sum(record.values.size for record in self.records))
+
+    @property
+    def of_engine(self) -> float:
+        """Squared integration error of the engine, divided by noise and summed over all samples [-]."""
+        return sum(float(np.square(record.engine) @ record.good.sum(axis=1)) for record in self.records)
 
     def evaluated(self, changes: Sequence[ModelChange]) -> list[ScaledResiduals | None]:
         """Return the residuals under each change; None for a device that cannot produce the recordings."""
@@ -158,34 +202,38 @@ class CauseSearch:
             return None
         return replace(request, device=device)
 
-    def compared(self, candidates: Sequence[CandidateCause], none: ScaledResiduals) -> list[SizedCause]:
+    def compared(self, candidates: Sequence[CandidateCause], none: ScaledResiduals) -> list[ResidualCause]:
         """Return each candidate at its best magnitude: the best of a grid, refined by two Gauss-Newton steps.
 
         ``none`` are the residuals without a change. Candidates whose best magnitude is at an end of the grid are
         rejected.
         """
-        best: dict[str, SizedCause] = {}
-        worse: dict[str, float] = {}
+        best, worse, rising = dict[str, ResidualCause](), dict[str, float](), set[str]()
         trials = [(candidate, size) for candidate in candidates for size in candidate.grid]
-        for step in range(STEPS + _OF_BEST + 1):
+        for step in range(STEPS + _OF_BEST + _OF_RISING + 1):
+            rising.clear()
             changes = [candidate.at(size) for candidate, size in trials]
             for (candidate, size), residuals in zip(trials, self.evaluated(changes), strict=True):
                 if residuals is not None:
-                    gain = self._gain(residuals, none) - self.penalty * candidate.has_size
-                    cause = SizedCause(candidate=candidate, size=size, residuals=residuals, gain=gain)
+                    cause = self._cause(candidate, size, residuals, none)
                     previous = best.get(candidate.name)
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
-                    if previous is None or (gain, cause.is_inside) > (previous.gain, previous.is_inside):
+                    if previous is None or (cause.gain, cause.is_inside) > (previous.gain, previous.is_inside):
                         best[candidate.name] = cause
                         worse.pop(candidate.name, None)
+                        if previous is not None and cause.gain - previous.gain > self.penalty:
+                            rising.add(candidate.name)
                     elif step:
                         worse[candidate.name] = size
-            with_size = [cause for cause in best.values() if cause.candidate.has_size]
-            nearest = sorted(with_size, key=lambda cause: -cause.gain)[:_BEST]
-            trials = self._improved(with_size if step < STEPS else nearest, worse) if step < STEPS + _OF_BEST else []
+            improved = [cause for cause in best.values() if cause.candidate.has_size]
+            if step >= STEPS:
+                improved = sorted(improved, key=lambda cause: -cause.gain)[:_BEST]
+            if step >= STEPS + _OF_BEST:
+                improved = [cause for cause in improved if cause.name in rising]
+            trials = self._improved(improved, worse) if step < STEPS + _OF_BEST + _OF_RISING else []
         return [cause for cause in best.values() if cause.is_inside or not cause.candidate.has_size]
 
-    def left_by(self, causes: Sequence[SizedCause]) -> list[float]:
+    def left_by(self, causes: Sequence[ResidualCause]) -> list[float]:
         """Return the largest RMS error of any channel that each cause leaves, divided by its noise [-].
 
         It is what a validation finds once the cause is mended, with its rule for the common delay: none at its limit.
@@ -201,26 +249,31 @@ class CauseSearch:
                 agreement = agreement_of(corrected, replayed, self.settings, abs(change.delay) or None)
                 errors += [channel.in_noise for channel in agreement.channels]
             # Wrong samples are left out of the errors of the search alone.
-            of_search = math.sqrt(float(cause.residuals.squares.max()))
-            left.append(max(errors) if change.start is None else of_search)
+            left.append(max(errors) if change.start is None else cause.left)
         return left
 
-    def _gain(self, residuals: ScaledResiduals, none: ScaledResiduals) -> float:
-        """Return the gain G [-] of a change without the penalty for its fitted magnitude."""
+    def _cause(
+        self, candidate: CandidateCause, size: float, residuals: ScaledResiduals, none: ScaledResiduals
+    ) -> ResidualCause:
+        """Return a candidate at a magnitude with its gain G [-], given the residuals with and without it."""
         counts = np.concatenate([np.full(len(record.channels), record.values.shape[1]) for record in self.records])
-        return float(counts @ (np.log(np.maximum(none.squares, 1.0)) - np.log(np.maximum(residuals.squares, 1.0))))
+        gain = float(counts @ (np.log(np.maximum(none.squares, 1.0)) - np.log(np.maximum(residuals.squares, 1.0))))
+        left = math.sqrt(float(residuals.squares.max()))
+        return ResidualCause(candidate, size, residuals, gain - self.penalty * candidate.has_size, left)
 
-    def _improved(self, causes: Sequence[SizedCause], worse: Mapping[str, float]) -> list[tuple[CandidateCause, float]]:
+    def _improved(
+        self, causes: Sequence[ResidualCause], worse: Mapping[str, float]
+    ) -> list[tuple[CandidateCause, float]]:
         """Return the magnitude of each candidate after a Gauss-Newton step, kept between neighbouring grid points.
 
         A step that led to a ``worse`` magnitude is taken again, shorter.
         """
         improved = [
-            (cause.candidate, cause.size + _SHORTER * (worse[cause.candidate.name] - cause.size))
+            (cause.candidate, cause.size + _SHORTER * (worse[cause.name] - cause.size))
             for cause in causes
-            if cause.candidate.name in worse
+            if cause.name in worse
         ]
-        causes, ends = [cause for cause in causes if cause.candidate.name not in worse], []
+        causes, ends = [cause for cause in causes if cause.name not in worse], []
         for cause in causes:
             grid = sorted(cause.candidate.grid)
             nearest = int(np.argmin(np.abs(np.array(grid) - cause.size)))
@@ -272,7 +325,9 @@ class CauseSearch:
         words = "zeros, gains and delays of several sensors seem to be off"
         return [CandidateCause("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
-    def beside_usual(self, slopes: Sequence[_Slope], none: ScaledResiduals, known: Collection[str]) -> list[SizedCause]:
+    def beside_usual(
+        self, slopes: Sequence[_Slope], none: ScaledResiduals, known: Collection[str]
+    ) -> list[ResidualCause]:
         """Return unusually large changes that explain the recordings together with usual sensor errors.
 
         Magnitudes come from a linear fit, and a replay verifies each. Usual errors cost no penalty. Names in ``known``
@@ -296,13 +351,13 @@ class CauseSearch:
                 sized.append((candidate, size))
                 changes.append(reduce(joined, [item.candidate.at(part) for item, part in fitted]))
         causes = [
-            SizedCause(candidate, size, residuals, gain=self._gain(residuals, none) - self.penalty)
+            self._cause(candidate, size, residuals, none)
             for (candidate, size), residuals in zip(sized, self.evaluated(changes), strict=True)
             if residuals is not None
         ]
         return [cause for cause in causes if cause.explains and cause.is_inside]
 
-    def needs_another(self, first: SizedCause, slopes: Sequence[_Slope]) -> bool:
+    def needs_another(self, first: ResidualCause, slopes: Sequence[_Slope]) -> bool:
         """Return whether the residuals left by the first change need a second, unusually large change.
 
         The test is linear in both magnitudes. The squared error explained by the second change must exceed 2 (ln N + ln
@@ -320,7 +375,6 @@ class CauseSearch:
         # Beside a second change the first would have another size: what it can take over is no merit of the second.
         rest = errors - (along_first @ errors) * along_first
         threshold = 2.0 * (self.penalty + math.log(len(slopes)))
-        of_engine = sum(float(np.square(record.engine) @ record.good.sum(axis=1)) for record in self.records)
         for candidate, slope in slopes:
             across = slope - (along_first @ slope) * along_first
             across_square = float(across @ across)
@@ -330,7 +384,7 @@ class CauseSearch:
                 explained = along * along / across_square
                 noise = max((float(rest @ rest) - explained) / len(errors), 1.0)
                 is_larger = abs(along / across_square) > candidate.usual
-                if is_larger and explained > of_engine + threshold * noise * noise:
+                if is_larger and explained > self.of_engine + threshold * noise * noise:
                     return True
         return False
 

@@ -1,16 +1,133 @@
-"""Settings of a validation in SI units: motion, initial values, delay limit and error limits."""
+"""Settings of a validation in SI units: compared channels, motion, initial values, delay limit and error limits."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.parameters.device import Device
+from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS
 from ppafo.simulation.scenario import Leg
-from ppafo.units import parse_quantity
-from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2, Thresholds, parse_thresholds
-from ppafo.validation.replay import MOTIONS, Motion
+from ppafo.units import parse_quantity, split_quantity
 from ppafo.wording import argument_text, known_names, nearest_name, one_line
 
+ANGLE, PRESSURE_1, PRESSURE_2 = "angle", "pressure_1", "pressure_2"
+PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
+
+
+@dataclass(frozen=True, slots=True)
+class ComparedChannel:
+    """Channel compared between recording and model.
+
+    ``unit`` is the SI unit of an error (``Pa_d`` for a pressure difference), ``quantity`` the kind of quantity,
+    ``title`` the label. ``full_range(device, gauge)`` is the full range [SI] of a device with a gauge supply pressure
+    [Pa].
+    """
+
+    unit: str
+    quantity: str
+    title: str
+    full_range: Callable[[Device, float], float]
+
+    def usual_zero(self, device: Device) -> float:
+        """Return the usual zero error of a sensor, or its effect on a computed channel [SI unit of the channel]."""
+        # Pressure difference and torque have the zeros of both sensors, as their full ranges have both pressures.
+        return ANGLE_ERRORS.zero if self.quantity == "angle" else self.full_range(device, PRESSURE_ERRORS.zero)
+
+
+COMPARED: dict[str, ComparedChannel] = {
+    ANGLE: ComparedChannel(
+        "rad", "angle", "Vane angle", lambda device, _: device.actuator.angle_max - device.actuator.angle_min
+    ),
+    PRESSURE_1: ComparedChannel("Pa_d", "pressure change", "Pressure in chamber 1", lambda _, gauge: gauge),
+    PRESSURE_2: ComparedChannel("Pa_d", "pressure change", "Pressure in chamber 2", lambda _, gauge: gauge),
+    PRESSURE_DIFFERENCE: ComparedChannel(
+        "Pa_d", "pressure change", "Pressure difference", lambda _, gauge: 2.0 * gauge
+    ),
+    TORQUE: ComparedChannel(
+        "N m", "torque", "Actuator torque", lambda device, gauge: 2.0 * gauge * device.actuator.torque_constant
+    ),
+}
+"""Compared channels by name, with the full ranges of the paper: 110 deg, 55 psi, 55 psi and 110 psi.
+
+The full range of the torque follows from equation (2). A pressure difference ranges from full supply on one side to
+full supply on the other.
+"""
+
+ACCEPTABLE_FRACTION = 0.03
+"""Largest RMS error of an acceptable model as a fraction of the full range [-].
+
+The paper calls 10 % acceptable (page with figure 7); a lag of 10 ms of both pressures would pass there.
+"""
+
+EXPLAINED_FRACTION = 0.5
+"""Least explained fraction of signal variance (R^2) [-] for an acceptable model; the mean explains 0."""
+
+_FRACTION_UNITS = ("%", "percent")
+_LIMIT_EXAMPLES = "for example 'angle=10%', 'pressure_1=3.7 psi_d', or '5%' for all channels"
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorLimit:
+    """Largest RMS error: a fraction of the full range [-], or an error in the SI unit of the channel."""
+
+    value: float
+    is_fraction: bool
+
+    def fraction_of(self, full_range: float) -> float:
+        """Return the limit as a fraction [-] of a full range [SI unit of the channel]."""
+        return self.value if self.is_fraction else self.value / full_range
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """Error limits by channel (``channels``), and limit of other channels (``others``, None for the default)."""
+
+    others: ErrorLimit | None
+    channels: Mapping[str, ErrorLimit]
+
+    def limit(self, channel: str) -> ErrorLimit | None:
+        """Return the limit that the user set for a channel, None for the default limit."""
+        return self.channels.get(channel, self.others)
+
+
+def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
+    """Parse thresholds such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later texts override.
+
+    Raises DataError for a channel that is not compared, or a limit that is not above 0.
+    """
+    others = None
+    channels: dict[str, ErrorLimit] = {}
+    for text in texts:
+        name, separator, value = text.rpartition("=")
+        if separator:
+            channel = name.strip()
+            if channel not in COMPARED:
+                names = known_names(channel, COMPARED)
+                raise DataError(f"threshold '{one_line(text)}': there is no channel '{one_line(channel)}'{names}")
+            channels[channel] = _limit(value, text, COMPARED[channel].unit)
+        else:
+            others = _limit(value, text, "")
+    return Thresholds(others, channels)
+
+
+def _limit(value: str, text: str, unit: str) -> ErrorLimit:
+    """Parse a limit in ``value``: a fraction for percent, else SI; messages quote the whole ``text``."""
+    try:
+        is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
+        number = parse_quantity(value, "" if is_fraction else unit)
+    except UnitError as error:
+        raise DataError(f"threshold '{one_line(text)}': {error}; {_LIMIT_EXAMPLES}") from error
+    if not unit and not is_fraction:
+        raise DataError(f"threshold '{one_line(text)}': a limit for all channels must be in %, for example '5%'")
+    if number <= 0.0:
+        raise DataError(f"threshold '{one_line(text)}': must be above 0; {_LIMIT_EXAMPLES}")
+    return ErrorLimit(number, is_fraction)
+
+
+Motion = Literal["free", "measured", "locked", "leg"]
+"""Motion of the vane in a replay: free, prescribed as recorded, locked, or with a foot."""
+MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")
 DEFAULT_LIMIT = 0.02
 """Default limit of the estimated delay [s]; sensors, filters and valves lag less."""
 LARGEST_DELAY = 1.0

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.validate.question import validate
+from ppafo.analyses.validate import validate
 from ppafo.arguments import quantity
 from ppafo.errors import ArgumentError, DataError, PpafoError
 from ppafo.parameters import load_device

@@ -14,9 +14,8 @@ from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Between
 from ppafo.simulation.loading import load_scenario
-from ppafo.validation.agreement import _late_command, channel_agreement
-from ppafo.validation.compared import parse_thresholds
-from ppafo.validation.delay import ComparedCurve
+from ppafo.validation.agreement import ComparedCurve, _late_command, channel_agreement
+from ppafo.validation.settings import parse_thresholds
 
 Agree = Callable[..., Any]
 Step = tuple[Device, Recording]

@@ -1,0 +1,419 @@
+"""Comparison of a parameter set with recordings: replay, errors of each channel, cause of the residual, verdict."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ppafo.arguments import Duration, Name, Overrides, Volume, Word, checked
+from ppafo.documents.json_text import fields_of
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.progress import Progress, Report, report_nothing
+from ppafo.units.shown import in_units
+from ppafo.version import __version__
+from ppafo.wording import argument_text, count_of
+
+if TYPE_CHECKING:
+    from pandas import DataFrame  # type: ignore[import-untyped]
+    from xarray import Dataset
+
+    from ppafo.parameters.device import Device
+    from ppafo.report.finding import Finding, Section
+    from ppafo.report.kind import Kind
+    from ppafo.report.panels import Panel
+    from ppafo.signals import Recording
+    from ppafo.storage.column_map import ColumnMap
+    from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement
+    from ppafo.validation.causes import Diagnosis
+    from ppafo.validation.settings import ReplaySettings
+
+SetLike = Annotated[str | Path, Word("PARAMETERS")]
+ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
+Recorded = Annotated["Recording | DataFrame | Dataset | str | Path", Word("RECORDING")]
+Motion = Annotated[str, Word("free|measured|locked|leg")]
+Initial = Annotated[str, Word("CHANNEL=VALUE")]
+Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
+KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}
+"""Words of the report for the origin of a recording, so that model output does not pass for a measurement."""
+_EXPLAINS = 0.5
+"""Largest ratio of the residual with the nearest cause to the residual without a cause at which a cause is named."""
+_NEAR_LIMIT = 0.25
+"""Least ratio of the largest residual to the RMS limit at which the panel shows the limit; else it would be flat."""
+_SHORT = 3.0
+"""Duration [s] below which the time axis is in milliseconds."""
+_HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at", "verdict")
+"""Column heads of the table of errors."""
+_UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
+"""Pattern of characters that are replaced in file names."""
+_WRITTEN_AS_ZERO = 5.0e-4
+"""Absolute value below which a number in the table of errors is written as 0."""
+_OF_CHANNEL = (
+    *("unit", "rms", "noise", "passes", "full_range", "variation"),
+    *("rms_unaligned", "bias", "largest", "largest_time"),
+)
+"""Errors of a channel that its data has under the names of the fields."""
+
+
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """Result of the validation of a parameter set against recordings.
+
+    ``device``: device of the set after the ``overrides``
+    ``settings``: settings of the replay
+    ``recordings``: agreement of each recording with the model
+    ``causes``: diagnosed causes of the residual
+    """
+
+    parameter_set: str
+    device: Device
+    overrides: tuple[str, ...]
+    settings: ReplaySettings
+    recordings: tuple[RecordingAgreement, ...]
+    causes: Diagnosis
+
+    @property
+    def passes(self) -> bool:
+        """True if every RMS error is within its limit; causes of the residual do not affect the verdict."""
+        return all(recording.passes for recording in self.recordings)
+
+    def json_document(self) -> dict[str, Any]:
+        """Return errors, causes and recordings as plain data in SI."""
+        return {
+            "format": "ppafo agreement",
+            "schema_version": 1,
+            **fields_of(self, "parameter_set", "passes"),
+            "device": self.device.name,
+            "valve": self.device.valve_name,
+            "overrides": list(self.overrides),
+            "longest_delay": self.settings.longest_delay,
+            "summary": verdict(self),
+            "causes": {
+                "tried": self.causes.tried,
+                **{
+                    name: cause
+                    and {
+                        **fields_of(cause, "name", "gain", "left", "is_usual"),
+                        "words": cause.in_words,
+                        "same": [other.name for other in cause.same],
+                        "numbers": {path: value for path, (value, _) in cause.numbers.items()},
+                    }
+                    for name, cause in (("found", self.causes.found), ("nearest", self.causes.nearest))
+                },
+            },
+            "recordings": [
+                {
+                    **fields_of(agreement, "file", "sha256", "motion", "step", "passes"),
+                    **fields_of(agreement.measured, "label", "kind", "duration"),
+                    "samples": len(agreement.measured),
+                    "inputs": list(agreement.inputs),
+                    "delay": agreement.delay.correction,
+                    "delay_is_at_limit": agreement.delay.is_at_limit,
+                    "remarks": list(agreement.remarks),
+                    "channels": {channel.channel: _channel_data(channel) for channel in agreement.channels},
+                }
+                for agreement in self.recordings
+            ],
+            "versions": {"ppafo": __version__},
+        }
+
+
+def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
+    """Return the errors of a channel as plain data in SI, and the RMS error in the unit that people are shown."""
+    from ppafo.report.display_units import display_value
+
+    kind = _kind_of(channel)
+    return {
+        **fields_of(channel, *_OF_CHANNEL),
+        "rms_share": channel.fraction,
+        "limit_share": channel.limit,
+        "shown": {"unit": kind.shown_unit, "rms": display_value(channel.rms, kind.quantity)},
+    }
+
+
+def _kind_of(channel: ChannelAgreement) -> Kind:
+    """Return display unit and number format of the errors of a channel, which are differences."""
+    from ppafo.report.kind import Kind
+    from ppafo.validation.settings import COMPARED
+
+    return Kind("", "", COMPARED[channel.channel].quantity)
+
+
+@checked
+def validate(
+    parameter_set: SetLike,
+    recordings: Sequence[Recorded],
+    *,
+    valve: Name | None = None,
+    overrides: Overrides = (),
+    motion: Motion = "free",
+    volume: Volume | None = None,
+    initial: Sequence[Initial] = (),
+    thresholds: Limits = (),
+    longest_delay: Duration = 0.02,
+    columns: ColumnsLike | None = None,
+    plugins: Plugins = (),
+    progress: Report | None = None,
+) -> Finding[Validation]:
+    """Compare a parameter set with recordings, channel by channel.
+
+    The model is run on the recorded command, supply pressure and external torque; residuals are measured - model.
+    Without thresholds, an RMS error may be 3 % of full range, or less if that is over half of the variance of the
+    signal, in addition to noise and the usual zero error of the sensor. A cause of the residual is named in any case.
+
+    Arguments:
+        parameter_set: name of a parameter set, or a .toml file
+        recordings: a .csv or .nc file, or a result folder; several may be given
+        valve: valve of the parameter set; default: its default valve
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        motion: free: the model moves the vane; measured: the vane follows the recorded angle; locked: the vane stays at
+            its initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
+        volume: no vane: the valve fills and vents chamber 1 of this fixed volume, for example '60 cm^3'; pressure_1 is
+            compared
+        initial: initial value of a channel that was not recorded, for example 'pressure_2=0 psi_g'
+        thresholds: maximum RMS error, as a fraction of full range or with a unit: 5%, angle=10%, 'pressure_1=3.7
+            psi_d'; default: 3%, and half of the variance of the signal is explained
+        longest_delay: maximum delay of the measurement to estimate; default '20 ms', '0 s' for none
+        columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may
+            contain it
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is a Validation with ``passes`` and, in ``recordings``, one ``RecordingAgreement``
+        each: ``measured`` and ``model`` are recordings, their channels of shape (samples,) in SI; ``channels`` has
+        RMS error, bias, largest error and delay [s] of each channel in its SI unit (rad, Pa, N m)
+
+    Raises:
+        DataError: a recording that cannot be used
+        ParameterError: a parameter set that cannot be used
+        SimulationError: a model that cannot be run on the recording
+
+    >>> import ppafo
+    >>> folder = ppafo.simulate("step-response").save("bench")
+    >>> print(ppafo.validate("ppafo2011", [folder], motion="leg", overrides=["supply.pressure=55 psi_g"]).said[0])
+    ppafo2011 agrees with 1 recording: every RMS error is within its limit; nothing but noise is left
+    """
+    name_plugins(plugins)
+    from ppafo.parameters import load_device
+    from ppafo.validation.agreement import compare_recording
+    from ppafo.validation.causes import causes_of
+    from ppafo.validation.measured import read_all
+    from ppafo.validation.settings import replay_settings
+
+    report = progress or report_nothing
+    device = load_device(parameter_set, overrides=overrides, valve=valve)
+    device.check_pressurised("a validation, which counts in parts of the gauge supply pressure,")
+    settings = replay_settings(device, motion, volume, initial, thresholds, longest_delay)
+    read, agreements = read_all(recordings, device, columns), []
+    for measured in read:
+        report(Progress(f"replaying {measured.file}"))
+        agreements.append(compare_recording(measured, device, settings))
+    causes = causes_of(read, agreements, device, settings, report)
+    return _finding_of(Validation(str(parameter_set), device, tuple(overrides), settings, tuple(agreements), causes))
+
+
+def verdict(validation: Validation) -> str:
+    """Return a sentence on the agreement of the set, with the largest deviation and its probable cause, if any."""
+    causes = validation.causes
+    passes = validation.passes
+    name = validation.device.name
+    pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
+    worst = max((channel for channel, _ in pairs), key=lambda channel: channel.in_noise)
+    if causes.is_noise:
+        texts = ["nothing but noise is left"]
+    else:
+        share = f"{100 * worst.fraction:.2g} % of full range"
+        texts = [f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"]
+        if not passes and causes.found is None and any(row.motion == "free" for row in validation.recordings):
+            # A cause is searched with the motion as it was said, which is wrong for a device that something else moved.
+            motion = argument_text("motion", "leg")
+            texts.append(f"if the device was on a leg, locked or driven, give {motion}, locked or measured first")
+        texts.append(_why(causes, worst.in_noise, passes))
+    texts.append(_removed_delay(validation))
+    explanation = "; ".join(filter(None, texts))
+    if not passes:
+        failed = ", ".join(
+            f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
+            for channel, agreement in pairs
+            if not channel.passes
+        )
+        return f"{name} does not agree: {failed}; {explanation}"
+    wide = f" ({worst.channel}: {100 * worst.limit:.3g} %, which is wider than the noise and may hide a wrong number)"
+    limit = f"every RMS error is within its limit{'' if causes.is_noise else wide}"
+    return f"{name} agrees with {count_of(len(validation.recordings), 'recording')}: {limit}; {explanation}"
+
+
+def _why(causes: Diagnosis, without: float, passes: bool) -> str:
+    """Return the cause of a residual in words, or the nearest cause; empty if none was searched.
+
+    ``without`` is the largest error divided by noise [-] without any cause. A nearest cause is named if it at least
+    halves this error, or if it concerns wrong samples, which are detectable whatever else is wrong.
+    """
+    if causes.found is not None:
+        # What is beyond a limit is more than usual, of whatever kind it is.
+        said = f"{causes.found.in_words}{', as on any bench' if causes.found.is_usual and passes else ''}"
+        same = ", ".join(cause.name for cause in causes.found.same)
+        return f"{said} (indistinguishable with these recordings: {same})" if same else said
+    if not (causes.tried or causes.kinds):
+        return ""
+    said, nearest = "no single change explains the residual", causes.nearest
+    if nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without):
+        texts = [
+            f"{cause.in_words}, which leaves {_times(cause.left)} times the noise" for cause in (nearest, *nearest.same)
+        ]
+        said += f"; nearest: {', or '.join(texts)}"
+    return f"{said}{f'; tried: {causes.kinds}' if causes.kinds else ''}"
+
+
+def _removed_delay(validation: Validation) -> str:
+    """Return what was removed as common delay, if it is longer than usual of sensors: a valve may be late as well."""
+    from ppafo.simulation.recorded.usual_errors import PRESSURE_ERRORS
+
+    removed = max(agreement.delay.correction for agreement in validation.recordings)
+    if removed <= PRESSURE_ERRORS.delay:
+        return ""
+    delay = validation.device.valve.settings.get("delay")
+    of_valve = (
+        "" if delay is None else f", of the sensors or of the valve (valve.delay = {1.0e3 * (delay + removed):.3g} ms)"
+    )
+    return f"a delay of {1.0e3 * removed:.3g} ms was removed{of_valve}"
+
+
+def _times(size: float) -> str:
+    """Return a multiple of the noise as text with two digits and without a power of ten."""
+    return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
+
+
+@in_units(lambda validation: validation.device.shown)
+def _finding_of(validation: Validation) -> Finding[Validation]:
+    """Return a validation as a finding; passed if every error is within its limit."""
+    from ppafo.report.finding import Finding, Section, facts
+    from ppafo.storage.comma_separated import marked_csv_bytes
+
+    # Stems of the written files, numbered if recordings have one name.
+    stems = [_UNUSUAL.sub("-", Path(row.file).stem).strip("-.") or "recording" for row in validation.recordings]
+    names = [
+        f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
+    ]
+    pairs = list(zip(names, validation.recordings, strict=True))
+    kinds = {agreement.measured.kind for agreement in validation.recordings}
+    said, unmeasured = [verdict(validation)], sorted(kinds - {"measured"})
+    # The verdict must not be read without these.
+    if unmeasured:
+        said.append(
+            f"Not everything here was measured: {', '.join(KIND_WORDS[kind] for kind in unmeasured)}. Agreement with "
+            "such a recording shows how well two models agree, not how well the model agrees with a device."
+        )
+    method = (
+        f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
+        "the state of its first samples. A residual is measured - model. Percentages are of the full range: the "
+        "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
+        "common delay was removed before the errors were computed."
+    )
+    hashes = [(recording.file, f"sha256 {recording.sha256}") for recording in validation.recordings if recording.sha256]
+    return Finding(
+        name="validate",
+        kicker="Validation of a parameter set",
+        title=f"{validation.device.name} against {count_of(len(validation.recordings), 'recording')}",
+        said=said,
+        parts=(
+            Section(said=[method], is_detail=True),
+            *(_part(name, agreement) for name, agreement in pairs),
+            Section("Files" if hashes else "", facts(hashes), is_detail=True),
+        ),
+        found=validation,
+        passed=validation.passes,
+        kind=next(iter(kinds)) if len(kinds) == 1 else "measured",
+        overrides=validation.overrides,
+        files={
+            f"{name}-replayed.csv": partial(marked_csv_bytes, agreement.model.resample(agreement.measured.time))
+            for name, agreement in pairs
+        },
+    )
+
+
+def _part(name: str, agreement: RecordingAgreement) -> Section:
+    """Return the section of one recording: table of errors, and panels. ``name`` is the stem of its files."""
+    from ppafo.report.display_units import display_value
+    from ppafo.report.finding import Section, columns_of
+
+    def number(value: float) -> str:
+        return "0" if abs(value) < _WRITTEN_AS_ZERO else f"{value:.3g}"
+
+    def cells(channel: ChannelAgreement) -> tuple[str, ...]:
+        kind = _kind_of(channel)
+        rms, variation, bias, largest = (
+            f"{number(display_value(value, kind.quantity))} {kind.shown_unit}"
+            for value in (channel.rms, channel.variation, channel.bias, channel.largest)
+        )
+        shares = [f"{number(100 * share)} %" for share in (channel.fraction, channel.limit)]
+        said = "pass" if channel.passes else "FAIL"
+        at = f"{channel.largest_time:.4g} s"
+        return channel.channel, rms, number(channel.in_noise), variation, *shares, bias, largest, at, said
+
+    measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
+    delay = f"{1.0e3 * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
+    replayed = (
+        f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
+        f"{', '.join(agreement.inputs)}; delay of the measurement: {delay}"
+    )
+    across = 1 if len(agreement.channels) == 1 else 2
+    return Section(
+        f"{agreement.file} ({kind})",
+        columns_of(_HEAD, map(cells, agreement.channels)),
+        [replayed],
+        remarks=[f"note: {remark}" for remark in agreement.remarks],
+        panels=partial(_panels, agreement, across),
+        name=f"{name}-agreement",
+        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: the residual, measured - "
+        "model, the limit of its RMS value dashed where it is in range.",
+        across=across,
+        size=(6.0 / across, 1.9),
+    )
+
+
+def _panels(agreement: RecordingAgreement, across: int) -> list[Panel]:
+    """Return the panels of a recording in rows of ``across`` channels: samples with the model, and residuals below."""
+    import numpy as np
+
+    from ppafo.report.kind import TIME, Kind
+    from ppafo.report.panels import Panel
+    from ppafo.report.residuals import FittedCurve, course_panels
+    from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
+    from ppafo.validation.agreement import measured_values
+    from ppafo.validation.settings import COMPARED, PRESSURE_1, PRESSURE_2
+
+    measured, model, looks = agreement.measured, agreement.model, {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
+    time, scale = (Kind("Time", "ms"), 1.0e3) if measured.duration < _SHORT else (TIME, 1.0)
+    rows: list[list[Panel]] = []
+    for index, channel in enumerate(agreement.channels):
+        name, quantity = channel.channel, COMPARED[channel.channel]
+        samples, limit = measured_values(measured, name), channel.limit * channel.full_range
+        assert samples is not None, "a compared channel was measured"
+        curve = FittedCurve(
+            time=time,
+            level=Kind(quantity.title, "", "pressure" if name in looks else quantity.quantity),
+            change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", quantity.quantity),
+            times=scale * measured.time,
+            samples=samples,
+            # The measurement is late by the delay, so the model is read that much earlier.
+            model=np.interp(measured.time - agreement.delay.correction, model.time, model[name]),
+            names=("", "") if index else (KIND_WORDS[measured.kind], "model on the recorded inputs"),
+            colour=looks.get(name, ACTUAL).colour,
+        )
+        is_near = float(np.abs(curve.model - samples).max()) >= _NEAR_LIMIT * limit
+        upper, lower = course_panels(curve, "dots", "" if index else "figure", (-limit, limit) if is_near else ())
+        if index % across:
+            rows[-2].append(upper)
+            rows[-1].append(lower)
+        else:
+            rows += [[upper], [lower]]
+    if len(rows[-1]) < across:
+        # An odd number of channels leaves one place in the last row empty.
+        rows[-2].append(Panel(TIME, TIME, ()))
+        rows[-1].append(Panel(TIME, TIME, (), tall=0.5))
+    return [panel for row in rows for panel in row]
