@@ -82,7 +82,7 @@ def badness(part: PartSums, course: ReferenceSummary) -> float:
     """Squared ratio of the largest number of a part to its limit, by which the worst of the earlier parts is chosen."""
     way, taken = max(course.largest, _TINY), max(part.taken, 1.0)
     lag_squares, share = part.lag_squares / taken, LARGEST_SHARE * way
-    allowed = share * share + 2.0 * share * part.lag_total / taken + lag_squares
+    allowed = max(share * share + 2.0 * share * part.lag_total / taken + lag_squares, _TINY)
     returns = min(RETURNING * (1.0 - abs(part.last - part.first) / max(part.path, _TINY)), 1.0)
     quickness = part.path / (SLOW_RATE * way * taken * course.interval)
     weight = 1.0 if part.rests > 0.0 else max(returns, 1.0 / max(quickness * quickness, 1.0))

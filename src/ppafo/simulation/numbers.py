@@ -194,15 +194,15 @@ def _moved(scenario: Scenario, replaced: Mapping[str, Any]) -> tuple[dict[str, A
     if changed is not scenario:
         declared = scenario.motion.motion_kind.quantities(scenario)
         anew = default_links(changed, [declared[path] for path in scenario.links if path in declared])
-    return resolved(scenario.graph, replaced, _Numbers(scenario), anew), changed, anew
+    return resolved(scenario.graph, replaced, _ScenarioNumbers(scenario), anew), changed, anew
 
 
 def links_that_hold(scenario: Scenario) -> Graph:
     """Return the links of a scenario that still apply: without numbers changed since it was loaded."""
-    return holding(scenario.graph, _Numbers(scenario))
+    return holding(scenario.graph, _ScenarioNumbers(scenario))
 
 
-class _Numbers(dict[str, Any]):
+class _ScenarioNumbers(dict[str, Any]):
     """Numbers of a scenario by path, each read when it is asked for."""
 
     def __init__(self, scenario: Scenario) -> None:

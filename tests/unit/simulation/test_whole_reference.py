@@ -44,6 +44,7 @@ TRIANGLES = table((0.0, 0.0), (0.2, 3.0), (0.4, 0.5), (0.6, 3.5), (0.8, 0.0))
         (PULSE, ["valve.area=0.002 mm^2"], "the torque loop does not move: 0.000"),
         (TRAPEZOID, FOLLOWING, "from 0.4 s to 1 s the torque stays 4 N m below its reference (0.45 N m allowed)"),
         (TRIANGLES, FOLLOWING, ""),
+        (table((0.0, 0.0), (0.5, 0.0)), FOLLOWING, ""),
         (TRIANGLES, ["valve.area=0.002 mm^2"], "the torque loop does not move: 0.000"),
         (
             TRIANGLES,
