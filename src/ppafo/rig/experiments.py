@@ -29,7 +29,7 @@ from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.scenario import LARGEST_SEED, UNITS, Scenario, vane_motion
 from ppafo.simulation.simulate import simulate
 from ppafo.version import __version__
-from ppafo.wording import known_names, one_line
+from ppafo.wording import argument_text, known_names, one_line
 
 NOTICE = "synthetic: made by the simulated test bench of ppafo in place of a measurement"
 """Notice in the metadata of every recording of the simulated bench."""
@@ -205,6 +205,10 @@ def record(
     overrides = tuple(overrides)
     of_preset = [override for override in overrides if override.strip().startswith(PREFIX)]
     bench = load_preset(preset, of_preset)
+    for override in read_overrides(overrides):
+        if override.typed in ("device.set", "device.valve"):
+            name = override.typed.removeprefix("device.").replace("set", "device")
+            raise ParameterError(f"override '{override}': the bench takes it as {argument_text(name)}")
     kind = load_parameter_set(device).actuator_kind
     if kind != VANE:
         raise ParameterError(

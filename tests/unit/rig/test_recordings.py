@@ -285,6 +285,14 @@ def test_an_empty_preset_points_to_the_schema(tmp_path: Path) -> None:
         load_preset(tmp_path / "mine.toml")
 
 
+@pytest.mark.parametrize(
+    ("override", "argument"), [("device.set=cylinder-lever", "device"), ("device.valve=x", "valve")]
+)
+def test_the_device_of_the_bench_is_an_argument_and_no_override(override: str, argument: str) -> None:
+    with pytest.raises(ParameterError, match=f"the bench takes it as {argument}$"):
+        record("step-response", overrides=[override])
+
+
 def test_what_the_user_sets_takes_the_place_of_what_the_preset_sets() -> None:
     made = record("step-response", overrides=["valve.dead_band=0.1", "run.step=1 ms", "run.duration=20 ms"])
     assert made.truth["device"]["valve"]["dead_band"] == 0.1
