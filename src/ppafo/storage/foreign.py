@@ -84,6 +84,12 @@ def read_trials(
                     else:
                         channels[name] = _channel(name, mapped, table, atmosphere, gas)
             raise_noted(faults)
+            falls = np.flatnonzero(np.diff(time) < 0.0) + 1
+            if columns.trial is None and falls.size and np.all(time[falls] < np.mean(time[:2])):
+                line = f"{table.noun} {table.rows[falls[0]]}"
+                raise DataError(
+                    f"{line}: the clock restarts, {falls.size + 1} trials; give trial: a number, list or 'all'"
+                )
             trials = {"": slice(None)} if columns.trial is None else _rows_of_trials(time, columns.trial)
         recordings = []
         for suffix_of_label, rows in trials.items():
