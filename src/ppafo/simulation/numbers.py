@@ -203,7 +203,7 @@ def links_that_hold(scenario: Scenario) -> Graph:
 
 
 class _ScenarioNumbers(dict[str, Any]):
-    """Numbers of a scenario by path, each read when it is asked for."""
+    """Numbers of a scenario by path, read on demand."""
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__()

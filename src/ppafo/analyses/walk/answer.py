@@ -116,6 +116,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
     mended = usage_text(reloaded(scenario, verdict.mended)) if verdict.mended else ""
+    remarks = (*person_remarks(scenario), _bottle_remark(worn), *_pressure_remarks(worn))
     assumed = [(assumption.path, assumption.note) for assumption in scenario.assumptions]
     return Finding(
         name="walk",
@@ -124,7 +125,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
         said=[sentence for sentence in said if sentence],
         parts=(
             Section(said=[sentence for sentence in set_up if sentence], is_detail=True),
-            Section(columns=comparison_table(comparison), remarks=_remarks(comparison)),
+            Section(columns=comparison_table(comparison), remarks=[remark for remark in remarks if remark]),
             *_bottle_parts(worn),
             Section("Command with the remedy" if mended else "", code=mended),
             Section("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
@@ -214,13 +215,6 @@ def _files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
     if worn.supply is not None:
         files["bottle.csv"] = partial(marked_csv_bytes, worn.supply.recording)
     return files
-
-
-def _remarks(comparison: WalkComparison) -> list[str]:
-    """Return remarks on wearer, bottle and pressures."""
-    worn = comparison.with_device
-    remarks = (*person_remarks(worn.scenario), _bottle_remark(worn), *_pressure_remarks(worn))
-    return [remark for remark in remarks if remark]
 
 
 def _bottle_remark(worn: WalkResult) -> str:

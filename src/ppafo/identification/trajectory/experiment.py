@@ -483,7 +483,7 @@ def tolerance_parameters(
         for path, (start, deviation) in _of_run(tolerances, experiment).items():
             if path not in free and deviation > 0.0:
                 parameters.append(_parameter(path, start, deviation, (experiment.label,)))
-    # What is fitted is moved already; a second number for it could not be told from the first.
+    # A fitted number takes up the error of its path: a tolerance beside it could not be told apart.
     given = {full_path(item.path, experiments[0].scenario) for item in fitted}
     for kind, prefix, limit_of in (
         ("zero", ZERO_OF, tolerances.zero_of),
