@@ -15,9 +15,9 @@ from ppafo.analyses.reproduce.question import reproduce as reproduce
 from ppafo.analyses.reproduce.solve import Reproduction as Reproduction
 from ppafo.analyses.sensitivity.question import sensitivity as sensitivity
 from ppafo.analyses.sets.audit import audit as audit
-from ppafo.analyses.sweep.answer import load_study_results as load_study_results
-from ppafo.analyses.sweep.results import StudyResults as StudyResults
-from ppafo.analyses.sweep.solve import sweep as sweep
+from ppafo.analyses.study_results import StudyResults as StudyResults
+from ppafo.analyses.study_results import load_study_results as load_study_results
+from ppafo.analyses.sweep import sweep as sweep
 from ppafo.analyses.tune.problem import list_tunings as list_tunings
 from ppafo.analyses.tune.problem import load_tuning as load_tuning
 from ppafo.analyses.tune.question import tune as tune

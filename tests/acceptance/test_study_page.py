@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.sweep.solve import sweep
+from ppafo.analyses.sweep import sweep
 from ppafo.studies.declaration import VARIED
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "study.md").read_text(encoding="utf-8")

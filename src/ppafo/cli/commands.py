@@ -13,7 +13,7 @@ from ppafo.wording import known_names
 _ANALYSES, _BENCH, _DEVICE = "ppafo.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
 _EXPORTS, _WALKING = "ppafo.cli.verbs.exports", "ppafo.cli.verbs.walking"
 _SETS, _GAITS = f"{_DEVICE}:sets_list", f"{_WALKING}:gait_list"
-_STUDIES = "ppafo.studies.loading:STUDY_FILES", "ppafo.analyses.sweep.solve:studies_of_the_package"
+_STUDIES = "ppafo.studies.loading:STUDY_FILES", "ppafo.analyses.study_results:studies_of_the_package"
 
 
 def _of_scenario(verb: str, first_line: str = "") -> Command:
@@ -62,7 +62,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     },
     "decide": {
         "sweep": Command(
-            f"{_ANALYSES}.sweep.question:sweep_into_folder",
+            f"{_ANALYSES}.sweep:sweep_into_folder",
             *_STUDIES,
             first_line="Run a study: many runs, one row each, resumable.",
         ),

@@ -12,7 +12,7 @@ from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_configuration, load_study
-from ppafo.studies.sampling import correlate, uniform_numbers, with_noise
+from ppafo.studies.sampling import Factor, correlate, uniform_numbers, with_noise
 from ppafo.studies.study import Configuration, RandomValue, SamplingPlan, Study, with_followers
 from ppafo.wording import known_names
 
@@ -44,9 +44,7 @@ class Uncertainty:
 
     def columns(self, uniform: Floats) -> Columns:
         """Return values [SI] (draws,) by path from uniform numbers in (0, 1), shape (draws, paths)."""
-        fractions = uniform if self.scores is None else correlate(uniform, self.scores)
-        values = {drawn.path: drawn.distribution.values(fractions[:, row]) for row, drawn in enumerate(self.drawn)}
-        return with_followers(values, self.same)
+        return with_followers(columns_of(self.drawn, self.scores, uniform), self.same)
 
     def random_columns(self, first: int, count: int, seed: int) -> Columns:
         """Return independent draws ``first`` to ``first + count - 1`` of the sequence given by ``seed``."""
@@ -77,6 +75,12 @@ class Uncertainty:
     def has_noise(self) -> bool:
         """True if each draw has its own seed of the sensor noise."""
         return NOISE_SEED in self.paths
+
+
+def columns_of(drawn: Sequence[RandomValue], scores: Factor | None, uniform: Floats) -> Columns:
+    """Return values [SI] (draws,) by path from uniform numbers in (0, 1), shape (draws, paths)."""
+    rows = np.ascontiguousarray((uniform if scores is None else correlate(uniform, scores)).T)
+    return {number.path: number.distribution.values(row) for number, row in zip(drawn, rows, strict=True)}
 
 
 def replicate_seed(seed: int, replicate: int) -> int:

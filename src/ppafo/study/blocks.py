@@ -5,7 +5,6 @@ fastest), and within a grid point draw by draw. A chunk never contains runs of t
 """
 
 import math
-from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,8 @@ from numpy.typing import NDArray
 
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.sampling import correlate, uniform_numbers
+from ppafo.studies.draws import columns_of
+from ppafo.studies.sampling import uniform_numbers
 from ppafo.studies.study import Configuration, Study, with_followers
 
 MAXIMUM_RUNS_OF_CHUNK = 65_536
@@ -46,7 +46,18 @@ class Chunk:
     runs: int
 
 
-def chunk_size(study: Study) -> int:
+def chunks_of(study: Study) -> list[Chunk]:
+    """Return the chunks of a study, as many for each configuration: the first ones short, each twice the one before."""
+    size, chunks, total = _full_size(study), list[Chunk](), study.runs_of_configuration
+    for configuration in range(len(study.configurations)):
+        first, runs = 0, size if study.runs_of_chunk is not None else min(size, _FIRST_RUNS_OF_CHUNK)
+        while first < total:
+            chunks.append(Chunk(len(chunks), configuration, first, min(runs, total - first)))
+            first, runs = first + runs, min(2 * runs, size)
+    return chunks
+
+
+def _full_size(study: Study) -> int:
     """Return the number of runs of a full chunk; it is smaller if traces are kept or the study has few long runs."""
     if study.runs_of_chunk is not None:
         return study.runs_of_chunk
@@ -74,27 +85,6 @@ def samples_of(study: Study, configuration: Configuration) -> int:
     return int(configuration.scenario.run.duration / study.outputs.every + 1.0e-9) + 1
 
 
-def _first_run(study: Study, index: int) -> int:
-    """Return the index of the first run of a chunk within its configuration: full chunks follow doubling ones."""
-    size = chunk_size(study)
-    first = size if study.runs_of_chunk is not None else min(size, _FIRST_RUNS_OF_CHUNK)
-    doublings = (math.ceil(size / first) - 1).bit_length()
-    return first * ((1 << min(index, doublings)) - 1) + size * max(0, index - doublings)
-
-
-def chunk_count(study: Study) -> int:
-    """Return the number of chunks of a study over all configurations, each with the same number."""
-    runs = study.runs_of_configuration
-    return len(study.configurations) * bisect_left(range(runs), runs, key=lambda index: _first_run(study, index))
-
-
-def chunk(study: Study, number: int) -> Chunk:
-    """Return a chunk by its number, counted over all configurations from 0."""
-    configuration, index = divmod(number, chunk_count(study) // len(study.configurations))
-    first, end = _first_run(study, index), _first_run(study, index + 1)
-    return Chunk(number, configuration, first, min(end, study.runs_of_configuration) - first)
-
-
 def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
     """Return values [SI] by varied path for ascending run indices, the same in every configuration."""
     point, draw = np.divmod(runs, study.sample.runs)
@@ -108,14 +98,11 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
         if study.sample.runs <= MAXIMUM_RUNS_OF_CHUNK:
             uniform = uniform_numbers(study.sample, dimensions, 0, study.sample.runs)[draw]
         else:
-            starts = np.flatnonzero(np.diff(draw, prepend=draw[0] - 2) != 1)
-            parts = np.split(draw, starts[1:])
+            parts = np.split(draw, np.flatnonzero(np.diff(draw) != 1) + 1)
             uniform = np.concatenate(
                 [uniform_numbers(study.sample, dimensions, int(part[0]), part.size) for part in parts]
             )
-        uniform = uniform if study.scores is None else correlate(uniform, study.scores)
-        rows = np.ascontiguousarray(uniform.T)
-        columns |= {number.path: number.distribution.values(row) for number, row in zip(study.drawn, rows, strict=True)}
+        columns |= columns_of(study.drawn, study.scores, uniform)
     return {path: columns[path] for path in study.paths}
 
 

@@ -1,24 +1,35 @@
-"""Results of a study in a folder: Parquet files of chunks, each with a note that contains its checksum.
+"""Results of a study in a folder: blocks of runs as Parquet files, each with a note, and documents with their hash.
 
-A chunk counts as finished once its note is written, after the chunk itself; a file that does not match its note is
-recomputed. Page checksums of Parquet miss some flipped bits; SHA-256 does not.
+A block is there when its file and its note are, and the note has the SHA-256 of the file, which unlike the checksums of
+Parquet misses no flipped bit. Each file is written under a temporary name, then renamed, the note after the block: a
+study that is killed at any moment resumes with what is there.
 """
 
+import contextlib
 import hashlib
-from collections.abc import Iterator, Sequence
+import json
+import shutil
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.documents.json_text import json_text
-from ppafo.engine.lanes import Count
+from ppafo.documents.json_text import json_document, json_text, plain
+from ppafo.documents.regular_file import read_regular_file
+from ppafo.documents.toml_text import quote
+from ppafo.engine.lanes import Count, write_source
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import scenario_document
+from ppafo.storage.files import LEFT_ASIDE, is_address, write_file
 from ppafo.storage.parquet import (
     TableColumn,
     encode_texts,
@@ -31,15 +42,21 @@ from ppafo.storage.parquet import (
 from ppafo.storage.result_folder import MANIFEST
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Study
-from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
-from ppafo.study.folder import StudyFolder
-from ppafo.study.manifest import STUDY_COPY, check_same_study, manifest, read_manifest
+from ppafo.study.blocks import Chunk, chunks_of, drawn_values, samples_of, varied_columns
+from ppafo.study.controller_document import DIGITS, controller_document
 from ppafo.study.runs import excess, unvaried, with_companions
-from ppafo.wording import argument_text, one_line
+from ppafo.version import __version__
+from ppafo.wording import argument_text
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+STUDY_COPY, FORMAT, SCHEMA_VERSION = "study.toml", "ppafo study results", 3
+_HASH = "sha256"
+_MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
+"""Largest document that is read [bytes]; documents of studies are far smaller."""
+_LONGEST_WRITING = 86400.0
+"""Age from which a temporary file counts as abandoned [s]."""
 _TRIED_RUNS = 8
 """Number of trial runs of each configuration before a study starts, to detect errors at once."""
 STATUSES = ("completed", "diverged", "refused")
@@ -50,202 +67,88 @@ OSCILLATES, FOLLOWS, ON_PURPOSE = "oscillates", "follows", "beyond_reach_on_purp
 _TEXT_COLUMNS = ("configuration", "status", "reason", "channel")
 ASKED_ABOVE = 10_000_000_000
 """Size [bytes] above which a study only starts with ``--yes``."""
-_FIXED_BYTES_OF_ROW, _BYTES_OF_NUMBER, _BYTES_OF_SAMPLE = 3, 8, 4
-"""Bytes of the texts of a row, each stored as an index into a list of texts, per number of a row, and per sample of a
-trace, which has single precision unless needed for bands."""
-_BYTES_OF_FILE = 12_000
-"""Overhead of a chunk file and its note [bytes]: names, units and meanings of the columns."""
+_FIXED_BYTES_OF_ROW, _BYTES_OF_NUMBER, _BYTES_OF_SAMPLE, _BYTES_OF_FILE = 3, 8, 4, 12_000
+"""Bytes of the texts of a row, each stored as an index into a list of texts, per number of a row, per sample of a trace
+(in single precision unless needed for bands), and of a chunk file and its note beside its rows."""
 
 
 @dataclass(frozen=True, slots=True)
-class FinishedChunk:
-    """Written chunk: chunk number, number of runs, and number of failed runs."""
+class StudyFolder:
+    """Folder of a study's results; file names are relative to ``path``, with ``/`` between folders."""
 
-    number: int
-    runs: int
-    failed: int
+    path: Path
 
+    def names(self) -> frozenset[str]:
+        """Return the names of all files but temporary ones; DataError if the path is a file."""
+        if self.path.exists() and not self.path.is_dir():
+            raise DataError(f"{self.path}: is a file; the results need a folder")
+        files = (path for path in self.path.rglob("*") if not path.is_dir() and LEFT_ASIDE not in path.name)
+        return frozenset(path.relative_to(self.path).as_posix() for path in files)
 
-@dataclass(frozen=True, slots=True)
-class StudyStore:
-    """Results of a study in a folder, written chunk by chunk."""
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file under a temporary name, then rename it."""
+        write_file(self.path / name, content)
 
-    study: Study
-    folder: StudyFolder
+    def write_document(self, name: str, document: Mapping[str, Any]) -> None:
+        """Write a JSON document with its own hash."""
+        self.write(name, f"{json_text({**document, _HASH: hash_of(document)})}\n".encode())
 
-    @classmethod
-    def claim(
-        cls, study: Study, folder: StudyFolder, agreed: bool, threads: int | None, report: Report
-    ) -> "StudyStore":
-        """Use a folder for a study; StudyError for results of another study or version, or too little disk space."""
-        names = folder.names()
-        if MANIFEST in names:
-            check_same_study(folder, read_manifest(folder), manifest(study))
-        elif names:
-            raise StudyError(
-                f"{folder.path}: is not empty and contains no study results (it has no {MANIFEST}); choose "
-                "another folder"
-            )
-        else:
-            check_room(study, folder, agreed)
-            report(Progress("preparing", 0, study.runs))
-            # A few runs of each configuration, spread evenly: a path that cannot vary is refused at once.
-            total = study.runs_of_configuration
-            runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))
-            for number in range(len(study.configurations)):
-                _result(study, Chunk(0, number, 0, runs.size), drawn_values(study, runs), threads)
-            folder.write(MANIFEST, f"{json_text(manifest(study))}\n".encode())
-        folder.tidy()
-        # After study.json, by which the folder is known to be ours.
-        if study.text and STUDY_COPY not in names:
-            folder.write(STUDY_COPY, study.text)
-        return cls(study, folder)
+    def document(self, name: str) -> dict[str, Any]:
+        """Return a JSON document without its hash; ValueError unless the hash is that of the document."""
+        document = json_document(read_regular_file(self.path / name, _MAXIMUM_BYTES_OF_DOCUMENT))
+        if not isinstance(document, dict) or document.pop(_HASH, None) != hash_of(document):
+            raise ValueError("does not have the content that was written")
+        return document
 
-    def finished(self) -> list[FinishedChunk]:
-        """Return the chunks whose files match their notes."""
-        names, chunks = self.folder.names(), []
-        for number in range(chunk_count(self.study)):
-            name = chunk_file(number)
-            if note_file(number) not in names:
-                continue
-            try:
-                note = self.folder.read_document(note_file(number))
-                finished = FinishedChunk(number, int(note["runs"]), int(note["failed"]))
-                with self.folder.open(name) as file:
-                    is_intact = hashlib.file_digest(file, "sha256").hexdigest() == note["sha256"][name]
-            except (OSError, ValueError, KeyError, TypeError, OverflowError):
-                continue
-            # An intact file of another size is of a study that was divided into other chunks.
-            if is_intact and finished.runs == chunk(self.study, number).runs:
-                chunks.append(finished)
-        return chunks
+    def write_chunk(self, number: int, failed: int, content: bytes) -> None:
+        """Write the file of a chunk, then the note that marks it as finished, with the number of its failed runs."""
+        self.write(chunk_file(number), content)
+        note = {"failed": failed, "file": hashlib.sha256(content).hexdigest()}
+        self.write_document(_note_file(number), note)
 
-    def write(self, finished: FinishedChunk, content: bytes) -> FinishedChunk:
-        """Write the file of a chunk, then the note that marks it as finished; return the chunk."""
-        name = chunk_file(finished.number)
-        self.folder.write(name, content)
-        checksums = {name: hashlib.sha256(content).hexdigest()}
-        note = {"runs": finished.runs, "failed": finished.failed, "sha256": checksums}
-        self.folder.write(note_file(finished.number), f"{json_text(note)}\n".encode())
-        return finished
+    def finished(self, chunks: Sequence[Chunk]) -> dict[int, int]:
+        """Return the number of failed runs of each chunk that is there, by chunk number."""
+        names, found = self.names(), {}
+        for number in (chunk.number for chunk in chunks if _note_file(chunk.number) in names):
+            with contextlib.suppress(OSError, ValueError):
+                note = self.document(_note_file(number))
+                with (self.path / chunk_file(number)).open("rb") as file:
+                    if hashlib.file_digest(file, "sha256").hexdigest() == note["file"]:
+                        found[number] = note["failed"]
+        return found
 
+    def tables(self, numbers: Sequence[int], columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
+        """Yield the tables of chunks by number; DataError for a missing or damaged chunk."""
+        return (self.table(chunk_file(number), columns) for number in numbers)
 
-def stored_rows(
-    folder: StudyFolder, numbers: Sequence[int], columns: Sequence[str] | None = None
-) -> "Iterator[pa.Table]":
-    """Yield the tables of chunks by number; DataError for a missing or damaged chunk."""
-    for number in numbers:
-        name = chunk_file(number)
+    def table(self, name: str, columns: Sequence[str] | None = None) -> "pa.Table":
+        """Return a table of the study, or some of its columns; DataError if missing, damaged, or of other types."""
+        import pyarrow as pa
+
         try:
-            table = read_parquet(folder.open(name), name, columns)
-            check_types(table, name)
-            yield table
+            table = read_parquet((self.path / name).open("rb"), name, columns)
+            for column in table.schema:
+                kind, is_fit = column.type, pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
+                if column.name.endswith(_OVER_TIME):
+                    # As many samples in each row, or they are no matrix.
+                    is_fit = pa.types.is_list(kind) and pa.types.is_floating(kind.value_type)
+                    lengths = table.column(column.name).combine_chunks().value_lengths() if is_fit else ()
+                    is_fit = is_fit and len(set(np.asarray(lengths).tolist())) <= 1
+                elif column.name in _TEXT_COLUMNS:
+                    is_fit = pa.types.is_string(kind) or pa.types.is_dictionary(kind)
+                if not is_fit:
+                    raise DataError(f"column '{column.name}' has the type {kind}")
         except (DataError, OSError) as error:
-            raise DataError(
-                f"{folder.path}/{name}: is missing or damaged; run the study again into this folder to recompute "
-                "this chunk"
-            ) from error
+            said = f"{self.path}/{name}: is missing or damaged; run the study again into this folder to recompute it"
+            raise DataError(said) from error
+        return table
 
 
-def check_types(table: "pa.Table", name: str) -> None:
-    """Raise DataError for a column that is neither text, nor number, nor a trace (lists of numbers of equal length)."""
-    import pyarrow as pa
-
-    for field in table.schema:
-        kind = field.type
-        if field.name.endswith(_OVER_TIME):
-            is_list = pa.types.is_list(kind) and pa.types.is_floating(kind.value_type)
-            # As many samples in each row, or they are no matrix.
-            lengths = table.column(field.name).combine_chunks().value_lengths().to_numpy() if is_list else np.arange(2)
-            fits = bool(np.all(lengths == lengths[:1]))
-        elif field.name in _TEXT_COLUMNS:
-            fits = pa.types.is_string(kind) or pa.types.is_dictionary(kind)
-        else:
-            fits = pa.types.is_floating(kind) or pa.types.is_integer(kind)
-        if not fits:
-            raise DataError(
-                f"{name}: column '{one_line(field.name)}' has the type {kind}, which a study never "
-                "writes; run the study again"
-            )
-
-
-def compute_chunk(
-    study: Study, number: int, threads: int | None, count: Count = report_nothing
-) -> tuple[FinishedChunk, bytes]:
-    """Compute a chunk; returns the content of its file: a row per run in SI units, nan for missing values."""
-    part = chunk(study, number)
-    values = drawn_values(study, np.arange(part.first, part.first + part.runs))
-    result = _result(study, part, values, threads, count)
-    columns = {**_columns_of_runs(study, part, values), **_columns_of_endings(study, part, values, result)}
-    outputs = study.outputs
-    for name in outputs.metrics:
-        metric = METRICS[name]
-        values_of_metric = result.metrics.get(name, np.full(part.runs, np.nan))
-        columns[name] = TableColumn(values_of_metric, stored_unit(metric.unit), metric.summary)
-        if name in result.errors:
-            unit = "Pa_d" if metric.unit == "Pa" else metric.unit
-            columns[f"{name}_error"] = TableColumn(result.errors[name], unit, f"estimated error of {name}")
-    samples = samples_of(study, study.configurations[part.configuration])
-    for channel in outputs.traces:
-        trace = result.traces[channel].T
-        trace = trace if trace.size else np.full((part.runs, samples), np.nan)
-        # What bands are read from is kept as it was computed, all else in single precision.
-        trace = trace.astype(np.float64 if channel in outputs.bands else np.float32)
-        summary = f"{CHANNELS[channel].summary}, every {outputs.every:g} s"
-        columns[trace_column(channel)] = TableColumn(lists_of(trace), stored_unit(CHANNELS[channel].unit), summary)
-    facts = {"study": study.name, "chunk": str(number), "rows": str(part.runs), "every": f"{study.outputs.every!r} s"}
-    content = parquet_bytes(table_of(columns, facts))
-    return FinishedChunk(number, part.runs, int(np.count_nonzero(result.status))), content
-
-
-def _columns_of_runs(study: Study, part: Chunk, values: dict[str, Floats]) -> dict[str, TableColumn]:
-    """Return the columns of run number, configuration and varied values; nan for a path fixed in the configuration."""
-    configuration = study.configurations[part.configuration]
-    first = part.configuration * study.runs_of_configuration + part.first
-    numbers = np.arange(first, first + part.runs, dtype=np.int64)
-    names = [each.name for each in study.configurations]
-    of_configuration = encode_texts(np.full(part.runs, part.configuration), names)
-    columns = {
-        "run": TableColumn(numbers, _PLAIN, "number of the run in the study"),
-        "configuration": TableColumn(of_configuration, _PLAIN, "name of the base scenario"),
-    }
-    # Gauge pressures as absolute ones, each from the atmosphere of its run.
-    in_effect = absolute(configuration.scenario, varied_columns(study, configuration, dict(values)), study.gauge)
-    for path, drawn in values.items():
-        varies = study.varies(path, configuration.name)
-        shown = in_effect.get(path, drawn) if varies else np.full(part.runs, np.nan)
-        columns[path] = TableColumn(shown, study.units[path], "varied value")
-    return columns
-
-
-def _columns_of_endings(
-    study: Study, part: Chunk, values: dict[str, Floats], result: EnsembleResult
-) -> dict[str, TableColumn]:
-    """Return the columns of status, time and reason of failure, oscillation, and tracking of the reference."""
-    configuration = study.configurations[part.configuration]
-    varied = varied_columns(study, configuration, dict(values))
-    judged = excess(result.metrics, configuration.scenario, varied, study.gauge)
-    return {
-        "status": TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended"),
-        "failure_time": TableColumn(result.failure_time, "s", "time at which the run diverged"),
-        "reason": TableColumn(texts_of_some(result.reasons, result.status.size), _PLAIN, "why the run has no metrics"),
-        OSCILLATES: TableColumn(
-            judged.oscillates, _PLAIN, "1 where the loop oscillates, empty where that is not known"
-        ),
-        FOLLOWS: TableColumn(
-            judged.follows, _PLAIN, "1 where the run follows its reference, 0 where not, empty where that is not known"
-        ),
-        ON_PURPOSE: TableColumn(
-            judged.excused.astype(float),
-            _PLAIN,
-            "1 where it does not, because the reference is beyond reach on purpose",
-        ),
-    }
-
-
-def trace_column(channel: str) -> str:
-    """Return the name of the column with the trace of a channel."""
-    return f"{channel}{_OVER_TIME}"
+def study_folder(path: str | Path) -> StudyFolder:
+    """Return the folder at a path; DataError for a remote address such as a URL."""
+    if is_address(path):
+        raise DataError(f"{path}: is a URL; give a folder on this computer for the results")
+    return StudyFolder(Path(path).absolute())
 
 
 def chunk_file(number: int) -> str:
@@ -253,38 +156,124 @@ def chunk_file(number: int) -> str:
     return f"runs/chunk-{number:07d}.parquet"
 
 
-def note_file(number: int) -> str:
-    """Return the file name of the note that marks a chunk as finished."""
+def _note_file(number: int) -> str:
     return f"finished/chunk-{number:07d}.json"
 
 
-def _result(
-    study: Study, part: Chunk, values: dict[str, Floats], threads: int | None, count: Count = report_nothing
-) -> EnsembleResult:
-    """Return the results of a chunk with varied ``values`` [SI] by path; StudyError for a path that cannot vary."""
-    configuration, outputs = study.configurations[part.configuration], study.outputs
-    columns = varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs)
-    every = outputs.every if outputs.traces else 0.0
-    with refused_as(StudyError, f"configuration '{configuration.name}'", ScenarioError):
-        return run_ensemble(
-            configuration.scenario,
-            columns,
-            with_companions(outputs.metrics, configuration.scenario),
-            outputs.traces,
-            every,
-            threads,
-            study.gauge,
-            outputs.errors,
-            count,
-        )
+def hash_of(document: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of a document."""
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
-def stored_unit(unit: str) -> str:
-    """Return the unit for tables: pressures are absolute (``Pa_a``) or differences (``Pa_d``), never plain Pa.
+def manifest(study: Study) -> dict[str, Any]:
+    """Return the content of ``study.json``: study, base scenarios in SI units, draws, chunks, units of columns.
 
-    Pa as the unit of a metric or channel is absolute.
+    Without time and computer: two studies with the same manifest have the same results.
     """
-    return "Pa_a" if unit == "Pa" else unit
+    scenarios, programs = dict[str, Any](), dict[str, str]()
+    for name, scenario in ((each.name, each.scenario) for each in study.configurations):
+        document, custom = scenario_document(scenario), scenario.controller.custom
+        # Without the file it came from, which may lie elsewhere the next time.
+        del document["origin"]
+        if custom is not None:
+            document["controller"]["custom"] = controller_document(custom)
+        scenarios[name] = document
+        # What it computes: a law or a valve from a module of the user is a name elsewhere. A line of comment says where
+        # a function stands, which may be elsewhere the next time too.
+        lines = write_source(plan_run(scenario).program, 1)[1].splitlines()
+        code = "\n".join(line for line in lines if not line.startswith("#"))
+        programs[name] = hashlib.sha256(code.encode()).hexdigest()[:DIGITS]
+    document = {
+        "format": FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        "ppafo": __version__,
+        "study": study.document,
+        "scenarios": scenarios,
+        # What is drawn may come from a parameter set, or have been changed in Python, and the file says neither.
+        "drawn": plain({key: getattr(study, key) for key in ("axes", "drawn", "same", "scores", "sample", "outputs")}),
+        "programs": programs,
+        **({"overrides": study.changes} if study.changes else {}),
+        "runs": study.runs,
+        "chunks": len(chunks_of(study)),
+        "shown": study.shown_for(study.configurations[0].scenario),
+        "varied": {path: {"unit": study.units[path], "given": study.given.get(path, "")} for path in study.paths},
+        "metrics": {
+            name: {"unit": METRICS[name].unit, "summary": METRICS[name].summary} for name in study.outputs.metrics
+        },
+    }
+    # As it will be read: tuples become lists.
+    return dict(json.loads(json.dumps(document)))
+
+
+def read_manifest(folder: StudyFolder) -> dict[str, Any]:
+    """Return the manifest of a folder of results; DataError if there is none, or it is not as it was written."""
+    try:
+        document = folder.document(MANIFEST)
+        if document["schema_version"] != SCHEMA_VERSION:
+            raise ValueError("has another layout")
+        return document
+    except OSError as error:
+        raise DataError(f"{folder.path}: contains no study results ({MANIFEST} cannot be read)") from error
+    except ValueError as error:
+        raise DataError(
+            f"{folder.path}: {MANIFEST} is damaged, or of another version of ppafo; run the study into another folder"
+        ) from error
+
+
+def claim(
+    study: Study, folder: StudyFolder, agreed: bool, threads: int | None, report: Report
+) -> tuple[list[Chunk], dict[int, int]]:
+    """Use a folder for a study; returns its chunks, and the failed runs of each that is there.
+
+    Raises StudyError for results of another study or version, and for too little disk space.
+    """
+    names, asked, chunks = folder.names(), manifest(study), chunks_of(study)
+    if MANIFEST in names:
+        if difference := next(_differences("", read_manifest(folder), asked), ""):
+            raise StudyError(
+                f"{folder.path}: contains the results of another study: {difference}; undo the change or choose "
+                "another folder"
+            )
+    elif names:
+        raise StudyError(
+            f"{folder.path}: is not empty and contains no study results (it has no {MANIFEST}); choose another folder"
+        )
+    else:
+        _check_room(study, folder, agreed)
+        report(Progress("preparing", 0, study.runs))
+        # A few runs of each configuration, spread evenly: a path that cannot vary is refused at once.
+        total = study.runs_of_configuration
+        runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))
+        for number in range(len(study.configurations)):
+            _result(study, Chunk(0, number, 0, runs.size), drawn_values(study, runs), threads)
+        folder.write_document(MANIFEST, asked)
+    # Abandoned by age and not by process: the folder may be shared by machines that cannot see each other's processes.
+    for path in folder.path.rglob(f"*{LEFT_ASIDE}*"):
+        with contextlib.suppress(OSError):
+            if path.lstat().st_mtime < time.time() - _LONGEST_WRITING:
+                path.unlink()
+    # After study.json, by which the folder is known to be ours.
+    if study.text and STUDY_COPY not in names:
+        folder.write(STUDY_COPY, study.text)
+    return chunks, folder.finished(chunks)
+
+
+def _differences(path: str, before: Any, now: Any) -> Iterator[str]:
+    """Yield a text for each key at which two documents differ."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        pairs = [(key, before.get(key), now.get(key)) for key in dict.fromkeys((*now, *before))]
+    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        pairs = [
+            (new.get("path", new.get("name", number)) if isinstance(new, dict) else number, old, new)
+            for number, (old, new) in enumerate(zip(before, now, strict=True), start=1)
+        ]
+    elif before != now:
+        yield f"{path} was {quote(before)} and is now {quote(now)}"
+        return
+    else:
+        return
+    for key, old, new in pairs:
+        yield from _differences(f"{path}.{key}" if path else key, old, new)
 
 
 def estimate_bytes(study: Study) -> int:
@@ -293,24 +282,108 @@ def estimate_bytes(study: Study) -> int:
     numbers = 2 + len(study.paths) + len(outputs.metrics) * (2 if outputs.errors else 1)
     traces = sum(_BYTES_OF_NUMBER if name in outputs.bands else _BYTES_OF_SAMPLE for name in outputs.traces)
     row = _FIXED_BYTES_OF_ROW + _BYTES_OF_NUMBER * numbers + samples * traces
-    return study.runs * row + chunk_count(study) * _BYTES_OF_FILE
+    return study.runs * row + len(chunks_of(study)) * _BYTES_OF_FILE
 
 
-def check_room(study: Study, folder: StudyFolder, agreed: bool) -> None:
+def free_bytes(path: Path) -> int:
+    """Return the free disk space [bytes] for a folder that may not exist yet."""
+    return shutil.disk_usage(next(each for each in (path, *path.parents) if each.exists())).free
+
+
+def _check_room(study: Study, folder: StudyFolder, agreed: bool) -> None:
     """Raise StudyError for a study that does not fit onto the disk, or is very large without ``--yes``."""
-    needed, free = estimate_bytes(study), folder.free_bytes()
-    size = f"{study.runs:,} runs of '{study.name}' need about {_bytes_text(needed)}"
+    needed, free = estimate_bytes(study), free_bytes(folder.path)
+    size = f"{folder.path}: {study.runs:,} runs of '{study.name}' need about {needed / 1e6:,.3g} MB"
     if needed > free:
-        raise StudyError(
-            f"{folder.path}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or trajectories"
-        )
+        raise StudyError(f"{size}, but only {free / 1e6:,.3g} MB are free: use fewer runs, metrics or trajectories")
     if needed > ASKED_ABOVE and not agreed:
-        raise StudyError(f"{folder.path}: {size}; give {argument_text('agreed', option='--yes')} to start the study")
+        raise StudyError(f"{size}; give {argument_text('agreed', option='--yes')} to start the study")
 
 
-def _bytes_text(size: int) -> str:
-    """Return a number of bytes as text, such as ``1.2 GB``."""
-    for unit, scale in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
-        if size >= scale:
-            return f"{size / scale:.3g} {unit}"
-    return f"{size / 1e3:.3g} kB"
+def compute_chunk(study: Study, part: Chunk, threads: int | None, count: Count = report_nothing) -> tuple[int, bytes]:
+    """Compute a chunk; returns the number of its failed runs and its file: a row per run in SI, nan for missing."""
+    configuration, outputs = study.configurations[part.configuration], study.outputs
+    values = drawn_values(study, np.arange(part.first, part.first + part.runs))
+    result = _result(study, part, values, threads, count)
+    varied = varied_columns(study, configuration, values)
+    judged = excess(result.metrics, configuration.scenario, varied, study.gauge)
+    missing, first = np.full(part.runs, np.nan), part.configuration * study.runs_of_configuration + part.first
+    names = [each.name for each in study.configurations]
+
+    def texts(codes: Any, known: Sequence[str], summary: str) -> TableColumn:
+        return TableColumn(encode_texts(codes, known), _PLAIN, summary)
+
+    columns = {
+        "run": TableColumn(
+            np.arange(first, first + part.runs, dtype=np.int64), _PLAIN, "number of the run in the study"
+        ),
+        "configuration": texts(np.full(part.runs, part.configuration), names, "name of the base scenario"),
+    }
+    # Gauge pressures as absolute ones, each from the atmosphere of its run.
+    in_effect = absolute(configuration.scenario, varied, study.gauge)
+    for path, drawn in values.items():
+        shown = in_effect.get(path, drawn) if study.varies(path, configuration.name) else missing
+        columns[path] = TableColumn(shown, study.units[path], "varied value")
+    not_known = "where not, empty where that is not known"
+    columns |= {
+        "status": texts(result.status, STATUSES, "how the run ended"),
+        "failure_time": TableColumn(result.failure_time, "s", "time at which the run diverged"),
+        "reason": TableColumn(texts_of_some(result.reasons, part.runs), _PLAIN, "why the run has no metrics"),
+        OSCILLATES: TableColumn(
+            judged.oscillates, _PLAIN, "1 where the loop oscillates, empty where that is not known"
+        ),
+        FOLLOWS: TableColumn(judged.follows, _PLAIN, f"1 where the run follows its reference, 0 {not_known}"),
+        ON_PURPOSE: TableColumn(
+            judged.excused.astype(float),
+            _PLAIN,
+            "1 where it does not, because the reference is beyond reach on purpose",
+        ),
+    }
+    for name in outputs.metrics:
+        unit, error = METRICS[name].unit, result.errors.get(name)
+        columns[name] = TableColumn(result.metrics.get(name, missing), stored_unit(unit), METRICS[name].summary)
+        if error is not None:
+            columns[f"{name}_error"] = TableColumn(
+                error, "Pa_d" if unit == "Pa" else unit, f"estimated error of {name}"
+            )
+    for channel in outputs.traces:
+        trace = result.traces[channel].T
+        trace = trace if trace.size else np.full((part.runs, samples_of(study, configuration)), np.nan)
+        # What bands are read from is kept as it was computed, all else in single precision.
+        trace = trace.astype(np.float64 if channel in outputs.bands else np.float32)
+        summary = f"{CHANNELS[channel].summary}, every {outputs.every:g} s"
+        columns[trace_column(channel)] = TableColumn(lists_of(trace), stored_unit(CHANNELS[channel].unit), summary)
+    facts = {"study": study.name, "chunk": str(part.number), "rows": str(part.runs), "every": f"{outputs.every!r} s"}
+    return int(np.count_nonzero(result.status)), parquet_bytes(table_of(columns, facts))
+
+
+def _result(
+    study: Study, part: Chunk, values: dict[str, Floats], threads: int | None, count: Count = report_nothing
+) -> EnsembleResult:
+    """Return the results of a chunk with varied ``values`` [SI] by path; StudyError for a path that cannot vary."""
+    configuration, outputs = study.configurations[part.configuration], study.outputs
+    with refused_as(StudyError, f"configuration '{configuration.name}'", ScenarioError):
+        return run_ensemble(
+            configuration.scenario,
+            varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs),
+            with_companions(outputs.metrics, configuration.scenario),
+            outputs.traces,
+            outputs.every if outputs.traces else 0.0,
+            threads,
+            study.gauge,
+            outputs.errors,
+            count,
+        )
+
+
+def trace_column(channel: str) -> str:
+    """Return the name of the column with the trace of a channel."""
+    return f"{channel}{_OVER_TIME}"
+
+
+def stored_unit(unit: str) -> str:
+    """Return the unit for tables: pressures are absolute (``Pa_a``) or differences (``Pa_d``), never plain Pa.
+
+    Pa as the unit of a metric or channel is absolute.
+    """
+    return "Pa_a" if unit == "Pa" else unit

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import ppafo
 from ppafo.errors import StudyError
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
@@ -45,6 +46,12 @@ def test_path_that_follows_another_has_its_values_in_every_run() -> None:
     values = varied_columns(loaded, loaded.configurations[0], drawn_values(loaded, np.arange(8)))
     assert len(set(values["actuator.dead_volume_1"])) == 8
     assert np.array_equal(values["actuator.dead_volume_2"], values["actuator.dead_volume_1"])
+
+
+def test_a_study_with_such_a_path_is_swept() -> None:
+    results = ppafo.sweep(STUDY, draws=2).found
+    assert results.varied == ("actuator.dead_volume_1",)
+    assert results.summary["completed"] == 2
 
 
 def test_path_follows_in_the_draws_of_analyses_too() -> None:

@@ -20,7 +20,7 @@ from ppafo.studies.distributions import (
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import cholesky_factor, permute, uniform_numbers
 from ppafo.studies.study import SamplingPlan
-from ppafo.study.blocks import chunk, chunk_count, drawn_values
+from ppafo.study.blocks import chunks_of, drawn_values
 
 SHARES = np.linspace(1e-6, 1.0 - 1e-6, 201)
 METHODS = ("random", "latin_hypercube", "sobol")
@@ -176,7 +176,7 @@ def test_correlations_are_those_of_the_normal_scores(small: Any, method: str) ->
 
 def test_chunks_hold_every_run_once_and_never_two_configurations(small: Any) -> None:
     study = load_study(small)
-    parts = [chunk(study, number) for number in range(chunk_count(study))]
+    parts = chunks_of(study)
     runs = [(part.configuration, run) for part in parts for run in range(part.first, part.first + part.runs)]
     assert runs == [(configuration, run) for configuration in range(2) for run in range(16)]
     assert [part.runs for part in parts] == [5, 5, 5, 1, 5, 5, 5, 1]

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from ppafo.studies.draws import study_of
-from ppafo.study.blocks import chunk, chunk_count
+from ppafo.study.blocks import chunks_of
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_chunks_double_from_a_short_one_up_to_the_full_size(
     ]
     small["sample"]["runs"] = runs
     study = study_of(small)
-    parts = [chunk(study, number) for number in range(chunk_count(study))]
+    parts = chunks_of(study)
     assert [part.runs for part in parts] == 2 * sizes
     assert [part.configuration for part in parts] == [0] * len(sizes) + [1] * len(sizes)
     assert [part.first for part in parts] == 2 * [sum(sizes[:number]) for number in range(len(sizes))]

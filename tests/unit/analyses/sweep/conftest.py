@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from ppafo.analyses.sweep.results import StudyResults
-from ppafo.analyses.sweep.solve import sweep
+from ppafo.analyses.study_results import StudyResults
+from ppafo.analyses.sweep import sweep
 
 
 @pytest.fixture(scope="session")

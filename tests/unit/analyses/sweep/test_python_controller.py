@@ -99,7 +99,7 @@ KIND = replace(ON_OFF, update=update)
 
 def test_a_law_that_was_edited_in_its_module_makes_another_study(tmp_path: Path) -> None:
     asked = f"""
-from ppafo.study.manifest import manifest
+from ppafo.study.store import manifest
 from ppafo.studies.loading import load_study
 document = {DOCUMENT!r}
 document["configurations"][0]["overrides"] += ["controller.kind=beside:KIND"]

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import ppafo
-from ppafo.analyses.sweep import solve as solve_module
 from ppafo.cli.main import main
+from ppafo.study import store
 
 STUDY = """
 schema_version = 1
@@ -87,7 +87,7 @@ def test_an_interruption_says_that_the_command_goes_on(
     def interrupted(*words: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(solve_module, "compute_chunk", interrupted)
+    monkeypatch.setattr(store, "compute_chunk", interrupted)
     assert swept(study, tmp_path / "out") == 130
     assert capsys.readouterr().err.endswith(
         "interrupted before the first chunk was finished; the same command starts the study again\n"

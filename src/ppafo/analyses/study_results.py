@@ -1,0 +1,642 @@
+"""Results of a study, read from its folder on demand: rows, statistics, report and figure.
+
+Statistics use the completed runs that have the metric; their number is stated with each. Mean, standard deviation and
+quantiles are exact; one column of one configuration is in memory at a time. The quantile of fraction q of n sorted
+values is interpolated linearly at position (n - 1) q: definition 7 of Hyndman and Fan (The American Statistician,
+1996). The standard deviation divides by n - 1.
+"""
+
+import hashlib
+import math
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from operator import methodcaller
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.arguments import checked
+from ppafo.errors import DataError, StudyError, UnitError, at_fault, refused_as
+from ppafo.metrics import METRICS
+from ppafo.report.finding import Finding, Section, columns_of, facts
+from ppafo.report.kind import TIME, YES_OR_NO, Kind, of_path, of_stored_metric
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.setting_names import label_of
+from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION, font_size
+from ppafo.signals.recording import CHANNELS
+from ppafo.simulation.numbers import NOISE_SEED
+from ppafo.storage.parquet import TableColumn, as_numpy, encode_texts, matrix_of, parquet_bytes, table_of
+from ppafo.studies.declaration import DEFAULT_SEED
+from ppafo.studies.distributions import Floats
+from ppafo.studies.loading import list_studies, load_study
+from ppafo.studies.study import Study
+from ppafo.study.blocks import MAXIMUM_RUNS_OF_CHUNK, samples_of
+from ppafo.study.runs import joined
+from ppafo.study.store import (
+    FOLLOWS,
+    ON_PURPOSE,
+    OSCILLATES,
+    STATUSES,
+    StudyFolder,
+    read_manifest,
+    stored_unit,
+    study_folder,
+    trace_column,
+)
+from ppafo.units import from_si
+from ppafo.units.shown import in_units, quantity_of_unit
+from ppafo.wording import known_names
+
+if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
+    import pyarrow as pa
+    from matplotlib.axes import Axes
+
+SUMMARY, BANDS = "summary.json", "bands.parquet"
+_EXAMPLES = 5
+"""Number of failed runs that the summary names."""
+MAXIMUM_IN_MEMORY = 16_000_000
+"""Largest number of samples of a channel in memory when quantile bands are computed."""
+COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
+"""Colours of the configurations in a figure, which has no more of them than that."""
+MOST_METRICS, MOST_COMPARED = 4, 2
+"""Largest number of metrics in a figure, and with a panel for each configuration: more would be too low to read."""
+MAXIMUM_DRAWN, _MAXIMUM_POINTS = 4_000_000, 3000
+"""Largest number of runs in a figure, spread evenly over all, and in a curve or in the points of a panel."""
+_COLUMNS, _PANEL, _COMPARED_PANEL = 2, (2.9, 2.4), (2.7, 2.3)
+"""Panels side by side in a figure; size of a panel [inches], and of one in a row that compares configurations."""
+_HISTOGRAM_BINS = 60
+"""Largest number of bins in the histogram of a metric."""
+_OPACITIES = (0.18, 0.32, 0.45)
+"""Opacities of the bands of one channel, from the outermost to the innermost."""
+_NAMED = 3
+"""Largest number of varied values named in the title of a figure."""
+_CAPTION = (
+    "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
+)
+_ENOUGH = 0.5
+"""Smallest fraction of a configuration's runs that must complete: with fewer, the median is that of the failed runs."""
+Columns = dict[str, np.ndarray[Any, Any]]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class StudyResults:
+    """Results of a study in a folder, from which rows are read on demand.
+
+    ``folder``: folder of the results
+    ``document``, ``summary``: content of ``study.json`` and of ``summary.json``
+    ``kept``: temporary folder, which exists as long as its results are in use; None for a folder of the user
+    """
+
+    folder: StudyFolder
+    document: Mapping[str, Any]
+    summary: Mapping[str, Any]
+    kept: tempfile.TemporaryDirectory[str] | None = None
+
+    def __repr__(self) -> str:
+        """Return name, number of runs, number of completed runs, and metrics."""
+        counted = ", ".join(f"{self.summary[key]:,} {key}" for key in STATUSES)
+        return (
+            f"StudyResults of '{self.name}' in {self.folder.path}\n  {self.document['runs']:,} runs: {counted}\n  "
+            f"varied: {', '.join(self.varied) or 'nothing'}\n  metrics: "
+            f"{', '.join(self.document['metrics']) or 'none'}"
+        )
+
+    @property
+    def name(self) -> str:
+        """Name of the study."""
+        return str(self.document["study"]["name"])
+
+    @property
+    def configurations(self) -> tuple[str, ...]:
+        """Names of the configurations of the study."""
+        return tuple(configuration["name"] for configuration in self.document["study"]["configurations"])
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Paths of the varied values of the study."""
+        return tuple(self.document["varied"])
+
+    @property
+    def metrics(self) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
+        """Statistics by configuration and metric: unit, count, mean, standard deviation, extremes and quantiles."""
+        metrics: Mapping[str, Mapping[str, Mapping[str, Any]]] = self.summary["configurations"]
+        return metrics
+
+    def table(self, columns: Sequence[str] | None = None) -> Columns:
+        """Return the rows of all runs, or some of their columns, as arrays by name; SI units, nan for missing values.
+
+        Channels over time are not part of the table; ``trajectories`` returns them.
+        """
+        # All chunks have the columns of the first.
+        known, traces = next(self.chunks()).column_names, {trace_column(name) for name in CHANNELS}
+        for name in columns or ():
+            if name not in known:
+                raise StudyError(f"the study has no column '{name}'{known_names(name, known)}")
+        columns = columns or [name for name in known if name not in traces]
+        return joined([as_numpy(part) for part in self.chunks(columns)])
+
+    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+        """Return the rows of all runs, like ``table``, in SI or in ``units``, such as ``{"supply.pressure": "bar_g"}``.
+
+        ``attrs["units"]`` has the unit of each column; answers such as ``follows`` are booleans. Gauge pressures are
+        relative to the standard atmosphere.
+        """
+        from pandas import DataFrame
+
+        frame = DataFrame(self.table())
+        schema = next(self.chunks(list(frame))).schema
+        shown = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in schema}
+        for name, unit in (units or {}).items():
+            if name not in shown:
+                raise StudyError(f"the table has no column '{name}'{known_names(name, shown)}")
+            with refused_as(UnitError, f"column '{name}' in '{unit}'", UnitError):
+                # Units are affine, so that two values decide all.
+                zero, one = (from_si(number, unit, shown[name]) for number in (0.0, 1.0))
+            frame[name] = zero + (one - zero) * frame[name]
+        # A truth that is not known stays empty.
+        frame = frame.astype({name: "boolean" for name in (OSCILLATES, FOLLOWS) if name in frame})
+        frame.attrs = {"title": self.name, "units": shown | dict(units or {})}
+        return frame
+
+    def by_configuration(self, column: str) -> Columns:
+        """Return a column of all runs, by name of the configuration.
+
+        Runs with the same index have the same draw in all configurations.
+        """
+        values = self.table([column])[column]
+        return dict(zip(self.configurations, np.split(values, len(self.configurations)), strict=True))
+
+    def trajectories(self, channel: str) -> np.ndarray[Any, Any]:
+        """Return a stored channel of all runs, shape (runs, samples), nan for failed runs and after a fall."""
+        outputs = self.document["study"]["outputs"]
+        stored = list(dict.fromkeys([*outputs.get("trajectories", ()), *outputs.get("bands", ())]))
+        if channel not in stored:
+            raise StudyError(f"the study stores no trajectories of '{channel}'{known_names(channel, stored)}")
+        return self._matrix(channel)
+
+    def bands(self) -> Columns:
+        """Return quantile bands over time as columns: configuration, channel, time, and a column for each quantile."""
+        table, path = self.folder.table(BANDS), self.folder.path / BANDS
+        if hashlib.sha256(path.read_bytes()).hexdigest() != self.summary[BANDS]:
+            raise DataError(f"{path}: is missing or damaged; run the study again into this folder")
+        return as_numpy(table)
+
+    def thin(self, column: str, maximum: int) -> Columns:
+        """Return a column by name of the configuration, thinned to every n-th run for about ``maximum`` runs in all."""
+        # An odd step: an even one would see one half of a grid whose last axis has two values.
+        step = -(-int(self.document["runs"]) // maximum) | 1
+        return {name: self.column(name, column)[::step] for name in self.configurations}
+
+    def column(self, configuration: str, column: str) -> np.ndarray[Any, Any]:
+        """Return a column of the runs of a configuration."""
+        return np.concatenate([table.column(column).to_numpy() for table in self.chunks([column], configuration)])
+
+    def known(self, configuration: str, column: str) -> Floats:
+        """Return the finite values of a column of the runs of a configuration."""
+        values = self.column(configuration, column)
+        return np.asarray(values[np.isfinite(values)])
+
+    def chunks(self, columns: Sequence[str] | None = None, configuration: str | None = None) -> "Iterator[pa.Table]":
+        """Yield some columns chunk by chunk, of one configuration or of all."""
+        # No chunk holds runs of two configurations, and each configuration has the same number of them.
+        numbers = range(self.document["chunks"])
+        if configuration is not None:
+            of_each = len(numbers) // len(self.configurations)
+            numbers = numbers[of_each * self.configurations.index(configuration) :][:of_each]
+        return self.folder.tables(numbers, columns)
+
+    def _matrix(self, channel: str, configuration: str | None = None, samples: slice = slice(None)) -> Floats:
+        column = trace_column(channel)
+        parts = self.chunks([column], configuration)
+        return np.concatenate([matrix_of(part.column(column))[:, samples] for part in parts])
+
+    def json_document(self) -> dict[str, Any]:
+        """Return the summary, and the path of the folder."""
+        return {**self.summary, "folder": str(self.folder.path)}
+
+
+@checked
+def load_study_results(folder: str | Path) -> Finding[StudyResults]:
+    """Return the finished results of a study in a folder; DataError if the folder contains none.
+
+    >>> import ppafo
+    >>> written = ppafo.sweep("torque-task-uncertainty", draws=4, out="four")
+    >>> ppafo.load_study_results("four").said[0]
+    'torque-task-uncertainty: 8 runs: 8 completed'
+    """
+    stored = study_folder(folder)
+    with at_fault("folder"):
+        document = read_manifest(stored)
+    try:
+        summary = stored.document(SUMMARY)
+    except (OSError, ValueError) as error:
+        raise DataError(
+            f"{stored.path}: the study is not finished (there is no complete {SUMMARY}); run it again to resume"
+        ) from error
+    return finding_of(StudyResults(stored, document, summary))
+
+
+def studies_of_the_package() -> list[dict[str, Any]]:
+    """Return name, number of runs and description of each study of the package."""
+    studies = [load_study(name) for name in list_studies()]
+    return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
+
+
+def summarise(study: Study, results: StudyResults) -> StudyResults:
+    """Return the results with their summary, after it and the quantile bands were written into the folder.
+
+    The summary has numbers of runs, first failed runs, and statistics of each metric.
+    """
+    completed, failures = dict.fromkeys(results.configurations, 0), list[dict[str, Any]]()
+    for name in completed:
+        for part in results.chunks(["run", "configuration", "status", "reason"], name):
+            rows = np.asarray(part.column("status").to_numpy() == STATUSES[0])
+            completed[name] += int(np.count_nonzero(rows))
+            if len(failures) < _EXAMPLES and not rows.all():
+                failures += part.filter(~rows).slice(0, _EXAMPLES - len(failures)).to_pylist()
+    # A run that diverged has a time at which it did; one that was refused never began.
+    failed = study.runs - sum(completed.values())
+    diverged = sum(results.known(name, "failure_time").size for name in completed)
+    follow = {name: results.known(name, FOLLOWS) for name in completed}
+    summary: dict[str, Any] = {
+        "study": study.name,
+        **({"overrides": list(study.changes)} if study.changes else {}),
+        "runs": study.runs,
+        "completed": study.runs - failed,
+        "diverged": diverged,
+        "refused": failed - diverged,
+        "completed_by_configuration": completed,
+        "oscillating": {name: int(np.count_nonzero(results.known(name, OSCILLATES))) for name in completed},
+        "not_following": {
+            name: int(np.count_nonzero(own == 0.0) - np.count_nonzero(results.known(name, ON_PURPOSE)))
+            for name, own in follow.items()
+        },
+        "without_verdict": {
+            each.name: completed[each.name] - follow[each.name].size
+            for each in study.configurations
+            if follow[each.name].size or each.scenario.follows_reference
+        },
+        "failures": failures,
+        "configurations": {
+            name: {
+                metric: {"unit": METRICS[metric].unit, "summary": METRICS[metric].summary}
+                | describe(results.known(name, metric), study.outputs.quantiles)
+                for metric in study.outputs.metrics
+            }
+            for name in completed
+        },
+    }
+    if study.outputs.bands:
+        bands = _bands_file(study, results)
+        results.folder.write(BANDS, bands)
+        summary[BANDS] = hashlib.sha256(bands).hexdigest()
+    # Last, because a study counts as finished once its summary is there.
+    results.folder.write_document(SUMMARY, summary)
+    return replace(results, summary=summary)
+
+
+def describe(values: Floats, fractions: Sequence[float]) -> dict[str, Any]:
+    """Return count, mean, standard deviation, extremes, and quantiles by fraction.
+
+    Without values there is only the count; the standard deviation needs two values.
+    """
+    count = values.size
+    if count == 0:
+        return {"count": 0}
+    # Squares about the mean, in a second pass: about 0 they would cancel where the spread is small.
+    blocks = np.split(values, range(MAXIMUM_RUNS_OF_CHUNK, count, MAXIMUM_RUNS_OF_CHUNK))
+    mean = math.fsum(float(np.sum(block)) for block in blocks) / count
+    squares = math.fsum(float(np.sum((block - mean) ** 2)) for block in blocks)
+    levels = np.quantile(values, fractions, method="linear").tolist()
+    return {
+        "count": count,
+        "mean": mean,
+        **({"sd": math.sqrt(squares / (count - 1))} if count > 1 else {}),
+        "minimum": float(values.min()),
+        "maximum": float(values.max()),
+        "quantiles": dict(zip((f"{fraction:g}" for fraction in fractions), levels, strict=True)),
+    }
+
+
+def _bands_file(study: Study, results: StudyResults) -> bytes:
+    """Return the content of ``bands.parquet``: exact quantiles over the runs at each time."""
+    outputs, parts = study.outputs, list[Columns]()
+    # Samples are read in blocks that fit into the memory for all runs.
+    at_once = max(1, MAXIMUM_IN_MEMORY // study.runs_of_configuration)
+    for number, configuration in enumerate(study.configurations):
+        samples = samples_of(study, configuration)
+        for row, channel in enumerate(outputs.bands):
+            counts, levels = [], []
+            for start in range(0, samples, at_once):
+                values = results._matrix(channel, configuration.name, slice(start, start + at_once))
+                counts.append(np.count_nonzero(np.isfinite(values), axis=0))
+                levels.append(sorted_quantiles(np.sort(values, axis=0), counts[-1], outputs.quantiles))
+            quantiles = zip(outputs.quantiles, np.concatenate(levels, axis=1), strict=True)
+            parts.append(
+                {
+                    "configuration": np.full(samples, number),
+                    "channel": np.full(samples, row),
+                    "time": outputs.every * np.arange(samples),
+                    "runs": np.concatenate(counts),
+                    **{f"q{fraction:g}": level for fraction, level in quantiles},
+                }
+            )
+    rows, units = joined(parts), {stored_unit(CHANNELS[name].unit) for name in outputs.bands}
+    unit = units.pop() if len(units) == 1 else "SI unit of the channel"
+    names = encode_texts(rows.pop("configuration"), results.configurations)
+    columns = {
+        "configuration": TableColumn(names, "-", "name of the base scenario"),
+        "channel": TableColumn(encode_texts(rows.pop("channel"), outputs.bands), "-", "name of the channel"),
+        "time": TableColumn(rows.pop("time"), "s", "time since the start"),
+        "runs": TableColumn(rows.pop("runs"), "-", "completed runs, without a fall so far"),
+        **{name: TableColumn(values, unit, "quantile over runs") for name, values in rows.items()},
+    }
+    return parquet_bytes(table_of(columns, {"study": study.name}))
+
+
+def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequence[float]) -> Floats:
+    """Return quantiles (fractions, columns) of the first ``counts`` values of sorted columns; nan for empty ones."""
+    places = np.maximum(counts - 1, 0) * np.asarray(fractions)[:, None]
+    low, columns = places.astype(np.int64), np.arange(counts.size)
+    below, above = ordered[low, columns], ordered[np.minimum(low + 1, np.maximum(counts - 1, 0)), columns]
+    return np.asarray(below + (places - low) * (above - below), dtype=np.float64)
+
+
+@in_units(lambda results: results.document["shown"])
+def finding_of(results: StudyResults) -> Finding[StudyResults]:
+    """Return the results of a study as a finding; passed if enough runs of each configuration completed."""
+    document, summary, study = results.document, results.summary, results.document["study"]
+    runs, completed = document["runs"] // len(results.configurations), summary["completed_by_configuration"]
+    ended = ", ".join(f"{summary[key]:,} {key}" for key in STATUSES if summary[key])
+    said = [f"{results.name}: {document['runs']:,} runs: {ended}"]
+    failures = [f"run {each['run']} ({each['configuration']}): {each['reason']}" for each in summary["failures"]]
+    if summary["failures"]:
+        first, failed = summary["failures"][0], document["runs"] - summary["completed"]
+        said.append(
+            f"{failed:,} of {document['runs']:,} runs failed and have no metrics; the first is run {first['run']}: "
+            f"{first['reason']}"
+        )
+    # Where some runs have a verdict, 0 is news too.
+    flags = (
+        ("oscillating", "the loop oscillates (column 'oscillates')"),
+        ("not_following", "the reference is not followed (column 'follows')"),
+        ("without_verdict", "it is not known whether the reference is followed (column 'follows' is empty)"),
+    )
+    for key, words in flags:
+        for name, whole in completed.items():
+            is_news = key == "not_following" and summary["without_verdict"].get(name, whole) < whole
+            if (count := summary[key].get(name, 0)) or is_news:
+                said.append(f"{name}: in {count:,} of {whole:,} runs ({100.0 * count / max(whole, 1):.3g} %) {words}")
+    useless = [name for name, count in completed.items() if count < _ENOUGH * runs]
+    said += [f"{name}: most runs failed: the statistics of the others do not describe the study" for name in useless]
+    rows = [
+        (
+            number["path"],
+            number["kind"],
+            ", ".join(
+                f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")
+            ),
+        )
+        for number in study.get("vary", ())
+    ]
+    sampling = [
+        f"Correlation of {pair['between'][0]} with {pair['between'][1]}: {pair['coefficient']}, of their normal scores."
+        for pair in study.get("correlations", ())
+    ]
+    if sample := study.get("sample"):
+        method, seed = sample["method"].replace("_", " "), sample.get("seed", DEFAULT_SEED)
+        sampling.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
+    assumed: dict[tuple[str, str, str], list[str]] = {}
+    for name, scenario in document["scenarios"].items():
+        for number in scenario["assumptions"]:
+            assumed.setdefault((number["path"], number["value"], number["note"]), []).append(name)
+    assumptions = [(*assumption, ", ".join(names)) for assumption, names in assumed.items()]
+    files = (("rows of all runs", "runs/*.parquet"), ("summary", SUMMARY), ("study", "study.json"))
+    return Finding(
+        name="sweep",
+        kicker="Study",
+        title=results.name,
+        said=said,
+        parts=(
+            _figure(results, [" ".join(study["description"].split())] if study.get("description") else [], failures),
+            *(_metrics(results, name) for name in results.configurations),
+            Section("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True),
+            Section(said=sampling, is_detail=True),
+            Section(
+                "What the base scenarios assume" if assumptions else "",
+                columns_of(("value", "", "why", "in"), assumptions),
+                left=4,
+                is_detail=True,
+            ),
+            Section("Files", facts(files), is_detail=True),
+        ),
+        found=results,
+        passed=not useless,
+        overrides=document.get("overrides", ()),
+    )
+
+
+def _metrics(results: StudyResults, name: str) -> Section:
+    """Return the table of a configuration's metrics: number of runs, mean, standard deviation and quantiles."""
+    described = [each for own in results.metrics.values() for each in own.values() if each["count"]]
+    fractions = list(described[0]["quantiles"]) if described else []
+    head = ("metric", "unit", "runs", "mean", "sd", *(f"{100 * float(fraction):g} %" for fraction in fractions))
+    rows = []
+    for metric, own in results.metrics[name].items():
+        kind = _kind(results, metric)
+        cells = [metric, kind.shown_unit, f"{own['count']:,}"]
+        if own["count"]:
+            deviation = kind.change_number(own["sd"]) if "sd" in own else ""
+            cells += [kind.number(own["mean"]), deviation, *map(kind.number, own["quantiles"].values())]
+        rows.append([*cells, *[""] * (len(head) - len(cells))])
+    completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
+    return Section(columns=columns_of(head, rows), said=[completed], left=2)
+
+
+def _kind(results: StudyResults, name: str) -> Kind:
+    """Return the kind of a metric or varied path from its stored unit, also for a metric that no longer exists."""
+    if name == FOLLOWS:
+        # A column of every study, not a requested metric.
+        return Kind(f"Follows its reference{YES_OR_NO}")
+    if name in results.document["metrics"]:
+        return of_stored_metric(name, results.document["metrics"][name]["unit"])
+    varied = results.document["varied"][name]
+    return of_path(name, varied["unit"].removeprefix("-"), given=varied["given"])
+
+
+def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Section:
+    """Return the figure of a study: panels of the metrics, and bands over time.
+
+    A grid of two axes is drawn as maps, two drawn values as coloured points, all else as one panel for each metric.
+    """
+    study, names = results.document["study"], results.configurations[: len(COLOURS)]
+    # A metric that no run has would be a hole in the figure, unless no metric has a value.
+    with_values = [
+        metric
+        for metric in results.document["metrics"]
+        if any(own[metric]["count"] for own in results.metrics.values())
+    ]
+    chosen: dict[str, str] = {}
+    for metric in with_values:
+        rows = [own[metric] for own in results.metrics.values() if own[metric]["count"]]
+        # Nothing is shown by one whose displayed digits are the same in all runs, or that equals another.
+        if len({_kind(results, metric).text(row[end]) for row in rows for end in ("minimum", "maximum")}) > 1:
+            chosen.setdefault(str(rows), metric)
+    differing = list(chosen.values()) or with_values[:1] or list(results.document["metrics"])
+    # The value of a seed has no meaning.
+    varied = [path for path in results.varied if path != NOISE_SEED]
+    grid = [number["path"] for number in study.get("vary", ()) if number["kind"] in ("grid", "list")]
+    # Over two paths each configuration has a panel of each metric, a map or points; else all share one panel.
+    is_mapped = 2 in (len(grid), len(varied))
+    is_compared = is_mapped and len(names) > 1
+    most = MOST_COMPARED if is_compared else MOST_METRICS
+    # Metrics of a part of the run, such as rms_error_ramp, come after those of the whole run.
+    of_part = {metric for metric in differing for whole in differing if metric.startswith(f"{whole}_")}
+    metrics = sorted(differing, key=of_part.__contains__)[:most]
+    left_out = ", ".join(metric for metric in differing if metric not in metrics)
+    constant = ", ".join(metric for metric in with_values if metric not in differing)
+    # A map of the verdict, if some runs follow their reference and others do not.
+    if is_mapped:
+        verdicts = np.concatenate(list(results.thin(FOLLOWS, MAXIMUM_DRAWN).values()))
+        metrics += [FOLLOWS] if {0.0, 1.0} <= set(verdicts.tolist()) else []
+    title = f"{results.name}, {results.summary['completed']:,} runs"
+    if not is_mapped and len(varied) > 1:
+        labels = [label_of(path) for path in varied[:_NAMED]]
+        # Within the sentence a label is in lower case, but for abbreviations.
+        labels = [label if label[:2].isupper() else label[:1].lower() + label[1:] for label in labels]
+        more = f" and {len(varied) - _NAMED} more" if len(varied) > _NAMED else ""
+        title += f" over {len(varied)} values: {', '.join(labels)}{more}"
+    count = len(metrics) + len(study["outputs"].get("bands", ()))
+    return Section(
+        said=said,
+        remarks=remarks,
+        panels=partial(_panels, results, metrics, names, varied, grid),
+        name="figure",
+        caption=_CAPTION
+        + f" Not drawn, because without a difference in the runs: {constant}." * bool(constant)
+        + f" Not drawn either, unless outputs.metrics names at most {most}: {left_out}." * bool(left_out),
+        across=len(names) if is_compared else min(_COLUMNS, max(1, count)),
+        size=_COMPARED_PANEL if is_compared else _PANEL,
+        title=title,
+        is_detail=True,
+    )
+
+
+def _panels(
+    results: StudyResults, metrics: Sequence[str], names: Sequence[str], varied: Sequence[str], grid: Sequence[str]
+) -> list[Panel]:
+    """Return a panel for each metric and each band; over two paths, a panel of a metric for each configuration."""
+    if 2 in (len(grid), len(varied)):
+        over_two = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, varied)
+        panels = [over_two(metric, name, name if len(names) > 1 else "") for metric in metrics for name in names]
+    elif len(varied) == 1:
+        panels = [_over(results, varied[0], metric) for metric in metrics]
+    else:
+        panels = [_histogram(results, metric) for metric in metrics]
+    panels += [_band(results, channel) for channel in results.document["study"]["outputs"].get("bands", ())]
+    # The first panel with curves names the configurations for all.
+    with_names = next((panel for panel in panels if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
+    return [replace(panel, legend="inside" if panel is with_names else "") for panel in panels]
+
+
+def _histogram(results: StudyResults, metric: str) -> Panel:
+    """Return a panel with the histogram of a metric for every configuration."""
+    by_name = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
+    values, kind = np.concatenate(list(by_name.values())), _kind(results, metric)
+    if not values.size:
+        return Panel(kind, Kind(), (), then=methodcaller("set", yticks=[]))
+    low, high, ticks = float(values.min()), float(values.max()), {}
+    if high == low:
+        # One bar about the only value.
+        edges, ticks = low + (abs(low) or 1.0) * np.array([-0.05, 0.05]), {"xticks": kind.values(np.array([low]))}
+    elif high - low < _HISTOGRAM_BINS and bool(np.all(values == np.round(values))):
+        # A bin for each whole number where values are counts of few kinds: others would be empty now and then.
+        edges = np.arange(low - 0.5, high + 1.0)
+    else:
+        edges = np.linspace(low, high, 1 + min(_HISTOGRAM_BINS, max(8, round(values.size**0.5))))
+    marks = [
+        Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
+        for (name, own), colour in zip(by_name.items(), COLOURS, strict=False)
+    ]
+    return Panel(kind, Kind(), marks, then=methodcaller("set", yticks=[], **ticks))
+
+
+def _over(results: StudyResults, path: str, metric: str) -> Panel:
+    """Return a panel of a metric over the single varied path."""
+    across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
+    marks = []
+    for name, colour in zip(results.configurations, COLOURS, strict=False):
+        # Draws come in any order, a line goes from left to right.
+        order = np.argsort(across[name], kind="stable")
+        order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
+        x, y = across[name][order], values[name][order]
+        marks.append(Mark("line", x, y, label=name, colour=colour, style={"marker": "."}))
+    return Panel(_kind(results, path), _kind(results, metric), marks)
+
+
+def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, title: str) -> Panel:
+    """Return a map of the mean of a metric over two paths for one configuration; white if no run completed."""
+    (columns, column), (rows, row) = (
+        np.unique(results.thin(path, MAXIMUM_DRAWN)[name], return_inverse=True) for path in grid
+    )
+    # A point of the grid may have several draws, some of which failed: the mean of the others.
+    values = results.thin(metric, MAXIMUM_DRAWN)[name]
+    cell, known, cells = row * columns.size + column, np.isfinite(values), rows.size * columns.size
+    count, total = (np.bincount(cell[known], weights, minlength=cells) for weights in (None, values[known]))
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
+    kind, kinds = _kind(results, metric), [_kind(results, path) for path in grid]
+    declared = {number["path"]: number for number in results.document["study"]["vary"]}
+    # Values of a list are drawn side by side, in cells of equal size, with their values at the ticks.
+    are_listed = [declared[path]["kind"] == "list" for path in grid]
+    places = [
+        np.arange(float(levels.size)) if is_listed else levels
+        for levels, is_listed in zip((columns, rows), are_listed, strict=True)
+    ]
+
+    def mark_axes(axes: "Axes") -> None:
+        """Set ticks for the values of a list, and logarithmic scales."""
+        axes.grid(visible=False)
+        sides = ((axes.xaxis, axes.set_xscale, columns), (axes.yaxis, axes.set_yscale, rows))
+        for number, (axis, set_scale, levels) in enumerate(sides):
+            if are_listed[number]:
+                axis.set_ticks(places[number], [f"{value:g}" for value in kinds[number].values(levels)])
+            elif declared[grid[number]].get("spacing") == "logarithmic":
+                set_scale("log")
+
+    across, upward = (Kind(each.axis) if is_listed else each for each, is_listed in zip(kinds, are_listed, strict=True))
+    return Panel(
+        across, upward, (Mark("map", places[0], places[1], kind.values(mean)),), title, scale=kind, then=mark_axes
+    )
+
+
+def _points(results: StudyResults, paths: Sequence[str], metric: str, name: str, title: str) -> Panel:
+    """Return a panel of points over two drawn values, coloured by a metric, for one configuration."""
+    most, kind = _MAXIMUM_POINTS * len(results.configurations), _kind(results, metric)
+    x, y, values = (results.thin(path, most)[name] for path in (*paths, metric))
+    across, upward = (_kind(results, path) for path in paths)
+    return Panel(across, upward, (Mark("points", x, y, kind.values(values)),), title, scale=kind)
+
+
+def _band(results: StudyResults, channel: str) -> Panel:
+    """Return a panel with the quantile bands of a channel, the outermost pair of quantiles light, the next darker."""
+    table = results.bands()
+    # The quantiles that the study asked for are the columns of its file.
+    fractions = sorted(float(name[1:]) for name in table if name.startswith("q"))
+    pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
+    marks = []
+    for name, colour in zip(results.configurations, COLOURS, strict=False):
+        rows = (table["configuration"] == name) & (table["channel"] == channel)
+        for pair, opacity in zip(pairs, _OPACITIES, strict=False):
+            ends = np.stack([table[f"q{fraction:g}"][rows] for fraction in pair])
+            marks.append(Mark("band", table["time"][rows], ends, colour=colour, style={"alpha": opacity}))
+        if 0.5 in fractions:
+            marks.append(Mark("line", table["time"][rows], table["q0.5"][rows], label=name, colour=colour))
+    unit = CHANNELS[channel].unit
+    kind = Kind(channel.replace("_", " ").capitalize(), unit, quantity_of_unit(unit))
+    title = f"{', '.join(f'{100.0 * fraction:g}' for fraction in fractions)} % of runs below"
+    return Panel(TIME, kind, marks, then=lambda axes: axes.set_title(title, fontsize=font_size(9.0)))

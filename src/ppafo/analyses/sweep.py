@@ -1,0 +1,171 @@
+"""Study: its runs into a folder, a row each, where an interrupted study resumes, and the statistics of all rows."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ppafo.arguments import Count, Overrides, Seed, Threads, Word, checked
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.progress import Progress, Report, report_nothing
+from ppafo.wording import said_of_configuration
+
+if TYPE_CHECKING:
+    from ppafo.analyses.study_results import StudyResults
+    from ppafo.report.finding import Finding
+    from ppafo.studies.study import Study
+
+StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY")]
+Folder = Annotated[str | Path, Word("DIR")]
+Agreed = Annotated[bool, Word(option="--yes")]
+LOG = "log.jsonl"
+"""Name of the log file, the only file with date, machine and speed; all other files are equal on any machine."""
+INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
+INTERRUPTED_AT_ONCE = "interrupted before the first chunk was finished; the same command starts the study again"
+
+
+@checked
+def sweep(
+    study: StudyLike,
+    *,
+    overrides: Overrides = (),
+    draws: Count | None = None,
+    seed: Seed | None = None,
+    threads: Threads | None = None,
+    out: Folder | None = None,
+    agreed: Agreed = False,
+    plugins: Plugins = (),
+    progress: Report | None = None,
+) -> Finding[StudyResults]:
+    """Run a study, given as a name, a TOML file, data with the layout of such a file, or a Study.
+
+    Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute.
+    A failed run has a row with its status and nan for all results.
+
+    Arguments:
+        study: name of a study, a .toml file, data laid out as one, or a Study
+        overrides: values to change, texts or a dictionary as of ``simulate``; of one configuration: 'NAME:PATH=VALUE'
+        draws: number of draws in place of the file's
+        seed: random seed in place of the file's
+        threads: threads of this process; default: all cores
+        out: a folder, where an interrupted study resumes; default: a temporary folder that exists as long as the
+            returned object
+        agreed: consent to a folder that takes much of the disk
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with counts of the runs
+
+    Returns:
+        a Finding whose ``found`` is the StudyResults: columns by name, and ``summary``
+
+    Raises:
+        StudyError: a study that cannot be used or does not fit onto the disk, and a folder with another study's results
+        DataError: a folder that cannot be used
+
+    >>> import ppafo
+    >>> study = ppafo.sweep("torque-task-uncertainty", draws=4).found
+    >>> study.summary["runs"], study.summary["completed"]
+    (8, 8)
+    """
+    name_plugins(plugins)
+    import numpy as np
+
+    from ppafo.analyses.study_results import SUMMARY, StudyResults, finding_of, summarise
+    from ppafo.simulation.gains import warn_of_gains
+    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
+    from ppafo.storage.files import temporary_folder
+    from ppafo.studies.draws import study_of
+    from ppafo.studies.study import check_can_be_swept
+    from ppafo.study.runs import RunCounter
+    from ppafo.study.store import claim, compute_chunk, read_manifest, study_folder
+    from ppafo.version import __version__
+
+    chosen = study_of(study, overrides, draws, seed)
+    check_can_be_swept(chosen)
+    kept = temporary_folder("ppafo-study") if out is None else None
+    folder = study_folder(kept.name if kept is not None else str(out))
+    for configuration in chosen.configurations:
+        varied = [path for path in {*chosen.paths, *chosen.same} if chosen.varies(path, configuration.name)]
+        with said_of_configuration(configuration.name):
+            warn_of_coarse_pairs([configuration.scenario], varied)
+            warn_of_gains(configuration.scenario, varied)
+    report, started = progress or report_nothing, time.monotonic()
+    chunks, finished = claim(chosen, folder, agreed, threads, report)
+    missing = [chunk for chunk in chunks if chunk.number not in finished]
+    earlier = sum(chunk.runs for chunk in chunks) - sum(chunk.runs for chunk in missing)
+    counter = RunCounter(chosen.runs, progress, earlier, sum(finished.values()))
+    # The first chunk may wait for a compiler.
+    counter.add(0, 0)
+    # Rows change below: an old summary would pass for a finished study meanwhile.
+    if missing:
+        (folder.path / SUMMARY).unlink(missing_ok=True)
+    for chunk in missing:
+        failed, content = compute_chunk(chosen, chunk, threads, counter.count_ended)
+        folder.write_chunk(chunk.number, failed, content)
+        counter.add(chunk.runs, failed)
+    line = {
+        "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+        "machine": platform.platform(),
+        "processors": os.cpu_count(),
+        "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
+        "threads": threads,
+        "runs": counter.done - earlier,
+        "failed": counter.failed,
+        "seconds": round(time.monotonic() - started, 3),
+    }
+    log = folder.path / LOG
+    folder.write(LOG, (log.read_bytes() if log.is_file() else b"") + f"{json.dumps(line)}\n".encode())
+    report(Progress("summarising", chosen.runs, chosen.runs))
+    # Read as everybody reads it, from what was written.
+    return finding_of(summarise(chosen, StudyResults(folder, read_manifest(folder), {}, kept)))
+
+
+@checked
+def sweep_into_folder(
+    study: StudyLike,
+    *,
+    out: Folder | None = None,
+    overrides: Overrides = (),
+    draws: Count | None = None,
+    seed: Seed | None = None,
+    threads: Threads | None = None,
+    agreed: Agreed = False,
+    progress: Report | None = None,
+) -> Finding[StudyResults]:
+    """Run a study: many runs, one row each, resumable.
+
+    Its figure, page and text are written into the folder too. An interrupt is raised again with a message that tells
+    whether the same command resumes the study.
+
+    study: name of a study, or a .toml file
+    out: folder for the results; default out/NAME with the name of the study
+    draws: number of draws, instead of the number in the file
+    agreed: start even if the results will fill much of the disk
+
+    >>> from pathlib import Path
+    >>> print(sweep_into_folder("torque-task-uncertainty", draws=4, out=Path("four")).said[0])
+    torque-task-uncertainty: 8 runs: 8 completed
+    """
+    from ppafo.report.drawing import load_drawing
+    from ppafo.report.finding import page_files, text_of
+    from ppafo.studies.draws import study_of
+    from ppafo.study.store import study_folder
+
+    # A module imported below may import Matplotlib, slowly: load_drawing imports it first, without its slow parts.
+    load_drawing()
+    chosen = study_of(study, overrides, draws, seed)
+    # A text stays a text: in a Path, a URL is no longer recognised as one.
+    folder = study_folder(out or Path("out") / chosen.name)
+    try:
+        swept = sweep(chosen, threads=threads, out=out or folder.path, agreed=agreed, progress=progress)
+        # No file contains the path of the folder, so the same study gives the same bytes anywhere.
+        for name, content in {**page_files(swept), "summary.txt": f"{text_of(swept)}\n".encode()}.items():
+            folder.write(name, content)
+    except KeyboardInterrupt:
+        is_begun = any(name.startswith("finished/") for name in folder.names())
+        raise KeyboardInterrupt(INTERRUPTED if is_begun else INTERRUPTED_AT_ONCE) from None
+    return swept
