@@ -21,7 +21,7 @@ from ppafo.units import (
     split_quantity,
     to_si,
 )
-from ppafo.units.spelling import UNITS, parse_unit, product
+from ppafo.units.spelling import UNITS, parse_unit
 from ppafo.wording import number_text
 
 PAIRS = [
@@ -222,20 +222,11 @@ ASKED = [
     ("4,1 bar_g", "Pa_a"),
     ("4,125 bar_g", "Pa_a"),
     ("1,000 mL", "m^3"),
-    ("3 nm", "N m"),
-    ("3 NM", "N m"),
-    ("3 L/s.bar", "m^3/(s Pa)"),
-    ("3 L/s bar", "m^3/(s Pa)"),
-    ("20 C", "K"),
-    ("68 F", "K"),
-    ("20 degc", "K"),
-    ("3 KG", "kg"),
     ("3 HPA_a", "Pa_a"),
     ("3 psii_g", "Pa_a"),
     ("3 psii", "Pa_a"),
     ("3 kPq", "Pa_d"),
     ("1 degg", "rad"),
-    ("5 mmm^2", "m^2"),
 ]
 
 
@@ -313,7 +304,7 @@ def test_every_unit_is_defined_as_in_the_list_that_pint_brings() -> None:
     of_pint = {"rev": "turn", "Torr": "torr", "mWC": f"{water} m", "inWC": f"{water} inch"}
     for unit in set(UNITS) - {"degC", "degF"}:
         theirs = registry.Quantity(of_pint.get(unit, unit)).to_base_units()
-        assert float(product(unit).scale) == pytest.approx(theirs.magnitude, rel=1e-15), unit
+        assert float(parse_unit(unit).scale) == pytest.approx(theirs.magnitude, rel=1e-15), unit
 
 
 FACTORS = ["m", "mm", "s", "K", "degC", "mdegC", "deg", "psi", "psi_g", "%", "N", "1", "", "kkg", "lbf", "Pa_d"]
@@ -358,7 +349,7 @@ def test_only_digits_of_ascii_make_a_number(text: str) -> None:
 
 def test_decimals_of_a_host_program_change_no_conversion() -> None:
     def converted() -> list[object]:
-        for kept in (conversion, parse_unit, product):
+        for kept in (conversion, parse_unit):
             kept.cache_clear()
         return [
             parse_quantity("8.4 g", "kg"),

@@ -13,8 +13,7 @@ from typing import Any
 
 from ppafo.arguments.reading import ANY, MAXIMUM_DIGITS, NUMBER, NumberRange, NumberWithUnit, task
 from ppafo.errors import ArgumentError
-from ppafo.units import SI
-from ppafo.units.carried import carried
+from ppafo.units import SI, carried
 
 _MAXIMUM_LEVELS = 60
 """Maximum depth of nested dictionaries and lists that are copied."""
@@ -49,9 +48,9 @@ def _scalar(value: Any) -> Any:
     a unit becomes the text of both, as a person writes it.
     """
     if (with_unit := carried(value)) is not None:
-        number = _scalar(with_unit.magnitude)
+        number, unit = _scalar(with_unit[0]), with_unit[1]
         is_number = isinstance(number, numbers.Real) and not isinstance(number, bool)
-        return f"{float(number)!r} {with_unit.unit}" if is_number and with_unit.unit != "1" else number
+        return f"{float(number)!r} {unit}" if is_number and unit != "1" else number
     if getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
         return value
     is_hidden = bool(getattr(value, "mask", False))

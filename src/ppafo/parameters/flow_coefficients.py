@@ -13,7 +13,7 @@ import math
 
 from ppafo.errors import UnitError
 from ppafo.units import parse_quantity, split_number, to_si
-from ppafo.units.reference import flow_of, is_volume_flow
+from ppafo.units.spelling import flow_of, is_volume_flow
 
 USUAL_CRITICAL_RATIO = 0.3
 """Usual critical pressure ratio b of spool valves [-], for data sheets without b."""

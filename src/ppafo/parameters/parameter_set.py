@@ -25,7 +25,7 @@ from ppafo.parameters.graph import (
 )
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.units import SI, base_value, format_quantity, split_quantity, to_si
-from ppafo.units.shown import units_beside, usual_unit
+from ppafo.units.shown import shown_unit, units_beside
 from ppafo.wording import known_names
 
 if TYPE_CHECKING:  # few devices have a measured actuator
@@ -220,7 +220,7 @@ def chosen_units(texts: Iterable[object]) -> dict[str, str]:
 
     A file in default units makes no choice: the units of a parameter set take precedence.
     """
-    return {si_unit: unit for si_unit, unit in units_of_texts(texts).items() if unit != usual_unit(si_unit)}
+    return {si_unit: unit for si_unit, unit in units_of_texts(texts).items() if unit != shown_unit(si_unit, {})}
 
 
 def unit_in(text: object) -> str:

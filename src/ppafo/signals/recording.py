@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, PpafoError, UnitError, refused_as
-from ppafo.units import from_si
-from ppafo.units.carried import carried
+from ppafo.units import carried, from_si
 from ppafo.wording import count_of, known_names, nearest_name, one_line
 
 if TYPE_CHECKING:
@@ -430,11 +429,9 @@ def _read_only(values: ArrayLike, unit: str) -> Floats:
 
 def _numbers(values: Any, unit: str) -> Floats:
     if (with_unit := carried(values)) is not None:
-        if _SAME_UNIT.get(with_unit.unit, with_unit.unit) != _SAME_UNIT.get(unit, unit):
-            raise DataError(
-                f"the values of a channel in '{unit}' carry the unit '{with_unit.unit}': convert them before"
-            )
-        values = with_unit.magnitude
+        values, own = with_unit
+        if _SAME_UNIT.get(own, own) != _SAME_UNIT.get(unit, unit):
+            raise DataError(f"the values of a channel in '{unit}' carry the unit '{own}': convert them before")
     given = np.ma.asanyarray(values) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
     # NumPy makes numbers of times and texts, and of complex ones their real part.
     if given.dtype.kind not in "biufO":

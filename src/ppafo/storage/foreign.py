@@ -147,7 +147,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     """Return the unit of a channel; a volume flow measured as mass flow gets its reference condition and gas."""
-    from ppafo.units.reference import flow_of, is_volume_flow, read_unit, with_condition, without_condition
+    from ppafo.units.spelling import flow_of, is_volume_flow, read_unit
 
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
@@ -155,10 +155,8 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
             raise UnitError("'at' and 'gas' are allowed only for a volume flow, such as 'L/min'")
         return unit
     flow = flow_of(unit)
-    if not (mapped.at or flow.condition):
-        raise UnitError(without_condition(unit, gas))
-    by_unit = with_condition(unit, mapped.at or "", mapped.gas or gas)
-    by_map = with_condition(flow.unit, mapped.at or flow.condition, mapped.gas or "".join(flow.gases[:1]) or gas)
+    by_unit = flow.at(mapped.at or "", mapped.gas or gas)
+    by_map = flow_of(flow.unit).at(mapped.at or flow.condition, mapped.gas or "".join(flow.gases[:1]) or gas)
     if not math.isclose(read_unit(by_unit).scale, read_unit(by_map).scale, rel_tol=_SAME_DENSITY):
         raise UnitError(f"means '{by_map}' by 'at' and 'gas', but '{by_unit}' by 'unit'; give each only once")
     return by_unit

@@ -42,7 +42,7 @@ from ppafo.studies.varying import (
     texts_of,
     varied_path,
 )
-from ppafo.units.shown import usual_unit
+from ppafo.units.shown import shown_unit
 from ppafo.wording import first_twice, nearest_name
 
 _CLOSEST = 1.0 - 1.0e-11
@@ -211,7 +211,7 @@ def _build(
         outputs=valid_outputs(parsed.outputs, scenarios),
         runs_of_chunk=parsed.runs_of_chunk,
         units=plain | {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()},
-        given={path: unit for path, unit in given.items() if unit != usual_unit(varied_paths[path].quantity.unit)},
+        given={path: unit for path, unit in given.items() if unit != shown_unit(varied_paths[path].quantity.unit, {})},
         gauge=frozenset(gauge | {path for path, other in followed.items() if other in gauge}),
         only={entry.path: entry.only for entry in parsed.vary if entry.only},
         document=document,

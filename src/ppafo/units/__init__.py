@@ -14,17 +14,22 @@ Inside the package all floats are SI. Four rules go beyond arithmetic:
 '549484 Pa absolute, 65 psi gauge'
 """
 
-import contextlib
-import difflib
 import functools
 import math
 import re
+from collections.abc import Mapping
 from decimal import Decimal
+from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import UnitError
-from ppafo.units.reference import MASS_FLOW, flow_of, is_volume_flow, read_unit, without_condition
-from ppafo.units.spelling import DECIMALS, ParsedUnit, UnknownUnitError, as_product, names, quote
+from ppafo.units.spelling import (
+    DECIMALS,
+    MASS_FLOW,
+    flow_of,
+    quote,
+    read_unit,
+)
 from ppafo.units.spelling import split_pressure_kind as split_pressure_kind
 
 SI = "SI"
@@ -38,10 +43,7 @@ _NEEDED = {
     LEVEL: "a pressure level is needed, for example '50 psi_g' or '446 kPa_a'",
     DIFFERENCE: "a pressure difference is needed, for example '5 psi_d'",
     "rad": "an angle is needed, for example '75 deg' or '1.3 rad'",
-    "m^3/(s Pa)": (
-        "a sonic conductance is needed, such as '1 L/(s bar)', a flow per pressure before the valve; a nominal "
-        "flow q from p1 to p2 (absolute) is C = q/(p1 sqrt(1 - ((p2/p1 - b)/(1 - b))^2)), with b = critical_ratio"
-    ),
+    "m^3/(s Pa)": "a sonic conductance is needed, such as '1 L/(s bar)', a flow per pressure before the valve",
     "": "a plain number without a unit is needed",
 }
 """Statements of what is needed in place of a wrong unit, by SI unit."""
@@ -64,10 +66,10 @@ def split_number(text: str) -> tuple[float, str]:
     if match is None:
         raise UnitError(f"{quote(text)} does not start with a number; write for example '12.6 mm^2' or '50 psi_g'")
     if comma := _DECIMAL_COMMA.match(stripped):
-        rest = stripped[comma.end() :].strip()
-        whole = f" or '{f'{comma[1]}{comma[2]} {rest}'.rstrip()}'" if len(comma[2]) == 3 else ""
-        pointed = f"{comma[1]}.{comma[2]} {rest}".rstrip()
-        raise UnitError(f"{quote(text)} has a comma in its number; write '{pointed}'{whole}")
+        # Three digits may be a group of a number above a thousand.
+        marks = (".", "") if len(comma[2]) == 3 else (".",)
+        ways = [f"'{comma[1]}{mark}{stripped[comma.start(2) :]}'" for mark in marks]
+        raise UnitError(f"{quote(text)} has a comma in its number; write {' or '.join(ways)}")
     value = _finite(float(match.group()), text)
     # float() rounds 1e-400 to 0 without a word, and 0 often means "none" in a file.
     if value == 0.0 and _NOT_ZERO.match(match.group()):
@@ -98,20 +100,15 @@ def from_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_
 
 def base_value(value: float, unit: str) -> float:
     """Convert a value in any unit to base units (m, kg, s, K, mol, rad)."""
-    parsed = _read(unit)
+    parsed = read_unit(unit)
     exact = DECIMALS.fma(_decimal(value), parsed.scale, parsed.offset)
     return float(exact) + (STANDARD_ATMOSPHERE if parsed.kind == "g" else 0.0)
 
 
-def dimension(unit: str) -> dict[str, int]:
-    """Return the dimension of a unit as powers of base dimensions such as ``[mass]`` and ``[angle]``."""
-    return dict(_read(unit).dimensions)
-
-
-def check_unit(unit: str, near: str | None = None) -> None:
+def check_unit(unit: str) -> None:
     """Check that a unit exists and is written like ``kg`` or ``m^3/(s Pa)``. Raises UnitError if not."""
     if unit != SI:
-        _read(unit, near)
+        read_unit(unit)
 
 
 @functools.lru_cache(maxsize=512)
@@ -120,15 +117,10 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     if unit == SI:
         return Decimal(1), Decimal(0), False
     wanted, needed = read_unit(si_unit), _NEEDED.get(si_unit, f"a unit like '{si_unit}' is needed")
-    flow, is_volume = flow_of(unit), False
-    with contextlib.suppress(UnitError):
-        # Without the gas and condition that make it a mass flow.
-        is_volume = not flow.is_stated and is_volume_flow(unit)
-    if is_volume and wanted.dimensions == MASS_FLOW:
-        raise UnitError(without_condition(unit))
-    if is_volume and flow.is_normal:
+    flow, is_mass_flow = flow_of(unit), wanted.dimensions == MASS_FLOW
+    if flow.is_normal and not flow.is_stated and not is_mass_flow:
         raise UnitError(f"unit '{unit}' does not fit: {needed}")
-    given = _read(unit, si_unit)
+    given = read_unit(unit, is_mass_flow)
     if given.dimensions != wanted.dimensions:
         raise UnitError(f"{f'unit {unit!r}' if unit else 'a number without a unit'} does not fit: {needed}")
     if si_unit in (LEVEL, DIFFERENCE):
@@ -139,29 +131,6 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
             raise UnitError(f"'{unit}' is {KINDS[given.kind]}, {needed}")
     offset = DECIMALS.divide(DECIMALS.subtract(given.offset, wanted.offset), wanted.scale)
     return DECIMALS.divide(given.scale, wanted.scale), offset, given.kind == "g" and si_unit == LEVEL
-
-
-def _read(unit: str, si_unit: str | None = None) -> ParsedUnit:
-    """Parse a unit. UnitError for an unknown one proposes near ones, with ``si_unit`` those that fit it."""
-    try:
-        return read_unit(unit)
-    except UnknownUnitError as error:
-        name, known = error.name, sorted(names())
-        # Written in capitals, 'MM' is more often a small unit than a large one.
-        near = sorted((each for each in known if each.lower() == name.lower()), key=lambda each: not each.islower())
-        if si_unit is not None:
-            # nm for N m: a force has a capital letter.
-            near += [as_product(name.capitalize()), f"deg{name}", *difflib.get_close_matches(name, known, 12)]
-        written = [re.sub(rf"(?<![A-Za-z]){re.escape(name)}(?![A-Za-z])", other, unit) for other in near if other]
-        meant = next((f", did you mean '{other}'?" for other in written if _fits(other, si_unit)), "")
-        raise UnknownUnitError(name, meant) from error
-
-
-def _fits(unit: str, si_unit: str | None) -> bool:
-    try:
-        return read_unit(unit).dimensions == read_unit(unit if si_unit is None else si_unit).dimensions
-    except UnitError:
-        return False
 
 
 def _decimal(value: float) -> Decimal:
@@ -177,3 +146,30 @@ def _finite(value: float, shown: object) -> float:
 def format_quantity(value: float, unit: str) -> str:
     """Format value and unit as text, which ``split_quantity`` reads back exactly."""
     return f"{repr(float(value)).removesuffix('.0')} {unit}".rstrip()
+
+
+def carried(value: Any) -> tuple[Any, str] | None:
+    """Return the number or array and the unit of a quantity of pint, an array of xarray or pandas, or a metric.
+
+    The unit of a plain number is 1; a value without any gives None.
+    """
+    if type(value) in (float, int, str, bool) or value is None:
+        return None
+    for number, unit in (("magnitude", "units"), ("value", "unit"), ("values", "unit")):
+        if hasattr(value, unit) and hasattr(value, number):
+            return getattr(value, number), _text(getattr(value, unit))
+    attributes = getattr(value, "attrs", None)
+    if not isinstance(attributes, Mapping):
+        return None
+    if hasattr(getattr(value, "data", None), "units"):
+        return carried(value.data)
+    units = attributes.get("units")
+    # pandas copies the attributes of a table, the units by column, to each column of it.
+    units = units.get(getattr(value, "name", None)) if isinstance(units, Mapping) else units
+    return None if units is None or not hasattr(value, "values") else (value.values, _text(units))
+
+
+def _text(unit: Any) -> str:
+    # pint writes its symbols so, mm ** 2 instead of millimeter ** 2.
+    text = f"{unit:~}" if hasattr(unit, "dimensionality") else str(unit)
+    return {"": "1", "-": "1", "dimensionless": "1"}.get(text, text)

@@ -129,20 +129,15 @@ def quantity_of_unit(si_unit: str) -> str:
     return _OF_UNIT.get(si_unit, "")
 
 
-def usual_unit(si_unit: str) -> str:
-    """Return the default display unit of an SI unit; "" for a plain number."""
-    quantity = quantity_of_unit(si_unit)
-    return QUANTITIES[quantity].shown if quantity else "" if si_unit == "1" else si_unit
-
-
-def shown_unit(si_unit: str) -> str:
-    """Return the display unit of an SI unit, as set by ``shown_in`` or by default; "" for a plain number."""
-    chosen, si_unit = _chosen.get(), _WRITTEN.get(si_unit, si_unit)
+def shown_unit(si_unit: str, chosen: Mapping[str, str] | None = None) -> str:
+    """Return the display unit of an SI unit, ``chosen`` as by ``shown_in`` or by default; "" for a plain number."""
+    chosen, si_unit = _chosen.get() if chosen is None else chosen, _WRITTEN.get(si_unit, si_unit)
     if si_unit in chosen:
         return chosen[si_unit]
     if si_unit in ("N/Pa", "N m/Pa"):
-        return f"{shown_unit(si_unit.removesuffix('/Pa'))}/{shown_unit('Pa_d').removesuffix('_d')}"
-    return usual_unit(si_unit)
+        return f"{shown_unit(si_unit.removesuffix('/Pa'), chosen)}/{shown_unit('Pa_d', chosen).removesuffix('_d')}"
+    quantity = quantity_of_unit(si_unit)
+    return QUANTITIES[quantity].shown if quantity else "" if si_unit == "1" else si_unit
 
 
 def unit_of(quantity: str) -> str:

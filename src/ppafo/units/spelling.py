@@ -1,8 +1,12 @@
-"""Units as people write them, read by pint.
+"""Units as people write them, read by pint; volume flows at a reference condition as mass flows.
 
 A spelling is brought to a normal form such as ``N m s/rad``, ``mm^2``, ``L/(s bar)``, ``psi_g``, only where it is
 unambiguous. The list of units is short, so that a misspelling is an error. Factors are decimals, so that 8.4 g is the
 float nearest to 0.0084 kg.
+
+A volume flow with condition and gas, ``L/min (ANR, air)``, is the mass flow ``rho q``, where rho = p M/(R T) is the
+density of an ideal gas of molar mass M. Air in the atmosphere of ISO 8778, which is humid, has the 1.185 kg/m^3 of ISO
+6358. Normal litres, slm and SCFM do not state their condition: manufacturers mean 0, 15, 20, 21.1 or 25 degC by them.
 """
 
 import decimal
@@ -11,8 +15,16 @@ import re
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ppafo.constants import PASCALS_PER_PSI
+from ppafo.constants import (
+    MOLAR_GAS_CONSTANT,
+    MOLAR_MASSES,
+    PASCALS_PER_PSI,
+    STANDARD_ATMOSPHERE,
+    STANDARD_REFERENCE_DENSITY_AIR,
+    STANDARD_REFERENCE_TEMPERATURE,
+)
 from ppafo.errors import UnitError
+from ppafo.wording import nearest_name
 
 if TYPE_CHECKING:
     import pint
@@ -40,27 +52,29 @@ UNITS = (
     *("rev", "K", "degC", "degF", "N", "lbf", "ozf", "kgf", "J", "W", "Pa", "bar", "psi", "atm", "Torr", "mHg"),
     *("inHg", "mWC", "inWC"),
 )
-"""Units that take prefixes and that messages list, by their symbols."""
-PRESSURES = UNITS[UNITS.index("Pa") :]
+"""Units that messages list, by their symbols; the last are the pressures."""
+_PRESSURES = UNITS[UNITS.index("Pa") :]
 _IN_PLURAL = ("lb", "lbf", "sec", "msec", "usec", "min", "hr", "rad", "deg", "rev")
 """Symbols that people write with an s; of others it is a second: ``Ns`` is N s."""
-PREFIXES = ("u", "m", "c", "d", "da", "h", "k", "M")
+_PREFIX = "u|m|c|d|da|h|k|M"
+_NAMES = [prefix + unit for prefix in ("", *_PREFIX.split("|")) for unit in UNITS]
+"""Names of all units with all prefixes; written in capitals, 'MM' is more often a small unit than a large one."""
 DECIMALS = decimal.Context(prec=28, rounding=decimal.ROUND_HALF_EVEN)
 """Decimal context of unit arithmetic, independent of the settings of a host program."""
-_PRESSURE = {"[mass]": 1, "[length]": -1, "[time]": -2}
+_PRESSURE, _MOLAR_MASS = {"[mass]": 1, "[length]": -1, "[time]": -2}, {"[mass]": 1, "[substance]": -1}
+MASS_FLOW, _VOLUME_FLOW = {"[mass]": 1, "[time]": -1}, {"[length]": 3, "[time]": -1}
 _LONGEST = 60
-_PREFIX = "|".join(PREFIXES)
 _FACTOR = r"[A-Za-z]+(?:_[gad])?(?:\^-?[1-9])?"
 _PRODUCT = rf"{_FACTOR}(?: {_FACTOR})*"
 _EXPRESSION = re.compile(rf"(?:1|{_PRODUCT})(?:/(?:{_FACTOR}|\({_PRODUCT}\)))*")
 _CHARACTERS = str.maketrans("·⋅\u00d7*\u00a0\u202f\u2212\u2013\u2215\u2044μµ¹", "      --//uu1") | {
     ord(sign): word for sign, word in zip("²³⁻°℃℉%", ("^2", "^3", "^-", "deg", "degC", "degF", "percent"), strict=True)
 }
-KIND_WORD = "g|ga|gauge|rel|relative|ü|ue|a|abs|absolute|d|diff|differential|difference"
+_KIND_WORD = "g|ga|gauge|rel|relative|ü|ue|a|abs|absolute|d|diff|differential|difference"
 _LETTER = {"r": "g", "ü": "g", "u": "g"}
 _KIND = re.compile(
-    rf"(?P<unit>((?:{_PREFIX})?(?:{'|'.join(PRESSURES)})|at|ksi)[ _]?|.+_|.+/.+?(?: |(?=\()|(?<=cm\^2)))"
-    rf"\(?(?P<word>{KIND_WORD})\.?\)?",
+    rf"(?P<unit>((?:{_PREFIX})?(?:{'|'.join(_PRESSURES)})|at|ksi)[ _]?|.+_|.+/.+?(?: |(?=\()|(?<=cm\^2)))"
+    rf"\(?(?P<word>{_KIND_WORD})\.?\)?",
     re.IGNORECASE,
 )
 """Kind of a pressure behind one unit or a quotient: ``psig``, ``bar (abs)``, ``kPa gauge``, ``lbf/in^2_a``."""
@@ -81,7 +95,32 @@ _SPELLINGS = [
 ]
 _FORCES = re.compile(r"(lb|oz) (in|ft)|(in|ft) (lb|oz)|(lb|kg)(/(?:in|ft|cm|mm)\^2)")
 """Spellings in which pound, ounce or kilogram is a force."""
+_FEW = sorted(UNITS, key=len)
+_FIRST, _NEXT = rf"((?:{_PREFIX})?(?:{'|'.join(_FEW[::-1])}))", rf"((?:{_PREFIX})??(?:{'|'.join(_FEW)}))"
+_JOINED = re.compile(rf"{_FIRST}(?!\1){_NEXT}(?:(?!\1|\2){_NEXT}(?:(?!\1|\2|\3){_NEXT})?)?")
+"""Two to four joined units, each of them once.
+
+The first is as long as it can be: mbarl is mbar L, and no metre times bar. The others are as short: Nms is N m s.
+"""
 _KIND_BELONGS = "_g, _a and _d are allowed only for a single unit of pressure, such as psi_g"
+_CONDITIONS = {
+    **dict.fromkeys(("ANR", "ISO 8778", "ISO 6358"), (STANDARD_REFERENCE_TEMPERATURE, 1.0e5, True)),
+    "DIN 1343": (273.15, STANDARD_ATMOSPHERE, False),
+    "ISO 2533": (288.15, STANDARD_ATMOSPHERE, False),
+}
+"""Temperature [K], pressure [Pa] and humidity of pneumatics, of normal litres, of the atmosphere at sea level."""
+_GASES = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}
+_AS_AIR = 5.0e-3
+"""Relative deviation from the molar mass of air [-] within which a gas counts as air."""
+_QUANTITY = re.compile(r"\s*([+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
+# What stands behind bar (abs) or kgf/cm^2 (g) is no condition.
+_BEHIND = re.compile(
+    rf"(?P<flow>.*[^/ ]) *\((?!(?i:{_KIND_WORD})\.?\))(?P<words>[^()]*)\)|(?P<bare>.*[^/ ])[ _]+(?P<name>ANR)"
+)
+_NORMAL = re.compile(
+    r"(?:(?i:std\.?|standard|norm\.?|normal) +|[NSns](?=c?m\^?[23³]/|[lL]/|cc/))(?P<volume>[^ ]+/.+)"
+    r"|(?P<milli>m?)[lL](?:[ns]|\(n\))(?P<per>/\w+)|[NnSs](?P<word>[lL]p?m|LP?M|(?i:ccm|cf[mh]))"
+)
 
 
 class ParsedUnit(NamedTuple):
@@ -96,23 +135,145 @@ class ParsedUnit(NamedTuple):
     dimensions: dict[str, int]
     kind: str = ""
 
+
+class WrittenFlow(NamedTuple):
+    """Unit as written and as a flow without the word for normal; reference condition and gases, empty if not stated."""
+
+    name: str
+    unit: str
+    is_normal: bool = False
+    condition: str = ""
+    gases: tuple[str, ...] = ()
+
     @property
-    def is_pressure(self) -> bool:
-        """Return whether it is a unit of pressure."""
-        return self.dimensions == _PRESSURE
+    def is_stated(self) -> bool:
+        """Return whether a condition or a gas is stated."""
+        return bool(self.condition or self.gases)
+
+    def at(self, condition: str, gas: str) -> str:
+        """Return the unit with the condition and gas where it does not state its own."""
+        whole = ", ".join(filter(None, (self.condition or condition, *(self.gases or (gas,)))))
+        return f"{self.name} ({whole})" if whole else self.name
 
 
-class UnknownUnitError(UnitError):
-    """Unknown name in a unit, with the names that exist."""
+def flow_of(unit: str) -> WrittenFlow:
+    """Split a unit into volume flow, whether it is a normal or standard one, condition and gases."""
+    text, words = unit.strip(), ""
+    if match := _BEHIND.fullmatch(text):
+        text, words = match["flow"] or match["bare"], match["words"] or match["name"] or ""
+    said = [word.strip() for word in _split(words) if word.strip()]
+    gases = tuple(word for word in said if word.lower() in _GASES or word.endswith("/mol"))
+    flow, normal = text, _NORMAL.fullmatch(text)
+    if normal:
+        flow = (normal["word"] or "").upper() or normal["volume"] or f"{normal['milli']}L{normal['per']}"
+    return WrittenFlow(text, flow, normal is not None, ", ".join(word for word in said if word not in gases), gases)
 
-    def __init__(self, name: str, hint: str = "") -> None:
-        """Store the unknown name, for a hint in another message."""
-        self.name = name
-        others = ", ".join(other for other in UNITS if other not in PRESSURES)
-        super().__init__(
-            f"'{name}' is not a known unit{hint}; available: {others}, pressures as psi_g, psi_a, psi_d (in a compound "
-            f"psi) and {', '.join(PRESSURES)} likewise, with the prefixes {', '.join(PREFIXES)}"
+
+def _split(words: str) -> list[str]:
+    """Split words at commas, semicolons or 'and'; a comma between digits is a decimal comma."""
+    return re.split(r"(?<!\d),|,(?!\d)|;|\band\b|&|@", words)
+
+
+def is_volume_flow(unit: str) -> bool:
+    """Return whether a unit is a volume per time, with or without condition. Raises UnitError if invalid."""
+    flow = flow_of(unit)
+    return flow.is_normal or parse_unit(flow.unit).dimensions == _VOLUME_FLOW
+
+
+def read_unit(unit: str, is_mass_flow: bool = False) -> ParsedUnit:
+    """Parse a unit; a volume flow with condition and gas becomes a mass flow.
+
+    Raises UnitError for an invalid unit, a condition without gas, and a normal flow, or any as a mass flow, without
+    condition.
+    """
+    flow = flow_of(unit)
+    is_volume = (flow.is_stated or flow.is_normal or is_mass_flow) and parse_unit(flow.unit).dimensions == _VOLUME_FLOW
+    if flow.is_stated and not is_volume:
+        raise UnitError(f"'{unit}': a reference condition belongs to a volume flow, such as 'L/min (ANR, air)'")
+    if not is_volume:
+        return parse_unit(unit)
+    temperature, pressure, is_humid = _condition_of(flow.condition, unit)
+    if len(flow.gases) != 1:
+        example = "L/min (ANR, air)" if flow.gases else flow.at("", "air")
+        raise UnitError(
+            f"'{unit}' states {'two gases' if flow.gases else 'no gas'}: write one gas, for example '{example}'; "
+            f"allowed: {', '.join(MOLAR_MASSES)}, or a molar mass in kg/mol"
         )
+    mass = _molar_mass(flow.gases[0])
+    density = pressure * mass / (MOLAR_GAS_CONSTANT * temperature)
+    if is_humid and abs(mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR:
+        density = STANDARD_REFERENCE_DENSITY_AIR
+    scale = DECIMALS.multiply(parse_unit(flow.unit).scale, Decimal(repr(density)))
+    return ParsedUnit(scale, Decimal(0), MASS_FLOW)
+
+
+def _condition_of(text: str, unit: str) -> tuple[float, float, bool]:
+    """Parse a reference condition: a name, or temperature and pressure. Raises UnitError for other text."""
+    name = re.sub(r"[\s_-]+", " ", text).upper()
+    if name in _CONDITIONS:
+        return _CONDITIONS[name]
+    words = _split(text)
+    values = {str(unit.dimensions): value for value, unit in _quantities(words) if unit.kind in ("", "a")}
+    temperature, pressure = (values.get(str(of), 0.0) for of in ({"[temperature]": 1}, _PRESSURE))
+    if len(words) == 2 and min(temperature, pressure) > 0.0:
+        return temperature, pressure, False
+    said = f": '{text}' is no reference condition{nearest_name(name, _CONDITIONS)}" if text else " is a volume flow"
+    flow = flow_of(unit)._replace(condition="")
+    named, own = (flow.at(condition, "air") for condition in ("ANR", "70 degF, 14.696 psi_a"))
+    raise UnitError(
+        f"'{unit}'{said}; a mass flow needs a gas and a condition ({', '.join(_CONDITIONS)}, or temperature and "
+        f"pressure): write '{named}' (20 degC, 1 bar) or '{own}'; in a column map give at = 'ANR' and gas = 'air'"
+    )
+
+
+def molar_mass_in(unit: str) -> float | None:
+    """Return the molar mass [kg/mol] of the gas that a unit of flow states, or None, as for 'L/min (ANR)'."""
+    gases = flow_of(unit).gases
+    return _molar_mass(gases[0]) if gases else None
+
+
+def _molar_mass(word: str) -> float:
+    """Return the molar mass [kg/mol] of a gas, given by name or as a molar mass with unit."""
+    if word.lower() in _GASES:
+        return _GASES[word.lower()]
+    masses = [value for value, unit in _quantities([word]) if unit.dimensions == _MOLAR_MASS and value > 0.0]
+    if not masses:
+        raise UnitError(f"'{word}' is not a molar mass, such as '0.044 kg/mol'")
+    return masses[0]
+
+
+def _quantities(words: list[str]) -> list[tuple[float, ParsedUnit]]:
+    """Return the value in base units and the unit of each word that is a number with a unit."""
+    matches = [match for word in words if (match := _QUANTITY.fullmatch(word))]
+    numbers = [(Decimal(match[1].replace(",", ".")), parse_unit(match[2])) for match in matches]
+    return [(float(DECIMALS.fma(number, unit.scale, unit.offset)), unit) for number, unit in numbers]
+
+
+@functools.lru_cache(maxsize=512)
+def parse_unit(unit: str) -> ParsedUnit:
+    """Parse a unit with the kind of a pressure. Raises UnitError for an unknown unit."""
+    bare, kind = split_pressure_kind(unit)
+    for word in re.findall(r"[A-Za-z_]+", bare):
+        symbol = _symbol(word)
+        if not symbol and word[-2:] in ("_g", "_a", "_d"):
+            raise UnitError(f"'{word}': {_KIND_BELONGS}")
+        if not symbol:
+            raise UnitError(
+                f"'{word}' is not a known unit{nearest_name(word, _NAMES)}; available: {', '.join(UNITS)}, with the "
+                f"prefixes {_PREFIX.replace('|', ', ')}; pressures as psi_g, psi_a, psi_d, in a compound psi"
+            )
+        if symbol.endswith(("degC", "degF")) and len(symbol) > len("degC"):
+            raise UnitError(f"'{unit}': degC and degF take no prefix; give degC, degF or K")
+    registry = _registry()
+    parsed = registry.parse_units(bare.replace("^", "**").replace(" ", "*"))
+    dimensions = {name: int(str(power)) for name, power in parsed.dimensionality.items()}
+    # Only a pressure has a zero that may lie at the atmosphere.
+    if kind and dimensions != _PRESSURE:
+        raise UnitError(f"'{unit}': {_KIND_BELONGS}")
+    # Units are affine: their values at 0 and 1 give scale and offset.
+    with decimal.localcontext(DECIMALS):
+        offset, one = (registry.Quantity(Decimal(number), parsed).to_base_units().magnitude for number in (0, 1))
+        return ParsedUnit(one - offset, Decimal(offset), dimensions, kind)
 
 
 @functools.cache
@@ -127,53 +288,16 @@ def _registry() -> "pint.UnitRegistry[Any]":
     return registry
 
 
-@functools.cache
-def names() -> frozenset[str]:
-    """Return all unit names with all prefixes."""
-    return frozenset(prefix + unit for unit in UNITS for prefix in ("", *PREFIXES))
-
-
-@functools.cache
-def _meant(word: str) -> tuple[str, str] | None:
-    """Return prefix and unit, as pint calls them, of a word; None for an unknown one."""
+@functools.lru_cache(maxsize=512)
+def _symbol(word: str) -> str:
+    """Return the symbol of a unit, with its prefix: ``kPa`` for ``kilopascals``; empty for an unknown word."""
     known = _registry().parse_unit_name(word) if word.isalpha() else ()
     for prefix, unit, _ in known:
         singular = word.removesuffix("s")
         is_plural = singular != word and (prefix, unit) in [each[:2] for each in _registry().parse_unit_name(singular)]
         if not is_plural or len(singular) > 4 or singular in (prefix + unit, *_IN_PLURAL):
-            return prefix, unit
-    return None
-
-
-def is_unit(word: str) -> bool:
-    """Return whether a word without a power is one unit."""
-    return word in names() or _meant(word) is not None
-
-
-def usual_name(word: str) -> str:
-    """Return the symbol, with its prefix, of a unit in words: ``kPa`` for ``kilopascals``."""
-    return word if word in names() or _meant(word) is None else str(_registry().get_symbol(word))
-
-
-@functools.lru_cache(maxsize=512)
-def product(unit: str) -> ParsedUnit:
-    """Return the unit of a product in normal spelling, such as ``N m s/rad``; a unit alone keeps its offset.
-
-    Raises UnknownUnitError.
-    """
-    for word in re.findall(r"[A-Za-z_]+", unit):
-        meant = _meant(word)
-        if meant is None:
-            raise UnknownUnitError(word)
-        if meant[0] and meant[1] in ("celsius", "fahrenheit"):
-            raise UnitError("degC and degF take no prefix; give degC, degF or K")
-    registry = _registry()
-    parsed = registry.parse_units(unit.replace("^", "**").replace(" ", "*"))
-    # Units are affine: their values at 0 and 1 give scale and offset.
-    with decimal.localcontext(DECIMALS):
-        offset, one = (registry.Quantity(Decimal(number), parsed).to_base_units().magnitude for number in (0, 1))
-        scale = one - offset
-    return ParsedUnit(scale, Decimal(offset), {name: int(str(power)) for name, power in parsed.dimensionality.items()})
+            return str(_registry().get_symbol(prefix + unit))
+    return ""
 
 
 @functools.lru_cache(maxsize=512)
@@ -189,57 +313,21 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
     if match := _KIND.fullmatch(normal):
         letter = match["word"][0].lower()
         normal, kind = match["unit"].rstrip(" _"), _LETTER.get(letter, letter)
-    normal = re.sub(r"[A-Za-z]+", lambda word: usual_name(word[0]), normal)
+    normal = re.sub(r"[A-Za-z]+", lambda word: _symbol(word[0]) or word[0], normal)
     if normal and (len(normal) > _LONGEST or not _EXPRESSION.fullmatch(normal)):
-        below = _in_brackets(normal)
-        is_clear = len(normal) <= _LONGEST and _EXPRESSION.fullmatch(below)
-        example = f"'{below}'" if is_clear else "a unit like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'"
-        raise UnitError(f"{quote(unit)} is not a unit; write {example}")
-    spaced = re.sub(r"[A-Za-z]+(?![A-Za-z]|_[gad])", lambda word: as_product(word[0]) or word[0], normal)
-    normal = _in_brackets(spaced) if spaced != normal else normal
+        raise UnitError(f"{quote(unit)} is not a unit; write a unit like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'")
+    spaced = re.sub(r"[A-Za-z]+(?![A-Za-z]|_[gad])", lambda word: _as_product(word[0]) or word[0], normal)
+    # J/kgK has both kg and K in its denominator.
+    normal = re.sub(rf"/({_FACTOR}(?: {_FACTOR})+)", r"/(\1)", spaced) if spaced != normal else normal
     force = _FORCES.fullmatch(normal)
     return force.expand(r"\1\4\5f\6") + f" {force[2] or force[3]}" * (force[6] is None) if force else normal, kind
 
 
-def _in_brackets(unit: str) -> str:
-    """Put brackets round a product in a denominator: ``J/kg K`` becomes ``J/(kg K)``."""
-    return re.sub(rf"/({_FACTOR}(?: {_FACTOR})+)", r"/(\1)", unit)
-
-
-@functools.lru_cache(maxsize=512)
-def parse_unit(unit: str) -> ParsedUnit:
-    """Parse a unit with the kind of a pressure. Raises UnitError for an unknown unit."""
-    bare, kind = split_pressure_kind(unit)
-    try:
-        parsed = product(bare)
-    except UnknownUnitError as error:
-        if re.search("_[gad]$", error.name):
-            raise UnitError(f"'{error.name}': {_KIND_BELONGS}") from error
-        raise
-    except UnitError as error:
-        raise UnitError(f"'{unit}': {error}") from error
-    # Only a pressure has a zero that may lie at the atmosphere.
-    if kind and not parsed.is_pressure:
-        raise UnitError(f"'{unit}': {_KIND_BELONGS}")
-    return parsed._replace(kind=kind)
-
-
-@functools.cache
-def _joined() -> re.Pattern[str]:
-    """Return the pattern of two to four joined units, each of them once.
-
-    The first is as long as it can be: mbarl is mbar L, and no metre times bar. The others are as short: Nms is N m s.
-    """
-    units = sorted(UNITS, key=len)
-    first, more = rf"((?:{_PREFIX})?(?:{'|'.join(units[::-1])}))", rf"((?:{_PREFIX})??(?:{'|'.join(units)}))"
-    return re.compile(rf"{first}(?!\1){more}(?:(?!\1|\2){more}(?:(?!\1|\2|\3){more})?)?")
-
-
-def as_product(name: str) -> str:
+def _as_product(name: str) -> str:
     """Split a joined name into known units, ``Nmm`` into ``N mm``; empty if already known or no product."""
     # A letter typed twice, as in degg, is no product.
-    is_name = is_unit(name) or is_unit(re.sub(r"(.)\1", r"\1", name))
-    match = None if is_name else _joined().fullmatch(name)
+    is_name = _symbol(name) or _symbol(re.sub(r"(.)\1", r"\1", name))
+    match = None if is_name else _JOINED.fullmatch(name)
     return "" if match is None else " ".join(filter(None, match.groups()))
 
 

@@ -328,7 +328,7 @@ def test_what_a_column_map_has_wrong_and_what_it_lacks_are_one_refusal(bench: Pa
     )
     problem = f"{FLOW.replace('flow.csv', 'meter.csv')}columns = 'rig'\n{mapped}"
     for flow, fragment in (
-        ('unit = "NL/min"', "which is a mass flow only with a reference condition and a gas"),
+        ('unit = "NL/min"', "is a volume flow; a mass flow needs a gas and a condition"),
         ('unit = "L/min", at = "ANR", gas = "air"', "is a flow of air, 0.02897 kg/mol, but the gas of"),
     ):
         with pytest.raises(PpafoError) as refused:

@@ -6,7 +6,8 @@ from xml.etree import ElementTree as Xml
 
 from ppafo.exports.fmu.interface import Interface
 from ppafo.exports.fmu.variables import FmuVariable, variables_of
-from ppafo.units import base_value, dimension
+from ppafo.units import base_value
+from ppafo.units.spelling import read_unit
 from ppafo.version import __version__
 
 _BASE_UNITS = {
@@ -152,7 +153,7 @@ def _add_units_and_experiment(root: Xml.Element, interface: Interface, variables
     """Add units, log categories and default experiment, which are the same in FMI 2 and 3."""
     table = Xml.SubElement(root, "UnitDefinitions")
     for name in sorted({_shown(variable.unit) for variable in variables} - {""}):
-        exponents = {_BASE_UNITS[base]: str(power) for base, power in dimension(name).items()}
+        exponents = {_BASE_UNITS[base]: str(power) for base, power in read_unit(name).dimensions.items()}
         unit = Xml.SubElement(table, "Unit", name=name)
         Xml.SubElement(unit, "BaseUnit", exponents)
         if name in _DISPLAY_UNITS:
