@@ -65,55 +65,45 @@ class FootLoad(NamedTuple):
 
 
 def foot_inertia_about_ankle(leg: LegParameters) -> float:
-    """Inertia of the foot about the ankle [kg m^2]; the lower right entry of M in equation (11)."""
+    """Inertia of the foot about the ankle [kg m^2]: what the second row of equation (11) multiplies with theta''."""
     return leg.foot_inertia + leg.foot_mass * leg.foot_mass_centre * leg.foot_mass_centre
 
 
-def link_product(leg: LegParameters) -> float:
-    """Coupling inertia of both links [kg m^2]: foot mass times shank length times distance of its centre of mass."""
-    return leg.foot_mass * leg.shank_length * leg.foot_mass_centre
-
-
-def mass_matrix(leg: LegParameters, cosine_theta: float) -> tuple[float, float, float]:
-    """Entries of the symmetric inertia matrix M [kg m^2], shank, coupling and foot. Equations (11), (12).
-
-    ``cosine_theta`` [-] is the cosine of the ankle angle.
-    """
-    foot = foot_inertia_about_ankle(leg)
-    product = link_product(leg) * cosine_theta
-    shank = leg.shank_inertia + leg.shank_mass * leg.shank_mass_centre * leg.shank_mass_centre
-    # The foot's mass turns with the shank at the end of its length (parallel axes).
-    shank += leg.foot_mass * leg.shank_length * leg.shank_length
-    return shank + foot - 2.0 * product, product - foot, foot
-
-
-def centrifugal_torques(
-    leg: LegParameters, sine_theta: float, shank_rate: float, angular_velocity: float
-) -> tuple[float, float]:
-    """Centrifugal and Coriolis torques C q' on knee and ankle [N m]; rates [rad/s]. Equations (11), (12)."""
-    product = link_product(leg) * sine_theta
-    knee = product * angular_velocity * (2.0 * shank_rate - angular_velocity)
-    return knee, -product * shank_rate * shank_rate
-
-
-def gravity_torques(
+def torque_on_knee(
     leg: LegParameters,
     sine_phi: float,
     cosine_phi: float,
     sine_alpha: float,
     cosine_alpha: float,
+    shank_rate: float,
+    shank_acceleration: float,
+    ankle_rate: float,
+    ankle_acceleration: float,
     knee_forward: float,
     knee_up: float,
-) -> tuple[float, float]:
-    """Gravity vector G on knee and ankle [N m], including the knee's acceleration [m/s^2]. Equations (11), (12).
+) -> float:
+    """Knee torque T_1 [N m] that moves shank and foot, positive where it turns the shank forward.
 
-    phi is the shank angle, alpha the foot's angle to the horizontal; the knee accelerates forward and up.
+    The first row of equation (11), in the coordinates of (12); the second is ``torque_of_shank``. phi is the shank
+    angle, alpha the foot's angle to the horizontal; rates [rad/s], accelerations [rad/s^2], [m/s^2].
     """
+    # theta is phi less alpha, plus 90 deg.
+    sine_theta = cosine_phi * cosine_alpha + sine_phi * sine_alpha
+    cosine_theta = cosine_phi * sine_alpha - sine_phi * cosine_alpha
+    mass_moment = leg.foot_mass * leg.foot_mass_centre
+    product = mass_moment * leg.shank_length
+    foot = foot_inertia_about_ankle(leg)
+    shank = leg.shank_inertia + leg.shank_mass * leg.shank_mass_centre * leg.shank_mass_centre
+    # The foot's mass turns with the shank at the end of its length (parallel axes).
+    shank += leg.foot_mass * leg.shank_length * leg.shank_length
+    coupling = product * cosine_theta - foot
+    inertial = (shank - product * cosine_theta - coupling) * shank_acceleration + coupling * ankle_acceleration
+    turning = product * sine_theta * ankle_rate * (2.0 * shank_rate - ankle_rate)
     # A knee that accelerates upwards acts as more gravity.
     up = leg.gravity + knee_up
-    shank = leg.shank_mass * leg.shank_mass_centre + leg.foot_mass * leg.shank_length
-    foot = leg.foot_mass * leg.foot_mass_centre * (cosine_alpha * up - sine_alpha * knee_forward)
-    return shank * (sine_phi * up + cosine_phi * knee_forward) + foot, -foot
+    above_ankle = leg.shank_mass * leg.shank_mass_centre + leg.foot_mass * leg.shank_length
+    weight = above_ankle * (sine_phi * up + cosine_phi * knee_forward)
+    return inertial + turning + weight + mass_moment * (cosine_alpha * up - sine_alpha * knee_forward)
 
 
 def foot_load(leg: LegParameters) -> FootLoad:
@@ -139,8 +129,8 @@ def torque_of_shank(
 ) -> float:
     """Torque [N m] about the ankle from shank motion, knee motion and weight, without the ankle's own acceleration.
 
-    The ankle's row of equation (11) without the term in theta''; angles as in ``gravity_torques``, rates [rad/s],
-    accelerations [rad/s^2], [m/s^2].
+    The second row of equation (11), in the coordinates of (12), without the term in theta''; angles as in
+    ``torque_on_knee``, rates [rad/s], accelerations [rad/s^2], [m/s^2].
     """
     # theta is phi less alpha, plus 90 deg.
     sine_theta = cosine_phi * cosine_alpha + sine_phi * sine_alpha

@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.model.contact import SWING
-from ppafo.model.leg import LegParameters, centrifugal_torques, gravity_torques, mass_matrix, passive_torque
+from ppafo.model.leg import LegParameters, passive_torque, torque_on_knee
 
 
 def dorsiflexor_moment(leg: LegParameters, record: Mapping[str, Any]) -> Floats:
@@ -27,14 +27,18 @@ def swing_knee_torque(leg: LegParameters, time: Floats, record: Mapping[str, Any
 
     In stance the torque depends on the horizontal ground reaction, which a gait file does not contain.
     """
-    theta, phi = record["state.angle"], record["walk.now.shank"]
-    alpha = phi - theta + 0.5 * np.pi
-    rate = record["state.angular_velocity"]
-    # A walk that fails at once has one sample, and no acceleration is known of it.
-    ankle_acceleration = np.gradient(rate, time) if len(time) > 1 else np.zeros_like(rate)
-    shank, coupling, _ = mass_matrix(leg, np.cos(theta))
-    turning, _ = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], rate)
-    forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
-    weight, _ = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)
-    inertial = shank * record["walk.now.shank_acceleration"] + coupling * ankle_acceleration
-    return np.where(record["walk.contact"] == SWING, inertial + turning + weight, 0.0)
+    shank, rate = record["walk.now.shank"], record["state.angular_velocity"]
+    foot = shank - record["state.angle"] + 0.5 * np.pi
+    directions = np.sin(shank), np.cos(shank), np.sin(foot), np.cos(foot)
+    torque = torque_on_knee(
+        leg,
+        *directions,
+        record["walk.now.shank_rate"],
+        record["walk.now.shank_acceleration"],
+        rate,
+        # A walk that fails at once has one sample, and no acceleration is known of it.
+        np.gradient(rate, time) if len(time) > 1 else np.zeros_like(rate),
+        record["walk.now.knee_forward"],
+        record["walk.now.knee_up"],
+    )
+    return np.where(record["walk.contact"] == SWING, torque, 0.0)

@@ -18,6 +18,7 @@ from ppafo.engine.scheme.pneumatics import (
     begin_moving_gas,
     gas_flows,
     held_chambers,
+    linearise,
     moving_change,
     second_moving_stage,
 )
@@ -181,7 +182,8 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
     )
     for _ in range(round(DURATION / step)):
         held, flowing = held_chambers(plant, ANGLE, parts=VANE_FUNCTIONS), flowing_now(plant, state, ports)
-        begun = begin_moving_gas(plant, state, held, ANGLE, flowing, step, parts=VANE_FUNCTIONS)
+        linear = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
+        begun = begin_moving_gas(plant, state, held, ANGLE, linear, flowing.flows, step, parts=VANE_FUNCTIONS)
         state = with_gas(state, end_of(plant, begun, ports, step))
     ideal = np.array(chamber_pressures(plant, ANGLE, state.mass_1, state.mass_2))
     away = []

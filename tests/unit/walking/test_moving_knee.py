@@ -10,18 +10,12 @@ import pytest
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaves
 from ppafo.engine.run import batch_of, state_row_numbers
-from ppafo.engine.scheme.walking import foot_direction
+from ppafo.engine.scheme.walking import foot_direction, torque_of_body_on_foot
 from ppafo.gait import Gait, load_gait
 from ppafo.gait.gait import GaitCurve
 from ppafo.model.contact import SWING
 from ppafo.model.gait import gait_at
-from ppafo.model.leg import (
-    LegParameters,
-    centrifugal_torques,
-    foot_inertia_about_ankle,
-    gravity_torques,
-    mass_matrix,
-)
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, foot_load
 from ppafo.signals.recording import Floats
 from ppafo.walking.gait_series import gait_series, gait_timing
 from ppafo.walking.motion import walk_of
@@ -96,13 +90,8 @@ def needed_moment(gait: Gait, leg: LegParameters, phases: Floats) -> Floats:
     for phase in phases.tolist():
         now = gait_at(series, timing, leg, phase * gait.stride_time)
         foot = foot_direction(now.shank, now.ankle)
-        _, coupling, _ = mass_matrix(leg, float(np.cos(now.ankle)))
-        _, turning = centrifugal_torques(leg, float(np.sin(now.ankle)), now.shank_rate, now.ankle_rate)
-        _, weight = gravity_torques(
-            leg, now.sine_shank, now.cosine_shank, foot.sine, foot.cosine, now.knee_forward, now.knee_up
-        )
-        inertial = foot_inertia_about_ankle(leg) * now.ankle_acceleration + coupling * now.shank_acceleration
-        found.append(inertial + turning + weight)
+        carried = torque_of_body_on_foot(foot_load(leg), now, foot)
+        found.append(carried + foot_inertia_about_ankle(leg) * now.ankle_acceleration)
     return np.array(found)
 
 

@@ -13,6 +13,7 @@ from ppafo.engine.scheme.pneumatics import (
     SlopedFlows,
     StillGas,
     added_flows,
+    flow_rates,
     held_pressures,
     linearise,
     response,
@@ -74,14 +75,14 @@ def begin_shaped_gas(
     ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
     per_mass_1 = plant.gas_product / (here.volume_1 + pressure_1 * here.compliance_1)
     per_mass_2 = plant.gas_product / (here.volume_2 + pressure_2 * here.compliance_2)
-    linear, flows = linearise(per_mass_1, per_mass_2, flowing, step)
+    linear = linearise(per_mass_1, per_mass_2, flowing, step)
     per_duration = 1.0 / (plant.gas_product * max(step, SHORTEST))
     drift = response(
         linear,
         pressure_1 * (here.volume_1 - ahead.volume_1) * per_duration,
         pressure_2 * (here.volume_2 - ahead.volume_2) * per_duration,
     )
-    first = solve_stage(linear, added_flows(flows, drift))
+    first = solve_stage(linear, added_flows(flow_rates(flowing.flows), drift))
     end_1, end_2 = parts.pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )

@@ -189,8 +189,8 @@ def solve_stage(linear: Linearisation, right: Flows) -> Flows:
     )
 
 
-def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: float) -> tuple[Linearisation, Flows]:
-    """Linearised flows at the start of a step [s], and the resulting rates [kg/s]. Equations (3), (6) to (9).
+def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: float) -> Linearisation:
+    """Linearised flows at the start of a step [s]. Equations (3), (6) to (9).
 
     ``per_mass_1`` and ``per_mass_2`` are pressure divided by mass [Pa/kg].
     """
@@ -201,7 +201,7 @@ def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: 
     c = -flowing.leak_by_1 * weight_1
     d = 1.0 - (flowing.slopes_2.total + flowing.leak_by_2) * weight_2
     scale = 1.0 / (a * d - b * c)
-    linear = Linearisation(
+    return Linearisation(
         a=a,
         b=b,
         c=c,
@@ -210,7 +210,6 @@ def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: 
         supplied_by_1=flowing.slopes_1.from_source * weight_1,
         supplied_by_2=flowing.slopes_2.from_source * weight_2,
     )
-    return linear, flow_rates(flowing.flows)
 
 
 def begin_still_gas(
@@ -223,8 +222,8 @@ def begin_still_gas(
     parts: ActuatorFunctions,
 ) -> StillGas:
     """First stage of one step [s] with a vane at rest."""
-    linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
-    first = solve_stage(linear, flows)
+    linear = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
+    first = solve_stage(linear, flow_rates(flowing.flows))
     # Pressures as in a step with moving volumes: a locked joint has the bits of an exported plant at rest.
     ended = state._replace(mass_1=state.mass_1 + step * first.mass_1, mass_2=state.mass_2 + step * first.mass_2)
     end_1, end_2 = parts.held_pressures(plant, held, ended)
@@ -236,28 +235,13 @@ def begin_moving_gas(
     state: PlantState,
     held: HeldChambers,
     next_angle: float,
-    flowing: SlopedFlows,
+    linear: Linearisation,
+    flowing: GasFlows,
     step: float,
     *,
     parts: ActuatorFunctions,
 ) -> MovingGas:
     """First stage of one step [s] with volumes that change linearly up to ``next_angle`` [rad]."""
-    linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
-    return begin_moving_stage(plant, state, held, next_angle, linear, flows, step, parts=parts)
-
-
-def begin_moving_stage(
-    plant: PlantParameters,
-    state: PlantState,
-    held: HeldChambers,
-    next_angle: float,
-    linear: Linearisation,
-    flows: Flows,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> MovingGas:
-    """First stage of one step [s] with moving volumes, from the rates at its start and their linearisation."""
     volumes = parts.rest_volumes(plant, state.angle)
     next_volumes = parts.rest_volumes(plant, next_angle)
     # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
@@ -267,7 +251,7 @@ def begin_moving_stage(
         state.mass_1 * held.per_mass_1 * (volumes[0] - next_volumes[0]) * per_duration,
         state.mass_2 * held.per_mass_2 * (volumes[1] - next_volumes[1]) * per_duration,
     )
-    first = solve_stage(linear, added_flows(flows, drift))
+    first = solve_stage(linear, added_flows(flow_rates(flowing), drift))
     end_1, end_2 = parts.pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )

@@ -16,7 +16,7 @@ from ppafo.engine.scheme.pneumatics import (
     Linearisation,
     MovingGas,
     SlopedFlows,
-    begin_moving_stage,
+    begin_moving_gas,
     held_chambers,
     linearise,
     pressure_that_matters,
@@ -92,10 +92,10 @@ def begin_fed_gas(
 ) -> FedGas:
     """First stage of one step [s] with ports at line pressures and volumes that change up to ``next_angle`` [rad]."""
     fixed = held_chambers(plant, state.angle, parts=parts)
-    linear, flows = linearise(fixed.per_mass_1, fixed.per_mass_2, flowing, step)
+    linear = linearise(fixed.per_mass_1, fixed.per_mass_2, flowing, step)
     volume_1, volume_2 = parts.rest_volumes(plant, state.angle)
     linear = with_lines(linear, volume_1 / lines.volume_1, volume_2 / lines.volume_2)
-    chambers = begin_moving_stage(plant, state, fixed, next_angle, linear, flows, step, parts=parts)
+    chambers = begin_moving_gas(plant, state, fixed, next_angle, linear, flowing.flows, step, parts=parts)
     first = chambers.still.first
     # The same stage for the flow out of line 2 alone, of which ``supplied`` is the sum with line 1.
     growth_2 = (volume_2 - parts.rest_volumes(plant, next_angle)[1]) / (volume_2 * max(step, SHORTEST))

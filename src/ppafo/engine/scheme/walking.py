@@ -10,7 +10,14 @@ from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.model import contact as ground
 from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 from ppafo.model.gait import GaitNow, GaitTiming
-from ppafo.model.leg import FootLoad, LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank
+from ppafo.model.leg import (
+    FootLoad,
+    LegParameters,
+    foot_inertia_about_ankle,
+    foot_load,
+    passive_torque,
+    torque_of_shank,
+)
 from ppafo.model.plant import (
     ActuatorFunctions,
     PlantParameters,
@@ -81,19 +88,15 @@ def torque_with_carried(
 
 def carried_foot(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> CarriedFoot:
     """Torques [N m] of foot and foot plate about the ankle for a direction of the foot."""
-    mass_moment = leg.foot_mass * leg.foot_mass_centre
-    return CarriedFoot(
-        torque_of_body_on_foot(leg, mass_moment, foot_inertia_about_ankle(leg), now, foot),
-        torque_of_body_on_foot(leg, share.mass_moment, share.inertia, now, foot),
-    )
+    load = foot_load(leg)
+    plate = load._replace(mass_moment=share.mass_moment, inertia=share.inertia)
+    return CarriedFoot(torque_of_body_on_foot(load, now, foot), torque_of_body_on_foot(plate, now, foot))
 
 
-def torque_of_body_on_foot(
-    leg: LegParameters, mass_moment: float, inertia: float, now: GaitNow, foot: Direction
-) -> float:
+def torque_of_body_on_foot(load: FootLoad, now: GaitNow, foot: Direction) -> float:
     """Torque [N m] about the ankle due to shank, knee and weight on a body fixed to the foot: ``torque_of_shank``."""
     return torque_of_shank(
-        FootLoad(mass_moment=mass_moment, inertia=inertia, shank_length=leg.shank_length, gravity=leg.gravity),
+        load,
         now.sine_shank,
         now.cosine_shank,
         foot.sine,

@@ -32,8 +32,9 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     elif parts.has_vane:
         is_held = parts.hands_chambers_on
         held = lane.held if is_held else pneumatics.held_chambers(lane.plant, lane.state.angle, parts=functions)
+        linear = pneumatics.linearise(held.per_mass_1, held.per_mass_2, lane.flowing, length)
         lane.moving_gas = pneumatics.begin_moving_gas(
-            lane.plant, lane.state, held, next_angle, lane.flowing, length, parts=functions
+            lane.plant, lane.state, held, next_angle, linear, lane.flowing.flows, length, parts=functions
         )
     else:
         lane.moving_gas = begin_shaped_gas(lane.plant, lane.state, next_angle, lane.flowing, length, parts=functions)

@@ -6,13 +6,10 @@ coil switches, a late command arrives, the vane meets a stop, a sample is due, o
 that have completed the step wait for the others, and all runs are independent.
 """
 
-from typing import Any
-
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.step import stated
 from ppafo.engine.step.lane import Lane, Now
-from ppafo.model.plant import PlantParameters
 from ppafo.model.ports import at_valve, shown_signals
 
 # Beyond 1e6 rad/s or 1 t of gas a run is lost.
@@ -109,16 +106,10 @@ def open_valve(parts: Program, lane: Lane, now: Now) -> None:
     else:
         lane.shown, lane.valve_state = parts.valve.advance(lane.valve, lane.valve_state, command, time, length)
     source = lane.plant if parts.feed is None else parts.feed.source(parts, lane)
-    port_1, port_2 = ports_behind(parts, lane, now, source)
+    port_1, port_2 = parts.valve.connect(source, lane.shown)
     pressure_1, pressure_2 = present_pressures(parts, lane)
     flow = parts.valve.port_flow
     lane.flowing = pneumatics.gas_flows(lane.plant, pressure_1, pressure_2, port_1, port_2, flow)
-
-
-def ports_behind(parts: Program, lane: Lane, now: Now, source: PlantParameters) -> tuple[Any, Any]:
-    """Return the ports of both chambers for a supply, with the present valve state."""
-    port_1, port_2 = parts.valve.connect(source, lane.shown)
-    return port_1, port_2
 
 
 def present_pressures(parts: Program, lane: Lane) -> tuple[float, float]:
@@ -158,7 +149,7 @@ def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
     if parts.stated_at_ports:
         stated.predict(parts, lane, command_of(parts, lane, now), length_of(parts, lane))
     source = lane.plant if parts.feed is None else parts.feed.source_ahead(parts, lane)
-    port_1, port_2 = ports_behind(parts, lane, now, source)
+    port_1, port_2 = parts.valve.connect(source, lane.shown)
     pressure_1, pressure_2 = parts.gas.ends(parts, lane)
     flow = parts.valve.port_flow
     sloped = pneumatics.gas_flows(lane.plant, pressure_1, pressure_2, port_1, port_2, flow)
