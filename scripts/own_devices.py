@@ -101,8 +101,8 @@ def draw_device(draw: random.Random) -> RandomValue:
 def main_gain(scenario: Scenario) -> tuple[str, bool]:
     """Path of the setting of a law that sets how fast it is, and whether a larger one is slower."""
     kind = WALKING_CONTROLLERS[scenario.controller.kind]
-    item = next(item for item in kind.quantities if set(MAIN).intersection(item.follows))
-    return f"controller.{item.name}", BOUNDARY in item.follows
+    item = next(item for item in kind.quantities if item.follows in MAIN)
+    return f"controller.{item.name}", item.follows == BOUNDARY
 
 
 def walk_law(law: str, device: RandomValue, seconds: float) -> Cell:

@@ -28,7 +28,7 @@ DEAD_BAND = Quantity(
     None,
     0.0,
     0.99,
-    follows=(nominal_term("dead_band"),),
+    follows=nominal_term("dead_band"),
 )
 BelievedBand = Annotated[float, DEAD_BAND]
 """Dead band of the valve [-] that a law compensates, by ``control.torque_loop.beyond_dead_band``."""

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from ppafo.engine.composer import ModuleText, is_step_function
 from ppafo.engine.plain_python import parse_module, refusal
-from ppafo.engine.rows import is_number, is_row, members, rebuilt
+from ppafo.engine.rows import is_number, is_row, members, rebuilt, section_row
 from ppafo.errors import ProgramError
 from ppafo.model.binding import made_of
 
@@ -327,6 +327,9 @@ class Reduction:
                 read = ast.Attribute(read, name, ast.Load())
             return read
         history = self.group_path(node.value)
+        if isinstance(self.text_of(node.slice), str):
+            # A setting by its path, which is an attribute until the text around the function has a name for it.
+            return ast.Attribute(self.visit(node.value), self.text_of(node.slice), ast.Load())
         if history not in HISTORIES:
             return self.with_reduced_operands(node)
         indices = [*map(self.visit, _indices(node)), ast.Name(NUMBER, ast.Load())]
@@ -338,13 +341,17 @@ class Reduction:
             case ast.Attribute(value=ast.Name(id="lane"), attr=name):
                 return name
             case ast.Subscript(value=ast.Name(id="lane"), slice=index):
-                path = index.value if isinstance(index, ast.Constant) else self.value_of(index)
+                path = self.text_of(index)
                 if isinstance(path, str):
                     return path
                 raise self.refuse(
                     node, f"'{ast.unparse(node)}': the name of the group must be known when the program is generated"
                 )
         return ""
+
+    def text_of(self, node: ast.expr) -> Any:
+        """Return a text that is written out, known or outside the function; any other value if it is none."""
+        return node.value if isinstance(node, ast.Constant) else self.outside_value(node)
 
     def group_read(self, name: str) -> ast.expr:
         """Return the name of a group, which becomes a parameter unless it was set before."""
@@ -359,6 +366,12 @@ class Reduction:
         if called is getattr:
             name = self.value_of(node.args[1])
             return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
+        if called is section_row:
+            kind, section = self.outside_value(node.args[0]), self.text_of(node.args[2])
+            further = [part for argument in node.args[3:] for part in self.arguments(argument)]
+            names = kind._fields[: len(kind._fields) - len(further)]
+            numbers = [ast.Attribute(node.args[1], f"{section}.{name}", ast.Load()) for name in names]
+            return ast.Call(self.placeholder(kind), [*numbers, *further], [])
         if called is rebuilt:
             return self.row_of(self.outside_value(node.args[0]), self.arguments(ast.Starred(node.args[1])))
         if is_step_function(called):

@@ -21,6 +21,14 @@ class Member(NamedTuple):
     kind: Any
 
 
+def section_row(row: Any, settings: Mapping[str, Any], section: str, *further: Any) -> Any:
+    """Return a NamedTuple filled with the numbers of a section from settings by path, its last fields with others.
+
+    In functions that prepare a run or a default the call is expanded number by number.
+    """
+    return row(*(settings[f"{section}.{name}"] for name in row._fields[: len(row._fields) - len(further)]), *further)
+
+
 def is_row(candidate: object) -> bool:
     """Return whether an object is a NamedTuple class."""
     return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")

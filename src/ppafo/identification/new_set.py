@@ -93,7 +93,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
     numbers = {path: old for path, old in parameter_set.numbers.items() if path not in others}
     # What was fitted as the pressure of both regulators holds for both.
     links = acting(links_of_set(parameter_set), {estimate.path})
-    numbers |= dict.fromkeys((estimate.path, *(path for path, link in links.items() if link.when_set)), entry)
+    numbers |= dict.fromkeys((estimate.path, *(path for path, link in links.items() if link.when)), entry)
     return replace(parameter_set, numbers=numbers)
 
 

@@ -5,7 +5,6 @@ of further parts, and calls ``parts.NAME(...)``. ``made_of`` binds the parts; th
 """
 
 import types
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -16,14 +15,6 @@ class Frame(NamedTuple):
     """Origin of a function with bound parts: the original function, and the parts."""
 
     function: PlainFunction
-    parts: Any
-
-
-class _Recipe(NamedTuple):
-    """Picklable form of a function that no module defines: frame, name and parts from which it is rebuilt."""
-
-    frame: Any
-    name: str
     parts: Any
 
 
@@ -60,25 +51,3 @@ def made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFun
     made.__qualname__, made.__module__, made.__annotations__ = name, frame.__module__, function.__annotations__
     vars(made)["frame"] = Frame(frame, parts)
     return made
-
-
-def recipe_of(value: Any) -> Any:
-    """Picklable form of a value: functions with bound parts are replaced by recipes, also inside tuples."""
-    frame = frame_of(value) if isinstance(value, types.FunctionType) else None
-    if frame is None:
-        return _item_by_item(recipe_of, value)
-    return _Recipe(recipe_of(frame.function), value.__name__, recipe_of(frame.parts))
-
-
-def by_recipe(value: Any) -> Any:
-    """Value rebuilt from its picklable form; within one process, with the same function objects."""
-    if isinstance(value, _Recipe):
-        return made_of(by_recipe(value.frame), value.name, by_recipe(value.parts))
-    return _item_by_item(by_recipe, value)
-
-
-def _item_by_item(change: Callable[[Any], Any], value: Any) -> Any:
-    if not isinstance(value, tuple):
-        return value
-    items = map(change, value)
-    return type(value)(*items) if hasattr(value, "_fields") else tuple(items)

@@ -25,8 +25,8 @@ class Quantity:
     maximum: float = math.inf
     minimum_allowed: bool = True
     """False if the value must be above ``minimum``."""
-    follows: tuple[str, ...] = ()
-    """Names of terms added to the default: of ``control.kind``, or of a loop in ``control``."""
+    follows: str = ""
+    """Name of the term added to the default: of ``control.kind``, or of a loop in ``control``."""
     words: tuple[str, ...] = ()
     """Words that a file may have in place of the number."""
     optional: bool = False

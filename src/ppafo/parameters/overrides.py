@@ -214,7 +214,7 @@ def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], v
     followers = {
         path: overrides_by_path[link.sources[0]]
         for path, link in acting(links_of_set(parameter_set, overrides_by_path), overrides_by_path).items()
-        if link.when_set
+        if link.when
     }
     # A gas brings numbers, and gauge pressures count from the atmosphere, so these two come first.
     first = [path for path in (SPECIES_PATH, ATMOSPHERE_PATH) if path in overrides_by_path]

@@ -19,7 +19,7 @@ from ppafo.parameters.graph import (
     SAME_PRESSURE,
     SECOND_PRESSURE_PATH,
     TORQUE_CONSTANT_PATH,
-    LinkedDefault,
+    Link,
     follows,
     gauge_link,
 )
@@ -262,7 +262,7 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
 
 def links_of_set(
     parameter_set: ParameterSet, set_paths: Collection[str] = (), atmosphere: float | None = None
-) -> dict[str, tuple[LinkedDefault, ...]]:
+) -> dict[str, tuple[Link, ...]]:
     """Return the links of a parameter set: gauge pressures to the atmosphere, the second regulator to the first.
 
     The second regulator follows the first if the set has the same pressure for both, unless ``set_paths`` contains only

@@ -89,7 +89,7 @@ SETTINGS = (
         None,
         1.0e4,
         1.0e8,
-        follows=(nominal_term("converter_range"),),
+        follows=nominal_term("converter_range"),
     ),
 )
 """Converter settings of an integer controller."""

@@ -13,7 +13,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import WHY_ONE_CHAMBER
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import Graph, LinkedDefault, follows, gauge_link
+from ppafo.parameters.graph import Graph, Link, follows, gauge_link
 from ppafo.simulation.assumptions import assumed_lines, read_assumptions
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, read_clock
 from ppafo.simulation.declaration import (
@@ -143,7 +143,7 @@ def _initial(reading: DocumentReader, device: Device) -> tuple[Initial, Graph]:
     """
     supply = device.supply
     pressures: list[float] = []
-    links: dict[str, tuple[LinkedDefault, ...]] = {}
+    links: dict[str, tuple[Link, ...]] = {}
     for quantity in INITIAL:
         path = f"initial.{quantity.name}"
         value = value_at(reading.document, path)
@@ -169,7 +169,7 @@ def with_settings(reading: DocumentReader, scenario: Scenario, declared: tuple[Q
     links = default_links(
         scenario, (item for item in declared if value_at(reading.document, f"controller.{item.name}") is None)
     )
-    settings: dict[str, float] = {}
+    settings, computed = dict[str, float](), dict[object, object]()
 
     def number(path: str) -> float:
         # A setting may follow one before it.
@@ -177,7 +177,7 @@ def with_settings(reading: DocumentReader, scenario: Scenario, declared: tuple[Q
 
     for item in declared:
         path = f"controller.{item.name}"
-        decided = replace(item, default=float(links[path][0].number(number))) if path in links else item
+        decided = replace(item, default=links[path][0].number(number, computed)) if path in links else item
         settings[path] = reading.number(path, decided)
     of_controller = {path.removeprefix("controller."): number for path, number in settings.items()}
     control = replace(scenario.controller, settings=of_controller)

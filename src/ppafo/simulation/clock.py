@@ -6,7 +6,7 @@ from typing import Any
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Numeric, choose, larger, rounded_up, smaller, truncated
 from ppafo.parameters.declared import value_at
-from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
+from ppafo.parameters.graph import Graph, Link
 from ppafo.parameters.overrides import read_overrides
 from ppafo.simulation.declaration import PERIOD, RATE, RUN
 from ppafo.simulation.document import DocumentReader
@@ -86,16 +86,12 @@ def read_clock(reading: DocumentReader) -> RunTimes:
 def links_of_times(document: Mapping[str, Any]) -> Graph:
     """Return the links of the step and the output interval to the other times, if the document does not give them."""
     step, output = (value_at(document, path) is not None for path in (_STEP_PATH, _OUTPUT_PATH))
-    found: dict[str, tuple[LinkedDefault, ...]] = {}
+    sources, found = (_DURATION_PATH, _PERIOD_PATH), dict[str, tuple[Link, ...]]()
     if not step:
-        sources = (_DURATION_PATH, _PERIOD_PATH)
-        with_output = LinkFunction((*sources, _OUTPUT_PATH), step_with_output)
-        term = with_output if output else LinkFunction(sources, step_unless_given)
-        found[_STEP_PATH] = (LinkedDefault((term,)),)
+        with_output = Link((*sources, _OUTPUT_PATH), step_with_output)
+        found[_STEP_PATH] = (with_output if output else Link(sources, step_unless_given),)
     if not output:
-        found[_OUTPUT_PATH] = (
-            LinkedDefault((LinkFunction((_DURATION_PATH, _PERIOD_PATH, _STEP_PATH), output_unless_given),)),
-        )
+        found[_OUTPUT_PATH] = (Link((*sources, _STEP_PATH), output_unless_given),)
     return found
 
 

@@ -1,35 +1,25 @@
 """Default controller gains of a device: rules of ``control.torque_loop`` and ``angle_loop`` for its loop and joint."""
 
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from dataclasses import replace
 
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.angle_loop import Joint
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import TorqueLoop
-from ppafo.model.actuators.kind import Range
-from ppafo.model.binding import made_of
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.model.declaration import PlainFunction, Quantity
-from ppafo.parameters.device import Device
-from ppafo.parameters.graph import LinkedDefault, LinkFunction
-from ppafo.simulation.mean_chambers import Surroundings
-from ppafo.simulation.motion_kind import LawSignals
-from ppafo.simulation.nominal import nominal_terms
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.graph import Link
+from ppafo.simulation.nominal import nominal_links
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.torque_loop import FlowNumbers, JointGainParts, loop_functions
-
-RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
-"""Names of the loop parameters from which gains are computed."""
+from ppafo.simulation.torque_loop import LoopParts
 
 _OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
     torque_loop.PROPORTIONAL_GAIN: torque_loop.proportional_gain,
     torque_loop.INTEGRAL_RATE: torque_loop.integral_rate,
     torque_loop.BOUNDARY: torque_loop.boundary_layer,
     torque_loop.CONVERGENCE: torque_loop.convergence_rate,
-    RATE: torque_loop.torque_rate,
-    DEAD_TIME: torque_loop.dead_time,
 }
 """Rule for each number that depends on the torque loop alone."""
 _OF_REACH: dict[str, Callable[[float], float]] = {
@@ -54,158 +44,56 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
 }
 """Rule for each number that depends on torque loop and joint."""
 GAIN_TERMS = frozenset((*_OF_LOOP, *_OF_REACH, *_OF_JOINT, torque_loop.OPENING, torque_loop.INTEGRAL_GAIN)) - {
-    torque_loop.REACH,
-    RATE,
-    DEAD_TIME,
+    torque_loop.REACH
 }
 """Names of the numbers that are gains of a controller, and not numbers of the device."""
 SLOPE_GAINS = ("derivative_gain", "damping")
 """Gains on the rate of the error, which are 0 by default for every device."""
 
 
-class _GainParts(NamedTuple):
-    """Functions behind a gain: torque loop or torque reach of a device, and gain rule of ``control.torque_loop``."""
-
-    number_of: Callable[..., Any]
-    rule: Callable[..., float]
+def opening_beyond_band(loop: TorqueLoop, dead_zone: float, dead_band: float) -> float:
+    """Command [-] that opens a valve with a dead band by the opening for a dead zone."""
+    return dead_band + (1.0 - dead_band) * torque_loop.dead_zone_opening(loop, dead_zone)
 
 
-class _LoopAndJoint(NamedTuple):
-    """Functions that compute the torque loop and the joint of a device."""
+def gain_links(parts: LoopParts, law: ControllerKind) -> dict[str, Link]:
+    """Return the links of default gains, by the names of ``control.torque_loop`` and ``angle_loop``."""
 
-    torque_loop_of: Callable[..., TorqueLoop]
-    joint_of: Callable[..., Joint]
+    def of_groups(rule: Callable[..., float], *groups: str, direct: tuple[str, ...] = ()) -> Link:
+        return Link(direct, rule, groups=groups, parts=parts)
 
-
-def gain_of_device(
-    settings: Any,
-    stops: Range,
-    around: Surroundings,
-    numbers: FlowNumbers,
-    valve: Any,
-    signals: Any,
-    *,
-    parts: _GainParts,
-) -> float:
-    """Default gain of a device, from its torque loop or torque reach by the rule ``parts.rule``."""
-    return parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals))
-
-
-def gain_with_setting(
-    settings: Any,
-    stops: Range,
-    around: Surroundings,
-    numbers: FlowNumbers,
-    valve: Any,
-    signals: Any,
-    setting: float,
-    *,
-    parts: _GainParts,
-) -> float:
-    """Default gain of a device, from its torque loop and another controller setting by the rule ``parts.rule``."""
-    return parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals), setting)
-
-
-def opening_beyond_band(
-    settings: Any,
-    stops: Range,
-    around: Surroundings,
-    numbers: FlowNumbers,
-    valve: Any,
-    signals: Any,
-    setting: float,
-    *,
-    parts: _GainParts,
-) -> float:
-    """Command [-] that opens a valve with a dead band by the opening from ``parts.rule``."""
-    opening = parts.rule(parts.number_of(settings, stops, around, numbers, valve, signals), setting)
-    return float(valve.dead_band + (1.0 - valve.dead_band) * opening)
-
-
-def gain_of_joint(
-    settings: Any,
-    stops: Range,
-    around: Surroundings,
-    numbers: FlowNumbers,
-    valve: Any,
-    signals: Any,
-    travel: float,
-    *,
-    parts: JointGainParts,
-) -> float:
-    """Default gain of a device, from torque loop, joint and ``travel`` [rad] per move by the rule ``parts.rule``."""
-    loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
-    return float(parts.rule(loop, parts.joint_of(settings, stops, around, signals, travel)))
-
-
-def loop_and_joint(
-    settings: Any,
-    stops: Range,
-    around: Surroundings,
-    numbers: FlowNumbers,
-    valve: Any,
-    signals: Any,
-    travel: float,
-    *,
-    parts: _LoopAndJoint,
-) -> tuple[TorqueLoop, Joint]:
-    """Torque loop and joint of a device, from which ``gain_of_joint`` computes each gain."""
-    loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
-    return loop, parts.joint_of(settings, stops, around, signals, travel)
-
-
-def default_gain_terms(
-    device: Device, law: ControllerKind, seen: LawSignals, controlled: str = TORQUE
-) -> dict[str, LinkFunction]:
-    """Return the functions for default gains, by the names of ``control.torque_loop`` and ``angle_loop``.
-
-    ``controlled`` is the controlled quantity, ``seen`` the signals of the controller.
-    """
-    controls_torque = TORQUE in law.controls
-    loops = loop_functions(device, seen, controlled)
-
-    def term(gain: PlainFunction, rule: PlainFunction, *settings: str) -> LinkFunction:
-        parts: _GainParts | JointGainParts
-        stages = None
-        if gain is gain_of_joint:
-            assert loops.joint is not None, "an angle controller has a joint"
-            parts = JointGainParts(loops.torque_loop, loops.joint, rule)
-            # In a study the loop costs more than the run: all gains of the joint have one.
-            shared = made_of(loop_and_joint, "loop_and_joint_of_device", _LoopAndJoint(loops.torque_loop, loops.joint))
-            stages = (shared, rule)
-        elif rule in _OF_REACH.values():
-            parts = _GainParts(loops.reach, rule)
-        else:
-            # A law of the angle alone has the torque loop inside it.
-            parts = _GainParts(loops.loop if controls_torque else loops.torque_loop, rule)
-        function = made_of(gain, f"{rule.__name__}_of_device", parts)
-        return LinkFunction((*loops.sources, *settings), function, loops.rows, stages=stages)
-
-    terms = {name: term(gain_of_device, rule) for name, rule in _OF_LOOP.items()}
-    if not controls_torque:
-        terms |= {name: term(gain_of_joint, rule, "controller.error_limit") for name, rule in _OF_JOINT.items()}
+    links = {name: of_groups(rule, "loop") for name, rule in _OF_LOOP.items()}
+    if not parts.controls_torque:
+        links |= {name: of_groups(rule, "loop", "joint") for name, rule in _OF_JOINT.items()}
     # The reach in an angle is not known: the dead zone of a law of the angle is to be given.
-    if controlled != ANGLE:
-        terms |= {name: term(gain_of_device, rule) for name, rule in _OF_REACH.items()}
-    has_dead_band = any(quantity.name == "dead_band" for quantity in VALVES[device.valve.kind].quantities)
-    opening = opening_beyond_band if has_dead_band else gain_with_setting
-    terms[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
+    if parts.controlled != ANGLE:
+        links |= {name: of_groups(rule, "reach") for name, rule in _OF_REACH.items()}
+    has_dead_band = any(quantity.name == "dead_band" for quantity in VALVES[parts.device.valve.kind].quantities)
+    opening = opening_beyond_band if has_dead_band else torque_loop.dead_zone_opening
+    direct = ("controller.dead_zone", *(("valve.dead_band",) if has_dead_band else ()))
+    links[torque_loop.OPENING] = of_groups(opening, "loop", direct=direct)
     # An integral goes with the proportional gain, also where that one is given.
-    gain = next((quantity.name for quantity in law.quantities if torque_loop.PROPORTIONAL_GAIN in quantity.follows), "")
-    terms[torque_loop.INTEGRAL_GAIN] = term(gain_with_setting, torque_loop.integral_gain, f"controller.{gain}")
-    return terms
+    gain = next((quantity.name for quantity in law.quantities if quantity.follows == torque_loop.PROPORTIONAL_GAIN), "")
+    links[torque_loop.INTEGRAL_GAIN] = of_groups(torque_loop.integral_gain, "loop", direct=(f"controller.{gain}",))
+    return links
 
 
-def default_links(scenario: Scenario, settings: Iterable[Quantity]) -> dict[str, tuple[LinkedDefault, ...]]:
+def loop_parts(scenario: Scenario, law: ControllerKind) -> LoopParts:
+    """Return what decides the loop of a law in a scenario besides numbers."""
+    seen = scenario.motion.motion_kind.sees(scenario)
+    return LoopParts(scenario.device, seen, scenario.controlled, TORQUE in law.controls)
+
+
+def default_links(scenario: Scenario, settings: Iterable[Quantity]) -> dict[str, tuple[Link, ...]]:
     """Return the links of those controller settings that numbers of the device decide unless given, by path."""
     following = [setting for setting in settings if setting.follows]
     if not following:
         return {}
-    device, kind = scenario.device, scenario.motion.motion_kind
-    gains = default_gain_terms(device, kind.law(scenario), kind.sees(scenario), scenario.controlled)
-    terms = nominal_terms(device) | gains
+    law = scenario.motion.motion_kind.law(scenario)
+    parts = loop_parts(scenario, law)
+    links = nominal_links(parts) | gain_links(parts, law)
     return {
-        f"controller.{item.name}": (LinkedDefault(tuple(terms[name] for name in item.follows), item.default or 0.0),)
+        f"controller.{item.name}": (replace(links[item.follows], gap=item.default or 0.0),)
         for item in following
-        if terms.keys() >= set(item.follows)
+        if item.follows in links
     }

@@ -3,17 +3,20 @@
 import logging
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import partial
 
 from ppafo.control.kind import ControllerKind
+from ppafo.control.torque_loop import TorqueLoop
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.ports import load_torque
 from ppafo.parameters.effects import effects_of
-from ppafo.parameters.graph import LinkFunction, acting
+from ppafo.parameters.graph import acting
 from ppafo.parameters.overrides import other_forms
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import DEAD_TIME, GAIN_TERMS, RATE, SLOPE_GAINS, default_gain_terms
+from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS, loop_parts
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
+from ppafo.simulation.torque_loop import Asked
 from ppafo.units.shown import in_units, shown_text, written_text
 from ppafo.wording import override_text, subject_text
 
@@ -58,9 +61,10 @@ class Gains:
         return f"gains: {'; '.join(parts)}{without}"
 
 
-def terms_of(scenario: Scenario, law: ControllerKind) -> dict[str, LinkFunction]:
-    """Return the functions of the device that determine the default gains of a scenario's controller, by name."""
-    return default_gain_terms(scenario.device, law, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
+def loop_of(scenario: Scenario, law: ControllerKind) -> TorqueLoop:
+    """Return the loop that a law closes in a scenario, from which its default gains are computed."""
+    loop: TorqueLoop = loop_parts(scenario, law).group("loop", Asked(partial(number_at, scenario)), {})
+    return loop
 
 
 def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
@@ -71,21 +75,25 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     items = [
         quantity
         for quantity in law_settings(law, scenario.controlled)
-        if GAIN_TERMS.intersection(quantity.follows) or (quantity.name in SLOPE_GAINS and settings[quantity.name])
+        if quantity.follows in GAIN_TERMS or (quantity.name in SLOPE_GAINS and settings[quantity.name])
     ]
     if not items:
         return None
-    links, terms = scenario.links, terms_of(scenario, law)
+    loop = loop_of(scenario, law)
     gains = tuple(
-        _Gain(quantity.name, quantity.unit, float(settings[quantity.name]), f"controller.{quantity.name}" in links)
+        _Gain(
+            quantity.name,
+            quantity.unit,
+            float(settings[quantity.name]),
+            f"controller.{quantity.name}" in scenario.links,
+        )
         for quantity in items
     )
-    rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
     # A load moves the chambers of a joint that nothing leads, also of one whose torque is controlled.
     of_joint = any(gain.computed for gain in gains) and not isinstance(scenario.motion, PrescribedMotion)
     loads = [effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws]
-    return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ())
+    return Gains(gains, loop.rate, loop.dead_time, CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ())
 
 
 @in_units(lambda scenario, _varied: scenario.device.shown)

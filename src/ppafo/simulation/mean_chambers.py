@@ -4,15 +4,15 @@ If the joint angle is unknown, the chambers are evaluated at a right angle or, i
 """
 
 from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from ppafo.model.actuators.kind import Chambers, Range
 from ppafo.model.actuators.vane import VaneSettings
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.model.declaration import Number, quantities_of
-from ppafo.parameters.device import VANE, Device
+from ppafo.model.declaration import PlainFunction
+from ppafo.parameters.device import VANE, Actuator, Device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import static_torque
 
@@ -26,9 +26,9 @@ LEAST_GAUGE = 1.0
 class Surroundings(NamedTuple):
     """Supply pressures of both chambers, and atmospheric pressure [Pa absolute]."""
 
-    supply_pressure: Annotated[float, Number("Pa_a", "")]
-    dorsiflexion_pressure: Annotated[float, Number("Pa_a", "")]
-    atmospheric_pressure: Annotated[float, Number("Pa_a", "")]
+    supply_pressure: float
+    dorsiflexion_pressure: float
+    atmospheric_pressure: float
 
 
 class MeanChambers(NamedTuple):
@@ -71,12 +71,6 @@ class _ShapedParts(NamedTuple):
     shape: Callable[[Any, Range], Any]
     chambers: Callable[[Any, float, float, float], Chambers]
     torque: Callable[[Any, float, float, float], float]
-
-
-class _ChamberParts(NamedTuple):
-    """Function for the chambers of an actuator at an angle [rad]."""
-
-    at: Callable[[Any, Range, Surroundings, float], MeanChambers]
 
 
 def measured_shape_of(settings: Any, stops: Range, *, parts: _MeasuredParts) -> Any:
@@ -139,46 +133,15 @@ def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *
     )
 
 
-def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: _ChamberParts) -> MeanChambers:
-    """Both chambers at the usual angle, for an unknown joint angle."""
-    return parts.at(settings, stops, around, usual_place(stops.angle_min, stops.angle_max))
-
-
-class _ChambersOf(NamedTuple):
-    """Functions for an actuator's chambers at the usual angle and at any angle.
-
-    ``sources`` are the paths of their arguments and ``rows`` the types into which these are grouped. ``at`` takes the
-    angle [rad] as an additional last argument.
-    """
-
-    function: Any
-    at: Any
-    sources: tuple[str, ...]
-    rows: tuple[type, ...]
-
-
-def chambers_of(device: Device) -> _ChambersOf:
-    """Return the functions that compute the mean chambers of a device from its numbers."""
-    actuator = device.actuator
-    kind = ACTUATORS[actuator.kind]
-    rows = (kind.settings, Range, Surroundings)
-    sections = ("actuator", "actuator", "supply")
-    names = {"supply_pressure": "pressure"}
-    sources = tuple(
-        f"{section}.{names.get(quantity.name, quantity.name)}"
-        for section, row in zip(sections, rows, strict=True)
-        for quantity in quantities_of(row)
-    )
+def chambers_of(actuator: Actuator) -> PlainFunction:
+    """Return the function of an actuator's settings, stops, surroundings and angle [rad] that gives its chambers."""
     if actuator.kind == VANE:
-        usual = made_of(usual_chambers, "usual_chambers_of_vane", _ChamberParts(vane_at))
-        return _ChambersOf(function=usual, at=vane_at, sources=sources, rows=rows)
-    name, model, shape = actuator.kind, kind.model, kind.model.prepare
+        return vane_at
+    model, name = ACTUATORS[actuator.kind].model, actuator.kind
+    shape = model.prepare
     if actuator.table is not None:
         shape = made_of(measured_shape_of, f"shape_of_{name}", _MeasuredParts(model.prepare, actuator.table))
-    shaped = _ShapedParts(shape, model.chambers, model.torque)
-    at = made_of(shaped_at, f"chambers_at_of_{name}", shaped)
-    middle = made_of(usual_chambers, f"usual_chambers_of_{name}", _ChamberParts(at))
-    return _ChambersOf(function=middle, at=at, sources=sources, rows=rows)
+    return made_of(shaped_at, f"chambers_at_of_{name}", _ShapedParts(shape, model.chambers, model.torque))
 
 
 def quicker_at(device: Device, angle: float, controlled: str) -> float:

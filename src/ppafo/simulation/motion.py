@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.errors import DataError, ScenarioError
+from ppafo.model import controlled
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
@@ -106,11 +107,12 @@ class VaneKind:
 
     def sees(self, scenario: Scenario) -> LawSignals:
         """Return the signals that the controller reads, for a joint with or without a foot."""
-        from ppafo.simulation.law_signals import seen_in_scenario
-
-        motion, is_locked = vane_motion(scenario), self.name == "locked"
-        moved = motion.profile.kind if isinstance(motion, PrescribedMotion) and not is_locked else ""
-        return seen_in_scenario(scenario.controlled, motion.leg is not None, is_locked, scenario.reference.kind, moved)
+        motion = vane_motion(scenario)
+        if scenario.controlled == controlled.ANGLE:
+            return LawSignals(scenario.reference.kind, "reference", has_leg=motion.leg is not None)
+        if self.name == "locked":
+            return LawSignals(is_locked=True)
+        return LawSignals(motion.profile.kind if isinstance(motion, PrescribedMotion) else "", "motion.profile")
 
     def follows_reference(self, scenario: Scenario) -> bool:
         """Tell whether the controller follows a reference: False for a constant command."""

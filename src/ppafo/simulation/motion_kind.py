@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 from ppafo.kinds import Kinds, declared_kinds
-from ppafo.model.declaration import PlainFunction, Quantity
+from ppafo.model.declaration import Quantity
 
 if TYPE_CHECKING:
     from ppafo.control.kind import ControllerKind
@@ -35,17 +35,16 @@ class RunTimes:
 
 
 class LawSignals(NamedTuple):
-    """Signals of a controller: their row type, a function for their delay [s], and the paths that fill the row.
+    """Signals of a controller: the joint whose controlled quantity it sees.
 
-    ``places`` computes the lowest and highest joint angle [rad] from the stops and the row. ``turning`` computes
-    inertia [kg m^2] and gravity torque [N m] from the row for a controller of an angle; None for any other.
+    ``profile`` is the kind of the profile in ``section`` that leads the angle of the joint; "" if none does.
     """
 
-    signals: type
-    late: PlainFunction
-    paths: tuple[str, ...]
-    places: PlainFunction
-    turning: PlainFunction | None = None
+    profile: str = ""
+    section: str = ""
+    is_locked: bool = False
+    has_leg: bool = False
+    in_walk: bool = False
 
 
 Measured = tuple["Recording", Mapping[str, "Metric"], str]

@@ -22,7 +22,7 @@ from ppafo.parameters.declaration import (
 )
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
-from ppafo.parameters.graph import Graph, LinkedDefault, holding, left, resolved
+from ppafo.parameters.graph import Graph, Link, holding, left, resolved
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.default_gains import default_links
@@ -185,7 +185,7 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
 
 def _moved(scenario: Scenario, replaced: Mapping[str, Any]) -> tuple[dict[str, Any], Scenario, Graph]:
     """Return numbers with all that follow them, the scenario with orifices given in their other form, and its links."""
-    changed, anew = scenario, dict[str, tuple[LinkedDefault, ...]]()
+    changed, anew = scenario, dict[str, tuple[Link, ...]]()
     for section in _changing_form(scenario, replaced):
         form = other_form(scenario.device, section)
         kind = SonicOrifice if "sonic_conductance" in form else Orifice
@@ -194,6 +194,9 @@ def _moved(scenario: Scenario, replaced: Mapping[str, Any]) -> tuple[dict[str, A
     if changed is not scenario:
         declared = scenario.motion.motion_kind.quantities(scenario)
         anew = default_links(changed, [declared[path] for path in scenario.links if path in declared])
+        for (link,) in anew.values():
+            # This finds the sources in the other form.
+            link.number(_ScenarioNumbers(changed).__getitem__)
     return resolved(scenario.graph, replaced, _ScenarioNumbers(scenario), anew), changed, anew
 
 

@@ -1,266 +1,352 @@
-"""Torque loop, torque reach and joint of a device as functions of its numbers.
+"""Torque loop, torque reach and joint of a device, each computed from the numbers of a scenario when it is asked for.
 
-Each is a generic function here: functions for the actuator's chambers, the valve's flow and the delays are inserted, so
-that one function of floats gives the number in a file, in a study and in an exported library.
+The functions ``set_NAME`` compute the group ``lane.NAME`` from other groups and ``settings``, numbers [SI] by path;
+``parts`` is known before any number. Python calls them for a file, a change and each run of a study; an exported
+library has them in C, concatenated into one function.
 """
 
-from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
-from ppafo.constants import UNIVERSAL_GAS_CONSTANT
+from ppafo.constants import STANDARD_GRAVITY, UNIVERSAL_GAS_CONSTANT
 from ppafo.control import angle_loop
 from ppafo.control.angle_loop import Joint
+from ppafo.control.profiles import TABLE, TabulatedProfile, table_bounds
 from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
+from ppafo.engine.rows import rebuilt, section_row
 from ppafo.model.actuators.kind import Range
-from ppafo.model.binding import made_of
-from ppafo.model.catalog import VALVES
-from ppafo.model.declaration import Number, PlainFunction
+from ppafo.model.catalog import ACTUATORS, VALVES
+from ppafo.model.columns import first
+from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.plant import valve_settings
-from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
+from ppafo.simulation.declaration import LOCKED_ANGLE
+from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of, usual_place
 from ppafo.simulation.motion_kind import LawSignals
-from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE
+
+_TABLES = ("tabulated", "smooth")
+LEADING = ("constant", "ramp_hold", "sine", *_TABLES)
+"""Kinds of profiles whose extreme angles are known."""
+_CHOSEN = {"pressure_1": (1.0, 0.0), "pressure_2": (0.0, 1.0), "pressure_difference": (1.0, 1.0)}
+"""Derivatives of a controlled pressure with respect to the pressure of each chamber [-]."""
 
 
-class FlowNumbers(NamedTuple):
-    """Gas properties, and the valve's area with discharge coefficient, or sonic conductance with critical ratio."""
+class Asked(dict[str, Any]):
+    """Numbers by path, read by ``present`` when they are asked for; the keys are the paths asked for, in order."""
 
-    molar_mass: Annotated[float, Number("kg/mol", "")]
-    heat_capacity_ratio: Annotated[float, Number("", "")]
-    temperature: Annotated[float, Number("K", "")]
-    orifice_1: Annotated[float, Number("", "area or sonic conductance")]
-    orifice_2: Annotated[float, Number("", "discharge coefficient or critical ratio")]
+    def __init__(self, present: Callable[[str], Any]) -> None:
+        super().__init__()
+        self.present = present
 
-
-class _SpoolParts(NamedTuple):
-    """Function for the time [s] that a spool takes to follow a command."""
-
-    follow_time: Callable[[Any], float]
+    def __missing__(self, path: str) -> Any:
+        self[path] = self.present(path)
+        return self[path]
 
 
-class _LoopParts(NamedTuple):
-    """Functions that compute the torque loop; each takes the parameter rows that it needs.
+class _Groups:
+    """Groups of one run by name, as the functions ``set_NAME`` see them: computed when they are first read."""
 
-    ``chambers_at`` gives the chambers at an angle [rad]; ``places`` the lowest and highest joint angle [rad];
-    ``valve_flow`` R T times the conductance of the valve [m^3/s]; ``time_of_valve`` the delay of the valve [s] for a
-    sample period [s]; ``time_of_signals`` the delay of the measurements [s]; ``per_pressure`` the derivative of the
-    controlled quantity with respect to the pressure of each chamber.
+    def __init__(self, compute: Callable[[str], Any]) -> None:
+        self.compute = compute
+
+    def __getattr__(self, name: str) -> Any:
+        return self.compute(name)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoopParts:
+    """Device, signals of the controller and controlled quantity: what decides the loop besides numbers.
+
+    ``controls_torque`` is False for a law of the angle alone, which has the torque loop inside it. ``reads`` are the
+    paths of the numbers that each computed group depends on.
     """
 
-    chambers_at: Callable[[Any, Range, Surroundings, float], MeanChambers]
-    places: Callable[[Range, Any], tuple[float, float]]
-    valve_flow: Callable[[FlowNumbers], float]
-    time_of_valve: Callable[[Any, float], float]
-    time_of_signals: Callable[[Any], float]
-    per_pressure_1: Callable[[MeanChambers], float]
-    per_pressure_2: Callable[[MeanChambers], float]
+    device: Device
+    seen: LawSignals
+    controlled: str = TORQUE
+    controls_torque: bool = True
+    reads: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def actuator_settings(self) -> Any:
+        """Class of the actuator's settings."""
+        return ACTUATORS[self.device.actuator.kind].settings
+
+    @property
+    def chambers_at(self) -> PlainFunction:
+        """Function for the chambers of the actuator at an angle."""
+        return chambers_of(self.device.actuator)
+
+    @property
+    def valve_settings(self) -> Any:
+        """Class of the valve's settings."""
+        return VALVES[self.device.valve.kind].settings
+
+    @property
+    def is_pair(self) -> bool:
+        """True for a pair of on/off valves."""
+        return {"opening_delay", "closing_delay", "switching_interval"}.issubset(self.valve_settings._fields)
+
+    @property
+    def follow_time(self) -> PlainFunction:
+        """Function for the time [s] that the spool of a proportional valve takes to follow a command."""
+        kind = VALVES[self.device.valve.kind]
+        return kind.lag or kind.choose(valve_settings(self.device.valve)).command_delay
+
+    @property
+    def is_sonic(self) -> bool:
+        """True for a valve given by its sonic conductance."""
+        return isinstance(self.device.valve.orifice, SonicOrifice)
+
+    @property
+    def of_pressure(self) -> tuple[float, float] | None:
+        """Derivatives of a controlled pressure with respect to both chambers' pressures; None for a torque or angle."""
+        return _CHOSEN.get(self.controlled)
+
+    @property
+    def is_slow(self) -> bool:
+        """True for a controller that opens the valve in proportion to the error of an angle."""
+        return self.controls_torque and self.controlled == ANGLE
+
+    def group(self, name: str, numbers: Mapping[str, float], computed: dict[Any, Any]) -> Any:
+        """Return a group from numbers of one run; ``computed`` keeps it for the same numbers."""
+        if name in self.reads:
+            key = (id(self), name, *(numbers[path] for path in self.reads[name]))
+            if key in computed:
+                return computed[key]
+        settings = Asked(numbers.__getitem__)
+        lane = _Groups(lambda other: self.group(other, settings, computed))
+        GROUPS[name](self, lane, settings)
+        self.reads[name] = tuple(settings)
+        return computed.setdefault((id(self), name, *settings.values()), vars(lane)[name])
+
+    def functions(self, groups: Collection[str], present: Callable[[str], Any]) -> list[PlainFunction]:
+        """Return the functions that compute some groups, in order of calling."""
+        alone = replace(self, reads={})
+        alone.note_reads(groups, present, {})
+        return [GROUPS[name] for name in alone.reads]
+
+    def note_reads(self, groups: Collection[str], present: Callable[[str], Any], computed: dict[Any, Any]) -> None:
+        """Find the paths of the numbers that decide some groups, which those of the first run tell."""
+        for name in groups:
+            if name not in self.reads:
+                self.group(name, Asked(lambda path: first(present(path))), computed)
 
 
-class _JointParts(NamedTuple):
-    """Functions for the joint: mean chambers of the actuator; inertia [kg m^2] and gravity torque [N m]."""
-
-    mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
-    turning: Callable[[Any], tuple[float, float]]
+def set_actuator(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the settings of the actuator."""
+    lane.actuator = section_row(parts.actuator_settings, settings, "actuator")
 
 
-class JointGainParts(NamedTuple):
-    """Functions behind a gain of an angle controller: torque loop, joint, and rule of ``control.angle_loop``."""
-
-    torque_loop_of: Callable[..., TorqueLoop]
-    joint_of: Callable[..., Joint]
-    rule: Callable[[TorqueLoop, Joint], Any]
+def set_stops(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
+    """Set stops and dead volumes."""
+    lane.stops = section_row(Range, settings, "actuator")
 
 
-def area_flow(numbers: FlowNumbers) -> float:
+def set_around(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
+    """Set the pressures around the device."""
+    lane.around = Surroundings(
+        settings["supply.pressure"], settings["supply.dorsiflexion_pressure"], settings["supply.atmospheric_pressure"]
+    )
+
+
+def set_valve(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the settings of the valve."""
+    lane.valve = section_row(parts.valve_settings, settings, "valve")
+
+
+def set_usual(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
+    """Set the chambers at the usual angle, for an unknown joint angle."""
+    lane.usual = parts.chambers_at(
+        lane.actuator, lane.stops, lane.around, usual_place(lane.stops.angle_min, lane.stops.angle_max)
+    )
+
+
+def within(stops: Range, one: float, other: float) -> tuple[float, float]:
+    """Two angles [rad], limited to the range between the stops."""
+    return between(stops, one), between(stops, other)
+
+
+def between(stops: Range, angle: float) -> float:
+    """Angle [rad], limited to the range between the stops."""
+    return float(min(max(angle, stops.angle_min), stops.angle_max))
+
+
+def set_places(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the two extreme angles of the joint [rad]: where it is locked or its profile leads, else the usual angle."""
+    kind = parts.seen.profile
+    of_profile = f"{parts.seen.section}."
+    if parts.seen.is_locked:
+        lane.places = (settings[LOCKED_ANGLE], settings[LOCKED_ANGLE])
+    elif kind == "constant":
+        lane.places = within(lane.stops, settings[of_profile + "level"], settings[of_profile + "level"])
+    elif kind == "ramp_hold":
+        lane.places = within(lane.stops, settings[of_profile + "start_level"], settings[of_profile + "level"])
+    elif kind == "sine":
+        level = settings[of_profile + "level"]
+        amplitude = settings[of_profile + "amplitude"]
+        lane.places = within(lane.stops, level - amplitude, level + amplitude)
+    elif kind in _TABLES:
+        # Curves exceed the knots slightly.
+        bounds = table_bounds(
+            rebuilt(TabulatedProfile, (settings[of_profile + quantity.name] for quantity in TABLE.quantities))
+        )
+        lane.places = within(lane.stops, bounds[0], bounds[1])
+    else:
+        place = usual_place(lane.stops.angle_min, lane.stops.angle_max)
+        lane.places = (place, place)
+
+
+def lag_of_sensor(bandwidth: float) -> float:
+    """Time constant [s] of a sensor with a bandwidth [Hz]; 0 for bandwidth 0, which means an ideal sensor."""
+    return 1.0 / (2.0 * math.pi * bandwidth) if bandwidth > 0.0 else 0.0
+
+
+def set_late(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the delay of the measurements [s]: transport, which a walk has not, and lag of the slowest sensor."""
+    lag = lag_of_sensor(settings["sensors.pressure_bandwidth"])
+    if parts.controlled == ANGLE:
+        lane.late = settings["sensors.delay"] + max(lag, lag_of_sensor(settings["sensors.angle_bandwidth"]))
+    elif parts.seen.in_walk:
+        lane.late = lag
+    else:
+        lane.late = settings["sensors.delay"] + lag
+
+
+def flow_of_area(molar_mass: float, ratio: float, temperature: float, area: float, discharge: float) -> float:
     """Flow coefficient of an orifice area: R T times its conductance [m^3/s]. Equation (6)."""
-    ratio, temperature = numbers.heat_capacity_ratio, numbers.temperature
-    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, numbers.molar_mass)
-    return constant * temperature * area_conductance(numbers.orifice_1, numbers.orifice_2, ratio, constant, temperature)
+    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
+    return constant * temperature * area_conductance(area, discharge, ratio, constant, temperature)
 
 
-def sonic_flow(numbers: FlowNumbers) -> float:
+def flow_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
     """Flow coefficient of a sonic orifice: R T times its conductance [m^3/s]. ISO 6358-1."""
-    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, numbers.molar_mass)
-    return constant * numbers.temperature * sonic_conductance_mass(numbers.orifice_1, constant, numbers.temperature)
+    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
+    return constant * temperature * sonic_conductance_mass(sonic, constant, temperature)
 
 
-def time_of_spool(valve: Any, period: float, *, parts: _SpoolParts) -> float:
-    """Delay [s] from a sample to the flow of a proportional valve: time of the spool, plus sample delay."""
-    return parts.follow_time(valve) + SAMPLES_LATE * period
+def set_flow(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the flow coefficient of the valve [m^3/s]."""
+    if parts.is_sonic:
+        lane.flow = flow_of_sonic(
+            settings["gas.molar_mass"], settings["gas.temperature"], settings["valve.sonic_conductance"]
+        )
+    else:
+        lane.flow = flow_of_area(
+            settings["gas.molar_mass"],
+            settings["gas.heat_capacity_ratio"],
+            settings["gas.temperature"],
+            settings["valve.area"],
+            settings["valve.discharge_coefficient"],
+        )
 
 
-def time_of_pair(valve: Any, period: float) -> float:
-    """Delay [s] from a sample to the flow of a pair of on/off valves: switching delay, plus wait for the switching."""
-    delay: float = max(valve.opening_delay, valve.closing_delay)
-    wait: float = max(SAMPLES_LATE * period, valve.switching_interval)
-    return delay + wait
+def set_valve_time(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the delay [s] from a sample to the flow: switching delay and wait of a pair; spool, and sample delay."""
+    sampled = SAMPLES_LATE * settings["controller.period"]
+    if parts.is_pair:
+        lane.valve_time = max(lane.valve.opening_delay, lane.valve.closing_delay) + max(
+            sampled, lane.valve.switching_interval
+        )
+    else:
+        lane.valve_time = parts.follow_time(lane.valve) + sampled
 
 
-def torque_by_pressure_1(mean: MeanChambers) -> float:
-    """Derivative of the torque with respect to the pressure in chamber 1 [m^3], positive."""
-    return mean.torque_per_pressure_1
+class _PerPressure(NamedTuple):
+    """Derivatives of the controlled quantity with respect to the pressure of each chamber, both positive."""
+
+    one: float
+    other: float
 
 
-def torque_by_pressure_2(mean: MeanChambers) -> float:
-    """Negative derivative of the torque with respect to the pressure in chamber 2 [m^3]."""
-    return mean.torque_per_pressure_2
+def per_flow(mean: MeanChambers, by: _PerPressure, source_1: float, source_2: float) -> float:
+    """Larger rate of the controlled quantity for a volume flow from the sources [Pa]: K P / V."""
+    return max(by.one * source_1 / mean.volume_1, by.other * source_2 / mean.volume_2)
 
 
-def same_pressure(_mean: MeanChambers) -> float:
-    """Derivative of a controlled pressure with respect to itself [-]: 1."""
-    return 1.0
+def by_torque(mean: MeanChambers) -> _PerPressure:
+    """Derivatives of the torque with respect to the pressure of each chamber [m^3]."""
+    return _PerPressure(mean.torque_per_pressure_1, mean.torque_per_pressure_2)
 
 
-def other_pressure(_mean: MeanChambers) -> float:
-    """Derivative of a controlled pressure with respect to the other chamber's pressure [-]: 0."""
-    return 0.0
-
-
-def loop_of(
-    settings: Any,
-    stops: Range,
-    around: Surroundings,
-    numbers: FlowNumbers,
-    valve: Any,
-    signals: Any,
-    *,
-    parts: _LoopParts,
-) -> TorqueLoop:
-    """Torque or pressure loop at constant volume: R = K q max(P_1 / V_1, P_2 / V_2), theta; K 1 or 0 for a pressure.
+def set_torque_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
+    """Set the torque or pressure loop at constant volume: R = K q max(P_1 / V_1, P_2 / V_2), theta.
 
     R is the larger value of the two extreme joint angles, at which the loop is fastest; theta is the dead time.
     """
-    lowest, highest = parts.places(stops, signals)
-    chambers = parts.chambers_at(settings, stops, around, lowest)
-    other = parts.chambers_at(settings, stops, around, highest)
     # A chamber at a vacuum is filled from the room, quicker than it is emptied.
-    source_1 = max(around.supply_pressure, around.atmospheric_pressure)
-    source_2 = max(around.dorsiflexion_pressure, around.atmospheric_pressure)
-    per_flow = max(
-        parts.per_pressure_1(chambers) * source_1 / chambers.volume_1,
-        parts.per_pressure_2(chambers) * source_2 / chambers.volume_2,
-        parts.per_pressure_1(other) * source_1 / other.volume_1,
-        parts.per_pressure_2(other) * source_2 / other.volume_2,
-    )
-    return TorqueLoop(
-        rate=parts.valve_flow(numbers) * per_flow,
-        dead_time=parts.time_of_valve(valve, signals.period) + parts.time_of_signals(signals),
-    )
-
-
-def reach_of(
-    settings: Any,
-    stops: Range,
-    around: Surroundings,
-    _numbers: FlowNumbers,
-    _valve: Any,
-    signals: Any,
-    *,
-    parts: _LoopParts,
-) -> float:
-    """Largest change of torque [N m] or pressure [Pa] from one supply while the other chamber is vented."""
-    lowest, _ = parts.places(stops, signals)
-    mean = parts.chambers_at(settings, stops, around, lowest)
-    gauge_1 = abs(around.supply_pressure - around.atmospheric_pressure)
-    gauge_2 = abs(around.dorsiflexion_pressure - around.atmospheric_pressure)
-    return max(parts.per_pressure_1(mean) * gauge_1, parts.per_pressure_2(mean) * gauge_2, 0.0)
-
-
-def joint_of(
-    settings: Any, stops: Range, around: Surroundings, signals: Any, travel: float, *, parts: _JointParts
-) -> Joint:
-    """Joint of a device with its gas at atmospheric pressure, where the gas spring is softest."""
-    mean = parts.mean_chambers(settings, stops, around)
-    inertia, weight = parts.turning(signals)
-    spring_1 = mean.torque_per_pressure_1 * mean.growth_1 * around.atmospheric_pressure / mean.volume_1
-    spring_2 = mean.torque_per_pressure_2 * mean.growth_2 * around.atmospheric_pressure / mean.volume_2
-    return Joint(
-        inertia=inertia,
-        stiffness=spring_1 + spring_2,
-        damping=signals.viscous_damping,
-        friction=signals.dynamic_torque,
-        static_friction=signals.static_torque,
-        travel=travel,
-        gravity=weight,
-        resolution=signals.angle_resolution,
-        noise=signals.angle_noise,
-    )
-
-
-def slow_loop_of(
-    settings: Any,
-    stops: Range,
-    around: Surroundings,
-    numbers: FlowNumbers,
-    valve: Any,
-    signals: Any,
-    *,
-    parts: JointGainParts,
-) -> TorqueLoop:
-    """Angle loop of a controller that opens the valve in proportion to its error: ``parts.rule`` is ``slow_loop``."""
-    loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
-    slow_loop: TorqueLoop = parts.rule(loop, parts.joint_of(settings, stops, around, signals, 0.0))
-    return slow_loop
-
-
-_PER_PRESSURE: dict[str, tuple[Callable[[MeanChambers], float], Callable[[MeanChambers], float]]] = {
-    "pressure_1": (same_pressure, other_pressure),
-    "pressure_2": (other_pressure, same_pressure),
-    "pressure_difference": (same_pressure, same_pressure),
-}
-"""Derivatives of a controlled pressure with respect to both chamber pressures."""
-
-
-class _LoopFunctions(NamedTuple):
-    """Functions that compute the loop of the controlled quantity, its reach, and the torque loop.
-
-    ``rows`` are the row types and ``sources`` the paths that fill them. ``joint`` is the function for the joint, None
-    unless the controller controls an angle.
-    """
-
-    loop: PlainFunction
-    reach: PlainFunction
-    torque_loop: PlainFunction
-    rows: tuple[type, ...]
-    sources: tuple[str, ...]
-    joint: PlainFunction | None
-
-
-def loop_functions(device: Device, seen: LawSignals, controlled: str) -> _LoopFunctions:
-    """Return the loop functions of a device for a controller with given signals."""
-    valve, sonic = VALVES[device.valve.kind], isinstance(device.valve.orifice, SonicOrifice)
-    chambers = chambers_of(device)
-    settings = tuple(quantity.name for quantity in valve.quantities)
-    if {"opening_delay", "closing_delay", "switching_interval"}.issubset(settings):
-        time_of_valve: PlainFunction = time_of_pair
+    source_1 = max(lane.around.supply_pressure, lane.around.atmospheric_pressure)
+    source_2 = max(lane.around.dorsiflexion_pressure, lane.around.atmospheric_pressure)
+    here = parts.chambers_at(lane.actuator, lane.stops, lane.around, lane.places[0])
+    there = parts.chambers_at(lane.actuator, lane.stops, lane.around, lane.places[1])
+    if parts.of_pressure is None:
+        quickest = max(
+            per_flow(here, by_torque(here), source_1, source_2), per_flow(there, by_torque(there), source_1, source_2)
+        )
     else:
-        follow_time = valve.lag or valve.choose(valve_settings(device.valve)).command_delay
-        time_of_valve = made_of(time_of_spool, "time_of_spool_valve", _SpoolParts(follow_time))
-    per_pressure_1, per_pressure_2 = _PER_PRESSURE.get(controlled, (torque_by_pressure_1, torque_by_pressure_2))
-    parts = _LoopParts(
-        chambers_at=chambers.at,
-        places=seen.places,
-        valve_flow=sonic_flow if sonic else area_flow,
-        time_of_valve=time_of_valve,
-        time_of_signals=seen.late,
-        per_pressure_1=per_pressure_1,
-        per_pressure_2=per_pressure_2,
+        by = _PerPressure(parts.of_pressure[0], parts.of_pressure[1])
+        quickest = max(per_flow(here, by, source_1, source_2), per_flow(there, by, source_1, source_2))
+    lane.torque_loop = TorqueLoop(lane.flow * quickest, lane.valve_time + lane.late)
+
+
+def set_reach(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
+    """Set the largest change of torque [N m] or pressure [Pa] from one supply while the other chamber is vented."""
+    gauge_1 = abs(lane.around.supply_pressure - lane.around.atmospheric_pressure)
+    gauge_2 = abs(lane.around.dorsiflexion_pressure - lane.around.atmospheric_pressure)
+    if parts.of_pressure is None:
+        mean = parts.chambers_at(lane.actuator, lane.stops, lane.around, lane.places[0])
+        lane.reach = max(mean.torque_per_pressure_1 * gauge_1, mean.torque_per_pressure_2 * gauge_2, 0.0)
+    else:
+        lane.reach = max(parts.of_pressure[0] * gauge_1, parts.of_pressure[1] * gauge_2, 0.0)
+
+
+def set_joint(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the joint of a device with its gas at atmospheric pressure, where the gas spring is softest."""
+    room = lane.around.atmospheric_pressure
+    mean = lane.usual
+    inertia = settings["foot_plate.inertia"]
+    weight = settings["foot_plate.gravity_torque"]
+    if parts.seen.has_leg:
+        moment = settings["motion.foot_mass"] * settings["motion.foot_mass_centre"]
+        inertia = inertia + settings["motion.foot_inertia"] + moment * settings["motion.foot_mass_centre"]
+        weight = weight + moment * STANDARD_GRAVITY
+    lane.joint = Joint(
+        inertia=inertia,
+        stiffness=mean.torque_per_pressure_1 * mean.growth_1 * room / mean.volume_1
+        + mean.torque_per_pressure_2 * mean.growth_2 * room / mean.volume_2,
+        damping=settings["friction.viscous_damping"],
+        friction=settings["friction.dynamic_torque"],
+        static_friction=settings["friction.static_torque"],
+        travel=0.0 if parts.controls_torque else settings["controller.error_limit"],
+        gravity=weight,
+        resolution=settings["sensors.angle_resolution"],
+        noise=settings["sensors.angle_noise"],
     )
-    loop = torque_loop = made_of(loop_of, "loop_of_device", parts)
-    joint: PlainFunction | None = None
-    if seen.turning is not None:
-        joint = made_of(joint_of, "joint_of_device", _JointParts(chambers.function, seen.turning))
-        slow_parts = JointGainParts(torque_loop, joint, angle_loop.slow_loop)
-        loop = made_of(slow_loop_of, "slow_loop_of_device", slow_parts)
-    sources = (
-        *chambers.sources,
-        *("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature"),
-        *(SONIC_PATHS if sonic else AREA_PATHS)[VALVE],
-        *(f"valve.{name}" for name in settings),
-        *seen.paths,
-    )
-    rows = (*chambers.rows, FlowNumbers, valve.settings, seen.signals)
-    reach = made_of(reach_of, "reach_of_device", parts)
-    return _LoopFunctions(loop=loop, reach=reach, torque_loop=torque_loop, rows=rows, sources=sources, joint=joint)
+
+
+def set_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
+    """Set the loop that the controller closes."""
+    lane.loop = angle_loop.slow_loop(lane.torque_loop, lane.joint) if parts.is_slow else lane.torque_loop
+
+
+GROUPS: Mapping[str, PlainFunction] = {
+    "actuator": set_actuator,
+    "stops": set_stops,
+    "around": set_around,
+    "valve": set_valve,
+    "usual": set_usual,
+    "places": set_places,
+    "late": set_late,
+    "flow": set_flow,
+    "valve_time": set_valve_time,
+    "torque_loop": set_torque_loop,
+    "reach": set_reach,
+    "joint": set_joint,
+    "loop": set_loop,
+}
+"""Function of each group by the name of the group, which it sets."""

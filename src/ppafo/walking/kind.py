@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ppafo.control.kind import ControllerKind
-from ppafo.simulation.law_signals import IN_WALK
 from ppafo.simulation.motion_kind import WALK, LawSignals
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import contradictions, evaluation, motion, planning
@@ -36,7 +35,7 @@ class WalkKind:
 
     def sees(self, _scenario: Scenario) -> LawSignals:
         """Return the torque signals that the controller receives."""
-        return IN_WALK
+        return LawSignals(in_walk=True)
 
     def follows_reference(self, _scenario: Scenario) -> bool:
         """Return False: the controller generates its own reference in each phase of the gait."""

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.control.torque_loop import REACH
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.simulation import at_hand
-from ppafo.simulation.gains import terms_of
+from ppafo.simulation.default_gains import loop_parts
 from ppafo.simulation.numbers import changes_in, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
+from ppafo.simulation.torque_loop import Asked
 from ppafo.simulation.tracking import Tracking, tracking_in
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.simulation.tracking.remedies import level_text
@@ -133,7 +133,7 @@ def limited_request(scenario: Scenario) -> str:
     peaks = {name: settings[name] for name in PEAKS if settings.get(name, 0.0) > limit}
     if not peaks or law is None:
         return ""
-    reach = float(terms_of(scenario, law)[REACH].number(partial(number_at, scenario)))
+    reach = loop_parts(scenario, law).group("reach", Asked(partial(number_at, scenario)), {})
     larger, present = (level_text("N m", torque) for torque in (min(max(peaks.values()), reach), limit))
     advice = f"the actuator gives at most {level_text('N m', reach)} at this supply pressure"
     if reach > limit and larger != present:

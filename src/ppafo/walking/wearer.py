@@ -15,11 +15,10 @@ from typing import Annotated, Any, NamedTuple
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
-from ppafo.model.binding import made_of
-from ppafo.model.declaration import Number, PlainFunction, Quantity, quantities_of
+from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.leg import LegParameters
 from ppafo.parameters.declared import value_at
-from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
+from ppafo.parameters.graph import Graph, Link
 from ppafo.simulation.declaration import FOOT
 from ppafo.simulation.document import DocumentReader
 
@@ -160,52 +159,18 @@ _SHARES: Mapping[str, float] = {
 """Numbers of the paper subject's leg divided by the powers of body mass and stature from ``SCALING``."""
 
 
-class _SegmentParts(NamedTuple):
-    """Number of a segment divided by the powers of body mass and stature with which the number scales."""
-
-    share: float
-
-
-def segment_length(stature: float, *, parts: _SegmentParts) -> float:
-    """Return a length in the leg [m] for a stature [m]."""
-    return parts.share * stature
-
-
-def segment_mass(_stature: float, body_mass: float, *, parts: _SegmentParts) -> float:
-    """Return the mass of a segment [kg] for a body mass [kg]."""
-    return parts.share * body_mass
-
-
-def segment_inertia(stature: float, body_mass: float, *, parts: _SegmentParts) -> float:
-    """Return the inertia of a segment about its mass centre [kg m^2], for a stature [m] and a body mass [kg]."""
-    return parts.share * body_mass * stature * stature
-
-
-_BY_EXPONENTS: Mapping[tuple[int, int], PlainFunction] = {
-    (0, 1): segment_length,
-    (1, 0): segment_mass,
-    (1, 2): segment_inertia,
-}
-_FOLLOWING: Mapping[str, PlainFunction] = {
-    name: made_of(function, f"{name}_of", _SegmentParts(_SHARES[name]))
-    for exponents, function in _BY_EXPONENTS.items()
-    for name in SCALING
-    if SCALING[name] == exponents and name != "body_mass"
-}
-"""Functions of stature and body mass by segment number."""
 STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 
 
 def links_of_stature(document: Mapping[str, Any]) -> Graph:
     """Return links from stature and body mass to segments of a walk file, active now or when a stature is given."""
-    is_later = value_at(document, STATURE) is None
-    links: dict[str, tuple[LinkedDefault, ...]] = {}
-    for name, function in _FOLLOWING.items():
-        # A link becomes active when its first source is given, so the stature is a source of masses too.
-        sources = (STATURE,) if SCALING[name] == (0, 1) else (STATURE, BODY_MASS)
-        if value_at(document, f"wearer.{name}") is None:
-            links[f"wearer.{name}"] = (LinkedDefault((LinkFunction(sources, function),), when_set=is_later),)
-    return links
+    when = STATURE if value_at(document, STATURE) is None else ""
+    # A link becomes active when its first source is given, so the stature is a source of masses too.
+    return {
+        f"wearer.{name}": (Link((BODY_MASS,) * of_mass + (STATURE,) * of_stature, when=when, factor=_SHARES[name]),)
+        for name, (of_mass, of_stature) in SCALING.items()
+        if name != "body_mass" and value_at(document, f"wearer.{name}") is None
+    }
 
 
 def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:

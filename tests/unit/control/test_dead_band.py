@@ -24,7 +24,7 @@ def test_every_law_that_asks_for_openings_follows_the_dead_band_of_its_valve() -
     for name, kind in laws.items():
         follows = {quantity.name: quantity.follows for quantity in kind.quantities}
         # The opening of a law with a dead zone is a number that has the band in it.
-        assert follows.get("dead_band") == (nominal_term("dead_band"),) or follows.get("opening") == (OPENING,), name
+        assert nominal_term("dead_band") == follows.get("dead_band") or follows.get("opening") == OPENING, name
 
 
 @pytest.mark.parametrize("kind", ["pid", "sliding_mode", "pid_fixed_point"])

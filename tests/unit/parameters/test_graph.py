@@ -1,15 +1,10 @@
 """Links between settings: which act, what they come to, and when they end."""
 
-from typing import Annotated, NamedTuple
-
 import numpy as np
-import pytest
 
-from ppafo.model.declaration import Number
 from ppafo.parameters.graph import (
     Graph,
-    LinkedDefault,
-    LinkFunction,
+    Link,
     acting,
     follows,
     gauge_link,
@@ -68,14 +63,7 @@ def test_a_gauge_pressure_of_supply_and_start_counts_from_the_atmosphere_and_no_
     assert gauge_link(FIRST, 2.0, "bar_a") == gauge_link("controller.filled_pressure", 2.0, "bar_g") == ()
 
 
-class Pair(NamedTuple):
-    """Two numbers, by name."""
-
-    x: Annotated[float, Number("-", "a number", minimum=0.0, maximum=10.0)]
-    y: Annotated[float, Number("-", "another one", minimum=0.0, maximum=10.0)]
-
-
-def test_terms_are_summed_and_one_with_settings_takes_them_by_name() -> None:
-    link = LinkedDefault((LinkFunction(("a", "b"), lambda row: row.x * row.y, (Pair,)), LinkFunction(("b",))), 0.5)
-    assert link.sources == ("a", "b", "b")
-    assert link.number({"a": 2.0, "b": 3.0}.__getitem__) == pytest.approx(9.5)
+def test_a_default_is_a_product_or_a_function_of_other_numbers_plus_a_gap() -> None:
+    numbers = {"a": 2.0, "b": np.array([3.0, 4.0])}
+    assert Link(("a", "a", "b"), gap=0.5, factor=10.0).number(numbers.__getitem__).tolist() == [120.5, 160.5]
+    assert Link(("a", "b"), lambda a, b: b if a < b else a).number(numbers.__getitem__).tolist() == [3.0, 4.0]

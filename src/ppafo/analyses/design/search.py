@@ -27,11 +27,12 @@ from ppafo.progress import Progress, Report
 from ppafo.report.kind import Kind
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
-from ppafo.simulation.default_gains import default_gain_terms
+from ppafo.simulation.default_gains import gain_links
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.law_signals import IN_SCENARIO
+from ppafo.simulation.motion_kind import LawSignals
 from ppafo.simulation.numbers import NOISE_SEED, number_at, with_numbers
 from ppafo.simulation.simulate import simulate
+from ppafo.simulation.torque_loop import LoopParts
 from ppafo.simulation.tracking import REVERSALS
 from ppafo.studies.draws import seeds_of_noise
 from ppafo.study.runs import oscillating
@@ -253,10 +254,10 @@ class Trials:
         ``columns`` replace numbers of the device by path.
         """
         scenario = self.problem.scenario
-        term = default_gain_terms(scenario.device, CONTROLLERS[scenario.controller.kind], IN_SCENARIO)[
+        link = gain_links(LoopParts(scenario.device, LawSignals()), CONTROLLERS[scenario.controller.kind])[
             PROPORTIONAL_GAIN
         ]
-        return term.number(lambda path: columns[path] if path in columns else number_at(scenario, path))
+        return link.number(lambda path: columns[path] if path in columns else number_at(scenario, path))
 
 
 def size_for_profile(problem: SizingProblem, threads: int | None, report: Report) -> Sizing:

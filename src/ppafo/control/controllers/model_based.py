@@ -20,7 +20,7 @@ SMALLEST_GAIN = 1.0e-3
 
 def _believed(name: str, unit: str, what: str, minimum: float, maximum: float) -> Quantity:
     """Declare a parameter of the nominal device, which defaults to the value of the device."""
-    return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=(nominal_term(name),))
+    return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=nominal_term(name))
 
 
 class NominalChambers(NamedTuple):
@@ -181,7 +181,7 @@ class _FeedbackLinearisationParameters(NamedTuple):
     """Decay rate of the error [1/s], time constant of the velocity filter [s], and the nominal device."""
 
     convergence_rate: Annotated[
-        float, Number("1/s", "rate at which the torque error decays", None, 0.0, 1.0e6, follows=(CONVERGENCE,))
+        float, Number("1/s", "rate at which the torque error decays", None, 0.0, 1.0e6, follows=CONVERGENCE)
     ]
     # Of the angle sensor and not of the device: some samples at 1 kHz, short against any valve.
     rate_filter: Annotated[float, Number("s", "time constant of the filter on the angle's rate", 0.0018, 0.0, 10.0)]

@@ -15,8 +15,8 @@ from ppafo.model.sensors import Measurement
 class PidGains(NamedTuple):
     """PID gains [1/(N m)], [1/(N m s)], [s/(N m)]; derivative filter time constant [s]; back-calculation gain [1/s]."""
 
-    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))]
-    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", None, 0.0, 1.0e6, follows=(INTEGRAL_GAIN,))]
+    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e3, follows=PROPORTIONAL_GAIN)]
+    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", None, 0.0, 1.0e6, follows=INTEGRAL_GAIN)]
     derivative_gain: Annotated[float, Number("s/(N m)", "k_d", 0.0, 0.0, 1.0e3)]
     derivative_filter: Annotated[
         float, Number("s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0)
@@ -29,7 +29,7 @@ class PidGains(NamedTuple):
             None,
             0.0,
             1.0e5,
-            follows=(INTEGRAL_RATE,),
+            follows=INTEGRAL_RATE,
         ),
     ]
 

@@ -71,12 +71,12 @@ ON_OFF = ControllerKind(
 class OnOffDeadZoneParameters(NamedTuple):
     """Errors at which the valve opens and closes again [N m], and the command while open [-]."""
 
-    dead_zone: Annotated[float, Number("N m", "error at which the valve opens", None, 0.0, 100.0, follows=(DEAD_ZONE,))]
+    dead_zone: Annotated[float, Number("N m", "error at which the valve opens", None, 0.0, 100.0, follows=DEAD_ZONE)]
     release: Annotated[
         float,
-        Number("N m", "error at which it closes again; the dead zone at most", None, 0.0, 100.0, follows=(RELEASE,)),
+        Number("N m", "error at which it closes again; the dead zone at most", None, 0.0, 100.0, follows=RELEASE),
     ]
-    opening: Annotated[float, Number("", "command while it is open", None, 0.0, 1.0, follows=(OPENING,))]
+    opening: Annotated[float, Number("", "command while it is open", None, 0.0, 1.0, follows=OPENING)]
 
 
 class OnOffDeadZoneState(NamedTuple):
@@ -132,10 +132,10 @@ class SlidingModeParameters(NamedTuple):
 
     surface_slope: Annotated[
         float,
-        Number("1/s", "weight of the error's integral in the surface", None, 0.0, 1.0e5, follows=(INTEGRAL_RATE,)),
+        Number("1/s", "weight of the error's integral in the surface", None, 0.0, 1.0e5, follows=INTEGRAL_RATE),
     ]
     boundary_layer: Annotated[
-        float, Number("N m", "half width of the layer without switching", None, 1.0e-6, 1.0e4, follows=(BOUNDARY,))
+        float, Number("N m", "half width of the layer without switching", None, 1.0e-6, 1.0e4, follows=BOUNDARY)
     ]
     reaching_command: Annotated[float, Number("", "opening outside the layer", 1.0, 0.0, 1.0)]
     dead_band: BelievedBand

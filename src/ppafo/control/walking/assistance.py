@@ -78,7 +78,7 @@ ASSISTANCE_QUANTITIES = (
         None,
         0.0,
         1.0e3,
-        follows=(REACH,),
+        follows=REACH,
     ),
 )
 """Fields of ``Assistance`` in order."""

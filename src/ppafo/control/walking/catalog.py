@@ -25,11 +25,11 @@ class _ProportionalParameters(NamedTuple):
     """Gains on the torque error [1/(N m)] and its integral [1/(N m s)], and assumed dead band of the valve [-]."""
 
     torque_gain: Annotated[
-        float, Number("1/(N m)", "opening per torque error", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))
+        float, Number("1/(N m)", "opening per torque error", None, 0.0, 1.0e3, follows=PROPORTIONAL_GAIN)
     ]
     torque_integral_gain: Annotated[
         float,
-        Number("1/(N m s)", "opening per integral of the torque error", None, 0.0, 1.0e6, follows=(INTEGRAL_GAIN,)),
+        Number("1/(N m s)", "opening per integral of the torque error", None, 0.0, 1.0e6, follows=INTEGRAL_GAIN),
     ]
     dead_band: BelievedBand
 

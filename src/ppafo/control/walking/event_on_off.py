@@ -40,7 +40,7 @@ class _EventOnOffParameters(NamedTuple):
             None,
             0.0,
             1.0e3,
-            follows=(REACH,),
+            follows=REACH,
         ),
     ]
     phases: PhaseRules

@@ -84,7 +84,7 @@ def scenario_library(scenario: Scenario) -> Library:
         ),
         words=words_of(scenario, links),
         further=partial(prepare_entry, preparation, VANE_PREPARATION, settings),
-        following=partial(follow_entry, settings, links, absent) if links else None,
+        following=partial(follow_entry, preparation, settings, links) if links else None,
         checking=partial(check_entry, preparation, settings) if preparation.has_rules else None,
         defaults=frozenset(setting.name for setting in settings if setting.path in links and setting.quantity.follows),
         links=links,
@@ -107,8 +107,9 @@ def walk_library(configuration: Scenario) -> Library:
     # Before anything is planned: what cannot be exported should be said at once.
     check_can_be_exported(configuration)
     program = exported(batch_of(plan_walk(configuration)).program)
-    settings, absent = settings_of_walk(configuration), second_chamber(configuration)
+    settings = settings_of_walk(configuration)
     links = links_of_walk(configuration)
+    preparation = Preparation(configuration, program.program)
     of_readings = [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]
     return Library(
         title=configuration.name,
@@ -119,8 +120,8 @@ def walk_library(configuration: Scenario) -> Library:
         switches=_switches(configuration.device, of_readings),
         other_program=(),
         words=words_of_walk(configuration, links),
-        further=partial(prepare_entry, Preparation(configuration, program.program), WALK_PREPARATION, settings),
-        following=partial(follow_entry, settings, links, absent) if links else None,
+        further=partial(prepare_entry, preparation, WALK_PREPARATION, settings),
+        following=partial(follow_entry, preparation, settings, links) if links else None,
         links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
         rules=rules_of_walk(configuration),

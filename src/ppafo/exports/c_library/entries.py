@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 from ppafo.engine.definitions import place_of
 from ppafo.engine.entries import indent, parse_expression
@@ -14,10 +15,11 @@ from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
 from ppafo.exports.c_library.prepared import Preparation
 from ppafo.exports.c_library.profile_rules import PROFILE_RULES
-from ppafo.exports.c_library.settings import second_chamber
+from ppafo.exports.c_library.settings import numbers_of_second_chamber
 from ppafo.exports.c_library.structs import given
-from ppafo.model.declaration import PlainFunction, quantities_of
-from ppafo.parameters.graph import Graph, LinkFunction
+from ppafo.model.declaration import PlainFunction
+from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Link
+from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
 
 
@@ -50,7 +52,7 @@ def prepare_entry(
         if name not in made and leaf_paths(row, name):
             last = place_of(functions[-1])
             raise ProgramError(f"{last}: no preparation function sets '{name}' ({row.__name__}) of the program")
-    written = _FromSettings(preparation.scenario, settings).written
+    written = _FromSettings(cells_of(preparation.scenario, settings)).written
     body = [*map(written, lines), *given("parameters", program.parameter_rows())]
     body += given("states", states)
     body += [f"counts.{name} = {written(number)}" for name, number in zip(COUNTS, counts.value.elts, strict=True)]
@@ -62,7 +64,7 @@ def check_entry(preparation: Preparation, settings: Sequence[ExportParameter], c
     *lines, place = StepText(preparation.program, collector).joined(PROFILE_RULES, preparation, ["settings"])
     assert isinstance(place, ast.Return), "the last function gives the place"
     assert place.value is not None
-    written = _FromSettings(preparation.scenario, settings).written
+    written = _FromSettings(cells_of(preparation.scenario, settings)).written
     body = [*map(written, lines), f"found.place = {written(place.value)}"]
     return "\n".join(["def check_profiles(settings, found):", *indent(body)])
 
@@ -82,11 +84,10 @@ def with_reach(library: Library, collector: SourceCollector) -> str:
 
 
 class _FromSettings(ast.NodeTransformer):
-    """Rewriter of settings as fields of their struct; numbers of an absent chamber as what stands for them."""
+    """Rewriter of reduced ``settings[PATH]`` as its source in ``cells``."""
 
-    def __init__(self, scenario: Scenario, settings: Sequence[ExportParameter]) -> None:
-        self.cells = {setting.name: f"settings.{setting.name}" for setting in settings}
-        self.cells |= {name: self.cells.get(text, text) for name, text in second_chamber(scenario).items()}
+    def __init__(self, cells: Mapping[str, str]) -> None:
+        self.cells = cells
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         """Rewrite a setting."""
@@ -100,48 +101,48 @@ class _FromSettings(ast.NodeTransformer):
         return ast.unparse(ast.fix_missing_locations(self.visit(node)))
 
 
+def cells_of(scenario: Scenario, settings: Sequence[ExportParameter]) -> dict[str, str]:
+    """Return the sources of settings by path; of a missing second chamber the atmosphere, or its constant numbers."""
+    cells = {setting.path: f"settings.{setting.name}" for setting in settings}
+    absent = numbers_of_second_chamber(scenario)
+    return cells | {path: cells[ATMOSPHERE_PATH] if "pressure" in path else repr(absent[path]) for path in absent}
+
+
 def follow_entry(
-    settings: Sequence[ExportParameter],
-    links: Graph,
-    absent: Mapping[str, str],
-    collector: SourceCollector,
+    preparation: Preparation, settings: Sequence[ExportParameter], links: Graph, collector: SourceCollector
 ) -> str:
     """Return the source of ``follow``, which computes settings left at their defaults from other settings.
 
-    ``links`` maps these settings to their sources (``Graph``). ``absent`` maps sources that are no settings of the
-    library to their values, as C text.
+    ``links`` are those of the scenario that hold, and of its times.
     """
-    values = {setting.path: setting.value for setting in settings}
-
-    used = {source for follows in links.values() for link in follows for source in link.sources}
-    used |= {path for path in values if c_identifier(path) in absent.values()}
-    rows: list[str] = []
-    lines = [f"{c_identifier(path)} = settings.{c_identifier(path)}" for path in values if path in used - set(links)]
-    lines += [f"{name} = {text}" for name, text in absent.items()]
+    scenario, values = preparation.scenario, {setting.path: setting.value for setting in settings}
+    cells, lines = cells_of(scenario, settings), list[str]()
+    groups = [name for follows in links.values() for link in follows for name in link.groups]
     for path, follows in links.items():
-        name, own = c_identifier(path), f"settings.{c_identifier(path)}"
+        if follows[0].parts is not None and groups:
+            # All that defaults of the device have in common, before the first of them.
+            functions = follows[0].parts.functions(groups, partial(number_at, scenario))
+            joined = StepText(preparation.program, collector).joined(functions, follows[0].parts, ["settings"])
+            lines += map(_FromSettings(cells).written, joined)
+            groups = []
+        name, own = c_identifier(path), cells[path]
         text = own
         # The first link that holds wins, so it is the outermost choice.
         for link in reversed(follows):
-            number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
-            text_of_link, source = f"({number})", link.sources[0]
-            if link.when_set:
-                # Compared with the default to the bit: a value that was written again counts as not set.
-                is_set = f"settings.{c_identifier(source)} != {values[source]!r}"
-                text_of_link = f"({text_of_link} if {is_set} else {text})"
-            text = text_of_link
-        lines.append(f"{name} = {text} if {own} == {values[path]!r} else {own}")
-        lines.append(f"followed.{name} = {name}")
-    return "\n".join([*rows, "def follow(settings, followed):", *indent(lines)])
+            number = _default(link, cells, collector)
+            # Compared with the default to the bit: a value that was written again counts as not set.
+            is_set = link.when and f"settings.{c_identifier(link.when)} != {values[link.when]!r}"
+            text = f"({number} if {is_set} else {text})" if is_set else number
+        lines += [f"{name} = {text} if {own} == {values[path]!r} else {own}", f"followed.{name} = {name}"]
+        cells[path] = name
+    return "\n".join(["def follow(settings, followed):", *indent(lines)])
 
 
-def _term(term: LinkFunction, rows: list[str], collector: SourceCollector) -> str:
-    """Return the source of one term in the sum for a dependent setting; its structs are appended to ``rows``."""
-
-    def filled(row: type, numbers: Sequence[str]) -> str:
-        name = f"Followed{len(rows)}"
-        rows.append(f"{name} = namedtuple({name!r}, {[quantity.name for quantity in quantities_of(row)]!r})")
-        return f"{name}({', '.join(numbers)})"
-
-    arguments = term.arguments([c_identifier(source) for source in term.sources], filled)
-    return f"{collector.add(term.function)}({', '.join(arguments)})"
+def _default(link: Link, cells: Mapping[str, str], collector: SourceCollector) -> str:
+    """Return the source of the default that a link gives."""
+    numbers = [*link.groups, *(cells[path] for path in link.direct)]
+    if link.function is None:
+        text = " * ".join([*([] if link.factor == 1.0 else [repr(link.factor)]), *numbers])
+    else:
+        text = f"{collector.add(link.function)}({', '.join(numbers)})"
+    return f"({text} + {link.gap!r})" if link.gap else f"({text})"

@@ -1,19 +1,18 @@
 """Preparation of a run from its settings: initial state, parameters, and time grid.
 
 All functions take ``parts``, the data independent of the settings (``Preparation``), ``lane``, the groups of the run to
-be filled, and ``settings``, one number each in SI units. Python runs these functions directly. A library contains them
-in C, concatenated into one function (``engine.generator``), with all conditions on ``parts`` evaluated beforehand.
+be filled, and ``settings``, numbers in SI units by path. A library contains them in C, concatenated into one function
+(``engine.generator``), with all conditions on ``parts`` evaluated beforehand.
 """
 
 from typing import Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
-from ppafo.engine.rows import rebuilt
+from ppafo.engine.rows import rebuilt, section_row
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.engine.step.lane import LaneResult, LaneTiming
-from ppafo.exports.c_library.library import c_identifier
 from ppafo.exports.c_library.prepared import VANE_ONLY_FIELDS, Preparation, PreparedLane, names_of
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.columns import larger, smaller
@@ -35,51 +34,45 @@ FOOT_SETTINGS = ("foot_mass", "foot_mass_centre", "foot_inertia", "shank_length"
 
 def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the plant parameters without a walking leg, and the parameters of effects."""
-    lane.gas = parts.section_row("gas", "specific_gas_constant")(
-        *(getattr(settings, name) for name in parts.setting_names("gas")),
-        specific_gas_constant(UNIVERSAL_GAS_CONSTANT, settings.gas_molar_mass),
-    )
-    lane["actuator"] = parts.section_row("actuator", *parts.vane_only_fields)(
-        *(getattr(settings, name) for name in parts.setting_names("actuator")), *(0.0 for _ in parts.vane_only_fields)
+    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, settings["gas.molar_mass"])
+    lane.gas = section_row(parts.section_row("gas", "specific_gas_constant"), settings, "gas", constant)
+    lane["actuator"] = section_row(
+        parts.section_row("actuator", *parts.vane_only_fields),
+        settings,
+        "actuator",
+        *(0.0 for _ in parts.vane_only_fields),
     )
     for section in ("friction", "foot_plate"):
-        lane[section] = parts.section_row(section)(*(getattr(settings, name) for name in parts.setting_names(section)))
-    lane["supply"] = parts.section_row("supply", "relieving")(
-        *(getattr(settings, name) for name in parts.setting_names("supply")),
-        # Lines have a check valve of their own, so that the valve may push gas back into them.
-        float(parts.device.supply.takes_back or parts.scenario.supply_lines is not None),
-    )
+        lane[section] = section_row(parts.section_row(section), settings, section)
+    # Lines have a check valve of their own, so that the valve may push gas back into them.
+    relieving = float(parts.device.supply.takes_back or parts.scenario.supply_lines is not None)
+    lane["supply"] = section_row(parts.section_row("supply", "relieving"), settings, "supply", relieving)
     lane.device = parts.row("Device", SEEN_BY_EFFECTS)(*(lane[section] for section in SEEN_BY_EFFECTS))
     for section, orifice in (("valve", "valve"), ("leak", "actuator.leak")):
         lane[f"{section}_restriction"] = (sonic_restriction if parts.is_sonic(orifice) else area_restriction)(
-            parts.orifice_row(orifice)(
-                *(getattr(settings, name) for name in parts.setting_names(orifice, parts.orifice_row(orifice)._fields))
-            ),
-            lane.gas,
-            settings.flow_linear_ratio,
+            section_row(parts.orifice_row(orifice), settings, orifice), lane.gas, settings["flow.linear_ratio"]
         )
     for effect in parts.program.effects:
-        names = parts.setting_names(effect.section, names_of(effect.quantities))
         if effect.prepare is None:
-            lane[effect.name] = effect.parameters(*(getattr(settings, name) for name in names))
+            lane[effect.name] = section_row(effect.parameters, settings, effect.section)
         else:
             lane[effect.name] = effect.prepare(
-                parts.effect_row(effect)(*(getattr(settings, name) for name in names)), lane.device
+                section_row(parts.effect_row(effect), settings, effect.section), lane.device
             )
     is_led = parts.program.angle is not None or parts.program.walks
     lane[parts.plant_of_vane] = plant_with(
         lane.device,
         lane["valve_restriction"],
         lane["leak_restriction"],
-        0.0 if is_led else (settings.motion_external_torque if parts.leg is None else -settings.motion_ankle_torque),
+        0.0
+        if is_led
+        else (settings["motion.external_torque"] if parts.leg is None else -settings["motion.ankle_torque"]),
     )
     if parts.program.actuator.shape is not None:
-        stops = rebuilt(Range, (getattr(settings, name) for name in parts.setting_names("actuator", Range._fields)))
+        stops = section_row(Range, settings, "actuator")
         # What came from a file that the set names is constant.
         shape = parts.program.actuator.prepare(
-            parts.row("ActuatorSettings", parts.device.actuator.settings)(
-                *(getattr(settings, name) for name in parts.setting_names("actuator", parts.device.actuator.settings))
-            ),
+            section_row(parts.actuator_settings, settings, "actuator"),
             stops,
             *(parts.constant(table) for table in parts.tables),
         )
@@ -105,7 +98,7 @@ def put_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         lane.load = foot_load(
             lane.plant.inertia,
             lane.plant.gravity_torque,
-            *(getattr(settings, name) for name in parts.setting_names("motion", FOOT_SETTINGS)),
+            *(settings[f"motion.{name}"] for name in FOOT_SETTINGS),
         )
         lane.plant = with_load(lane.plant, lane.load)
 
@@ -118,15 +111,15 @@ def set_shank(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
             assert shank is not None, "a leg has a shank"
             lane.shank = rebuilt(
                 shank.parameters,
-                (getattr(settings, name) for name in parts.setting_names("motion.shank", names_of(shank.quantities))),
+                (settings[f"motion.shank.{name}"] for name in names_of(shank.quantities)),
             )
         else:
             lane.shank = rebuilt(
                 ShankSeries,
                 (
-                    settings.motion_shank_start
+                    settings["motion.shank.start"]
                     if path == "shank.start"
-                    else (settings.motion_toe_lever if path == "shank.toe_lever" else parts.shank_numbers[path])
+                    else (settings["motion.toe_lever"] if path == "shank.toe_lever" else parts.shank_numbers[path])
                     for path in parts.shank_numbers
                 ),
             )
@@ -135,22 +128,23 @@ def set_shank(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 def count_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set number and length of the steps."""
     lane.counts_of_steps = step_counts(
-        settings.run_duration, settings.run_step, settings.run_output_interval, settings.controller_period
+        settings["run.duration"],
+        settings["run.step"],
+        settings["run.output_interval"],
+        settings["controller.period"],
     )
-    lane.tolerance = relative_tolerance(settings.run_tolerance)
+    lane.tolerance = relative_tolerance(settings["run.tolerance"])
 
 
 def set_timing(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set valve parameters, delays in steps, and the time grid."""
-    lane["valve_settings"] = parts.row("ValveSettings", parts.valve_settings)(
-        *(getattr(settings, name) for name in parts.setting_names("valve", parts.valve_settings))
-    )
+    lane["valve_settings"] = section_row(parts.valve_settings, settings, "valve")
     lane.valve = parts.program.valve.prepare(lane["valve_settings"])
     # The step that the counts found, not the one that was asked for.
     lane.step = lane.counts_of_steps.step
     command_delay = parts.program.valve.command_delay(lane["valve_settings"])
     lane.command_steps, command_lag = whole_and_rest(command_delay, lane.step)
-    lane.signal_steps, signal_lag = whole_and_rest(0.0 if parts.program.walks else settings.sensors_delay, lane.step)
+    lane.signal_steps, signal_lag = whole_and_rest(0.0 if parts.program.walks else settings["sensors.delay"], lane.step)
     lane.timing = LaneTiming(
         step=lane.step,
         period=lane.step * lane.counts_of_steps.steps_per_sample,
@@ -167,7 +161,7 @@ def choose_parts(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     else:
         smallest = parts.program.actuator.chambers(
             lane.plant,
-            smaller(larger(getattr(settings, parts.locked_angle_setting), lane.plant.angle_min), lane.plant.angle_max),
+            smaller(larger(settings[parts.locked_angle], lane.plant.angle_min), lane.plant.angle_max),
             lane.plant.atmospheric_pressure,
             lane.plant.atmospheric_pressure,
         )
@@ -177,7 +171,7 @@ def choose_parts(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
             smallest.volume_1,
             smallest.volume_2,
             # By how much faster the pressure of the gas follows than at one temperature.
-            settings.gas_heat_capacity_ratio if parts.program.is_thermal else 1.0,
+            settings["gas.heat_capacity_ratio"] if parts.program.is_thermal else 1.0,
         )
 
 
@@ -187,13 +181,13 @@ def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     if controller is not None:
         lane.controller = rebuilt(
             controller.parameters,
-            (getattr(settings, name) for name in parts.setting_names("controller", names_of(controller.quantities))),
+            (settings[f"controller.{name}"] for name in names_of(controller.quantities)),
         )
     # Where no reference is followed, the one that stands in its place is written out.
     lane.reference = rebuilt(
         reference.parameters,
         (
-            getattr(settings, c_identifier(f"reference.{name}"))
+            settings[f"reference.{name}"]
             if parts.scenario.follows_reference
             else parts.scenario.reference.settings[name]
             for name in names_of(reference.quantities)
@@ -203,9 +197,9 @@ def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         lane.path = rebuilt(
             path.parameters,
             (
-                getattr(settings, parts.locked_angle_setting)
+                settings[parts.locked_angle]
                 if name == "level" and path_of_locked_angle(parts.scenario) is not None
-                else getattr(settings, c_identifier(f"motion.profile.{name}"))
+                else settings[f"motion.profile.{name}"]
                 for name in names_of(path.quantities)
             ),
         )
@@ -213,19 +207,15 @@ def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set sensor noise, heat transfer to the gas, and supply lines."""
-    imperfections = parts.setting_names("sensors", SensorParameters._fields)
-    lane.sensors = rebuilt(SensorParameters, (getattr(settings, name) for name in imperfections))
+    lane.sensors = section_row(SensorParameters, settings, "sensors")
     if parts.program.is_thermal:
         lane.thermal = thermal_gas(
-            parts.row("Walls", names_of(THERMAL_GAS))(
-                *(getattr(settings, name) for name in parts.setting_names("gas_model", names_of(THERMAL_GAS)))
-            ),
-            lane.gas,
+            section_row(parts.row("Walls", names_of(THERMAL_GAS)), settings, "gas_model"), lane.gas
         )
     if parts.scenario.supply_lines is not None:
         relieving = parts.scenario.supply_lines.relieving
         lane.lines = rebuilt(
-            SupplyLines, (relieving if name == "relieving" else getattr(settings, name) for name in parts.line_fields)
+            SupplyLines, (relieving if path == "relieving" else settings[path] for path in parts.line_fields)
         )
 
 
@@ -236,18 +226,18 @@ def fill_chambers(parts: Preparation, lane: PreparedLane, settings: Any) -> None
         angle, angular_velocity, _ = path.value(lane.path, 0.0)
     filled = parts.program.actuator.chambers(
         lane.plant,
-        settings.motion_angle if path is None else angle,
-        settings.initial_pressure_1,
-        settings.initial_pressure_2,
+        settings["motion.angle"] if path is None else angle,
+        settings["initial.pressure_1"],
+        settings["initial.pressure_2"],
     )
     lane.state = state_with_volumes(
         lane.plant,
-        settings.motion_angle if path is None else angle,
-        settings.motion_angular_velocity if path is None else angular_velocity,
+        settings["motion.angle"] if path is None else angle,
+        settings["motion.angular_velocity"] if path is None else angular_velocity,
         filled.volume_1,
         filled.volume_2,
-        settings.initial_pressure_1,
-        settings.initial_pressure_2,
+        settings["initial.pressure_1"],
+        settings["initial.pressure_2"],
     )
 
 

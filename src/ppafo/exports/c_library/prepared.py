@@ -11,7 +11,6 @@ from typing import Any
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.step.lane import Lane
-from ppafo.exports.c_library.library import c_identifier
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.controlled import CONTROLLED, Ends
@@ -87,9 +86,9 @@ class Preparation:
         return () if self.program.actuator.shape is None else VANE_ONLY_FIELDS
 
     @property
-    def locked_angle_setting(self) -> str:
-        """Name of the setting for the angle of a locked joint."""
-        return c_identifier(path_of_locked_angle(self.scenario) or LOCKED_ANGLE)
+    def locked_angle(self) -> str:
+        """Path of the setting for the angle of a locked joint."""
+        return path_of_locked_angle(self.scenario) or LOCKED_ANGLE
 
     @property
     def reach(self) -> Callable[[Ends], tuple[float, float]] | None:
@@ -140,22 +139,22 @@ class Preparation:
     def line_fields(self) -> list[str]:
         """Settings of droop, largest flow and volume of each supply line, then ``relieving``, which is no setting."""
         names = ("droop", "largest_flow", "volume")
-        return [*(c_identifier(f"{SUPPLY_LINE}.{line}.{name}") for line in SUPPLY_LINES for name in names), "relieving"]
+        return [*(f"{SUPPLY_LINE}.{line}.{name}" for line in SUPPLY_LINES for name in names), "relieving"]
 
     @property
-    def valve_settings(self) -> list[str]:
-        """Names of the settings of the valve."""
-        return names_of(VALVES[self.device.valve.kind].quantities)
+    def valve_settings(self) -> Any:
+        """Class of the valve's settings."""
+        return self.row("ValveSettings", names_of(VALVES[self.device.valve.kind].quantities))
+
+    @property
+    def actuator_settings(self) -> Any:
+        """Class of the settings of an actuator that is no vane."""
+        return self.row("ActuatorSettings", self.device.actuator.settings)
 
     @property
     def tables(self) -> list[Any]:
         """Table of a measured actuator as a list; empty for other actuators."""
         return [] if self.device.actuator.table is None else [self.device.actuator.table]
-
-    def setting_names(self, section: str, fields: Iterable[str] | None = None) -> list[str]:
-        """Return the C names of settings of a section: these ``fields``, else all numbers visible to effects."""
-        fields = names_of(members(section, self.device.actuator.kind)) if fields is None else fields
-        return [c_identifier(f"{section}.{name}") for name in fields]
 
     def row(self, name: str, fields: Iterable[str]) -> Any:
         """Return a NamedTuple class of settings with the given field names."""

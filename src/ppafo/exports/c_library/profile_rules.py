@@ -6,7 +6,7 @@ The functions take what those of ``preparation`` take. A fault is the place of t
 from typing import Any
 
 from ppafo.control.profiles import TabulatedProfile, disordered_knot
-from ppafo.engine.rows import rebuilt
+from ppafo.engine.rows import section_row
 from ppafo.exports.c_library.preparation import count_steps, set_laws, set_shank
 from ppafo.exports.c_library.prepared import Preparation, PreparedLane
 from ppafo.model.actuators.kind import Range
@@ -40,12 +40,12 @@ def check_knots(parts: Preparation, lane: PreparedLane, settings: Any) -> None: 
 def check_courses(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the fault of a prescribed angle beyond the stops, or of a reference out of reach."""
     if parts.moves_on_path:
-        lane["stops"] = widened(settings.actuator_angle_min, settings.actuator_angle_max)
+        lane["stops"] = widened(settings["actuator.angle_min"], settings["actuator.angle_max"])
         lane["outside"] = excursion(
             lane.path,
             lane["stops"][0],
             lane["stops"][1],
-            settings.run_duration,
+            settings["run.duration"],
             lane.counts_of_steps.step,
             parts=parts.course_of_angle,
         )
@@ -55,11 +55,11 @@ def check_courses(parts: Preparation, lane: PreparedLane, settings: Any) -> None
     if parts.reach is not None:
         lane["reach"] = parts.reach(
             parts.row("Ends", Ends._fields)(
-                settings.actuator_angle_min,
-                settings.actuator_angle_max,
-                settings.supply_pressure,
-                settings.supply_dorsiflexion_pressure,
-                settings.supply_atmospheric_pressure,
+                settings["actuator.angle_min"],
+                settings["actuator.angle_max"],
+                settings["supply.pressure"],
+                settings["supply.dorsiflexion_pressure"],
+                settings["supply.atmospheric_pressure"],
             )
         )
         lane["limits"] = widened(lane["reach"][0], lane["reach"][1])
@@ -67,7 +67,7 @@ def check_courses(parts: Preparation, lane: PreparedLane, settings: Any) -> None
             lane.reference,
             lane["limits"][0],
             lane["limits"][1],
-            settings.run_duration,
+            settings["run.duration"],
             lane.counts_of_steps.step,
             parts=parts.course_of_reference,
         )
@@ -78,10 +78,7 @@ def check_actuator(parts: Preparation, lane: PreparedLane, settings: Any) -> Non
     """Set the fault of an actuator whose numbers are impossible together."""
     if parts.flaw is not None:
         lane["flaw"] = parts.flaw(
-            parts.row("ActuatorSettings", parts.device.actuator.settings)(
-                *(getattr(settings, name) for name in parts.setting_names("actuator", parts.device.actuator.settings))
-            ),
-            rebuilt(Range, (getattr(settings, name) for name in parts.setting_names("actuator", Range._fields))),
+            section_row(parts.actuator_settings, settings, "actuator"), section_row(Range, settings, "actuator")
         )
         lane.fault = first_fault(
             lane["flaw"] + (parts.place_of(parts.first_of_actuator) - 1.0) if lane["flaw"] > 0.0 else 0.0, lane.fault

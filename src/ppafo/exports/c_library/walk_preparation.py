@@ -6,7 +6,7 @@ planning reads as mappings are structs in C; therefore Python runs only the func
 
 from typing import Any
 
-from ppafo.engine.rows import rebuilt
+from ppafo.engine.rows import rebuilt, section_row
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.library import ExportParameter, Relation, Rule, c_identifier
 from ppafo.exports.c_library.preparation import counted, set_gas, set_plant, set_timing, start
@@ -16,7 +16,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.sensors import NOTHING_SEEN
 from ppafo.parameters.building import consistency
-from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction, holding
+from ppafo.parameters.graph import Graph, Link, holding
 from ppafo.simulation.declaration import RUN, SUPPLY_LINE, SUPPLY_LINES
 from ppafo.simulation.numbers import device_numbers
 from ppafo.simulation.profiles import profile_parameters
@@ -91,7 +91,7 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 def links_of_walk(configuration: Scenario) -> Graph:
     """Return the links by which settings of a walk follow others unless changed."""
     known = {setting.path: setting.value for setting in settings_of_walk(configuration)}
-    recorded = {"run.output_interval": (LinkedDefault((LinkFunction(("run.duration",), record_interval),)),)}
+    recorded = {"run.output_interval": (Link(("run.duration",), record_interval),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
     return holding(links, known | numbers_of_second_chamber(configuration))
@@ -129,11 +129,9 @@ def rules_of_walk(configuration: Scenario) -> tuple[Rule, ...]:
 def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set leg, gait, and the plant with both; the heel rocker has been fitted to the gait beforehand."""
     gait = walk_of(parts.scenario).gait
-    lane["wearer"] = parts.row("Wearer", names_of(WEARER))(
-        *(getattr(settings, name) for name in parts.setting_names("wearer", names_of(WEARER)))
-    )
+    lane["wearer"] = section_row(parts.row("Wearer", names_of(WEARER)), settings, "wearer")
     lane["rocker"] = rocker_on_heel(
-        fit_rocker(gait)[0], fit_rocker(gait)[1], fit_rocker(gait)[2], settings.wearer_heel_lever
+        fit_rocker(gait)[0], fit_rocker(gait)[1], fit_rocker(gait)[2], settings["wearer.heel_lever"]
     )
     lane.leg = leg_parameters(lane["wearer"], lane["rocker"])
     lane.share = device_share(lane["bare"], lane.leg.gravity)
@@ -145,10 +143,8 @@ def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) ->
 def set_walk_sensors(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the sensors."""
     lane.gait_sensors = gait_sensors(
-        parts.row("SensorNumbers", (*_FORCES, *_OTHERS))(
-            *(getattr(settings, name) for name in parts.setting_names("sensors", (*_FORCES, *_OTHERS)))
-        ),
-        settings.controller_period,
+        section_row(parts.row("SensorNumbers", (*_FORCES, *_OTHERS)), settings, "sensors"),
+        settings["controller.period"],
     )
 
 
@@ -160,26 +156,22 @@ def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> N
         parts.program.actuator.chambers(lane.plant, HIGHEST_ANGLE, lane["room"], lane["room"]),
     )
     if parts.scenario.supply_lines is not None:
-        lane["volume"] = min(
-            lane["volume"], *(getattr(settings, c_identifier(f"{SUPPLY_LINE}.{line}.volume")) for line in SUPPLY_LINES)
-        )
+        lane["volume"] = min(lane["volume"], *(settings[f"{SUPPLY_LINE}.{line}.volume"] for line in SUPPLY_LINES))
     lane.counts_of_steps = walk_step_counts(
-        settings.run_duration,
-        settings.run_step,
-        settings.run_output_interval,
-        settings.controller_period,
+        settings["run.duration"],
+        settings["run.step"],
+        settings["run.output_interval"],
+        settings["controller.period"],
         lane.plant,
         lane["volume"],
-        settings.gas_heat_capacity_ratio if parts.program.is_thermal else 1.0,
+        settings["gas.heat_capacity_ratio"] if parts.program.is_thermal else 1.0,
     )
     lane.needs_parts = False
 
 
 def set_walking_law(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the controller parameters; a walk has no reference."""
-    lane.controller = rebuilt(
-        law_of(parts.scenario).parameters, (getattr(settings, c_identifier(path)) for path in _control(parts.scenario))
-    )
+    lane.controller = rebuilt(law_of(parts.scenario).parameters, (settings[path] for path in _control(parts.scenario)))
     lane.reference = parts.constant(profile_parameters(NO_REFERENCE))
 
 

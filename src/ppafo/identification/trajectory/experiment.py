@@ -589,7 +589,7 @@ def _of_set(
     A parameter linked to another one has no uncertainty of its own.
     """
     scenario = experiments[0].scenario
-    following = {path for path, links in scenario.device.links.items() if not all(link.when_set for link in links)}
+    following = {path for path, links in scenario.device.links.items() if not all(link.when for link in links)}
     off = {effect.section for effect, is_on in switches_of(scenario.device).items() if not is_on}
     for path, quantity in declared_numbers(scenario).items():
         section, _, name = path.rpartition(".")

@@ -81,7 +81,10 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     gas, heat_varies = base.gas_model, "gas_model.heat_transfer_coefficient" in values
     if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:
         raise ScenarioError(f"{base.name}: the heat transfer varies, but '{WALL_AREA}' is 0; give the wall area")
-    varied = moving_together(base, absolute(base, values, gauge))
+    (shape,) = set(shapes.values())
+    moved = moving_together(base, absolute(base, values, gauge))
+    # A number that follows may be the same in all runs.
+    varied = {path: number if np.ndim(number) else np.full(shape, number) for path, number in moved.items()}
     # A number of a second chamber that the actuator does not have may follow, and nothing declares it.
     in_force = {path: declared[path] for path in varied if path in declared}
     return ScenarioColumns(base, varied, in_force, frozenset(values))

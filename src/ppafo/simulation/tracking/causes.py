@@ -11,10 +11,10 @@ from ppafo.metrics.settled import LARGEST_SHARE
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, error_functions
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.torque_loop import LEADING
 from ppafo.simulation.tracking.case import Case, TrackingCause, only_opens_fully
 from ppafo.simulation.tracking.load_causes import (
     flung_at_start,
@@ -233,7 +233,8 @@ def _loop_rate(scenario: Scenario, angle: float) -> float:
 
     It is 1 where the wanted angle is known, because gains are then computed for that angle.
     """
-    if scenario.motion.motion_kind.sees(scenario).places is not anywhere:
+    seen = scenario.motion.motion_kind.sees(scenario)
+    if seen.is_locked or seen.profile in LEADING:
         return 1.0
     return quicker_at(scenario.device, angle, scenario.controlled)
 

@@ -9,9 +9,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import SAMPLES_LATE
 from ppafo.model.controlled import ANGLE, CONTROLLED
-from ppafo.simulation.default_gains import DEAD_TIME, RATE
-from ppafo.simulation.gains import terms_of
-from ppafo.simulation.numbers import number_at
+from ppafo.simulation.gains import loop_of
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
@@ -46,9 +44,8 @@ _LARGEST_STEP = 0.25
 
 def pair_step(scenario: Scenario, law: ControllerKind) -> tuple[float, float]:
     """Step R theta of a pair [SI unit of the controlled quantity], and its dead time theta [s]."""
-    terms = terms_of(scenario, law)
-    rate, dead_time = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
-    return rate * dead_time, dead_time
+    loop = loop_of(scenario, law)
+    return loop.rate * loop.dead_time, loop.dead_time
 
 
 def quicker_text(scenario: Scenario, dead_time: float) -> str:

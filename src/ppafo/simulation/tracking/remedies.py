@@ -10,12 +10,10 @@ from ppafo.metrics.settled import LARGEST_SHARE
 from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import SonicOrifice
-from ppafo.parameters.graph import LinkedDefault
 from ppafo.parameters.overrides import read_overrides
 from ppafo.report.display_units import metric_change, metric_level
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS
-from ppafo.simulation.gains import terms_of
+from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS, default_links
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.settled import SettledPart
@@ -94,7 +92,7 @@ def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, 
         term: quantity
         for quantity in law_settings(law, scenario.controlled)
         for term in FASTEST_FIRST
-        if term in quantity.follows and f"controller.{quantity.name}" in declared_numbers(scenario)
+        if term == quantity.follows and f"controller.{quantity.name}" in declared_numbers(scenario)
     }
     return {term: items[term] for term in FASTEST_FIRST if term in items}
 
@@ -103,11 +101,10 @@ def default_gain_remedies(scenario: Scenario, law: ControllerKind | None) -> lis
     """Remedies with the device's default of the first gain that differs from it, then of all overridden gains."""
     if law is None:
         return []
-    terms, settings, defaults = terms_of(scenario, law), scenario.controller.settings, dict[str, float]()
-    for item in law_settings(law, scenario.controlled):
-        path = f"controller.{item.name}"
-        if GAIN_TERMS.intersection(item.follows) and path not in scenario.links and terms.keys() >= set(item.follows):
-            link = LinkedDefault(tuple(terms[name] for name in item.follows), item.default or 0.0)
+    settings, defaults = scenario.controller.settings, dict[str, float]()
+    gains = (item for item in law_settings(law, scenario.controlled) if item.follows in GAIN_TERMS)
+    for path, (link,) in default_links(scenario, gains).items():
+        if path not in scenario.links:
             # A default may follow one of this list before it.
             defaults[path] = float(link.number(lambda at: defaults[at] if at in defaults else number_at(scenario, at)))
     for quantity in speed_settings(scenario, law).values():
@@ -125,10 +122,11 @@ def default_integral_remedy(scenario: Scenario, law: ControllerKind | None) -> l
     """Remedy that sets an integral gain of 0 to the device's default; empty without such a gain."""
     if law is None:
         return []
-    terms, settings = terms_of(scenario, law), scenario.controller.settings
-    names = [item.name for item in law_settings(law, scenario.controlled) if torque_loop.INTEGRAL_GAIN in item.follows]
-    default = float(terms[torque_loop.INTEGRAL_GAIN].number(lambda path: number_at(scenario, path))) if names else 0.0
-    return [remedy(scenario, {f"controller.{name}": default}) for name in names if settings.get(name) == 0.0 < default]
+    settings = scenario.controller.settings
+    integrals = [item for item in law_settings(law, scenario.controlled) if item.follows == torque_loop.INTEGRAL_GAIN]
+    links = default_links(scenario, (item for item in integrals if settings.get(item.name) == 0.0))
+    defaults = {path: link.number(lambda at: number_at(scenario, at)) for path, (link,) in links.items()}
+    return [remedy(scenario, {path: default}) for path, default in defaults.items() if default > 0.0]
 
 
 def rescaled_gains(scenario: Scenario, law: ControllerKind | None, factors: Iterable[float]) -> tuple[Remedy, ...]:
@@ -156,7 +154,7 @@ def smaller_pair(scenario: Scenario, step: float) -> tuple[Remedy, ...]:
 def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -> float | None:
     """Torque [N m] requested at an angle error [rad] by a controller with a stiffness; None for another controller."""
     items = () if law is None else law_settings(law, scenario.controlled)
-    if scenario.controlled != ANGLE or not any(angle_loop.ANGLE_STIFFNESS in item.follows for item in items):
+    if scenario.controlled != ANGLE or not any(item.follows == angle_loop.ANGLE_STIFFNESS for item in items):
         return None
     settings = scenario.controller.settings
     return float(settings["angle_stiffness"]) * min(float(settings["error_limit"]), error)
