@@ -26,7 +26,7 @@ _HOMES = {
     "ppafo.analyses.linearise.question": ("linearise",),
     "ppafo.analyses.reproduce.question": ("reproduce",),
     "ppafo.analyses.sensitivity.question": ("sensitivity",),
-    "ppafo.analyses.tune.question": ("tune",),
+    "ppafo.analyses.tune": ("tune",),
     "ppafo.errors": (
         "ArgumentError",
         "DataError",
@@ -57,7 +57,7 @@ _HOMES = {
     "ppafo.analyses.sets.audit": ("audit",),
     "ppafo.analyses.study_results": ("StudyResults", "load_study_results"),
     "ppafo.analyses.sweep": ("sweep",),
-    "ppafo.analyses.tune.problem": ("list_tunings", "load_tuning"),
+    "ppafo.analyses.tuning": ("list_tunings", "load_tuning"),
     "ppafo.analyses.validate": ("Validation", "validate"),
     "ppafo.running": ("SteppedRun", "simulate", "simulate_many", "start"),
     "ppafo.signals": ("Channel", "Recording"),

@@ -18,9 +18,9 @@ from ppafo.analyses.sets.audit import audit as audit
 from ppafo.analyses.study_results import StudyResults as StudyResults
 from ppafo.analyses.study_results import load_study_results as load_study_results
 from ppafo.analyses.sweep import sweep as sweep
-from ppafo.analyses.tune.problem import list_tunings as list_tunings
-from ppafo.analyses.tune.problem import load_tuning as load_tuning
-from ppafo.analyses.tune.question import tune as tune
+from ppafo.analyses.tune import tune as tune
+from ppafo.analyses.tuning import list_tunings as list_tunings
+from ppafo.analyses.tuning import load_tuning as load_tuning
 from ppafo.analyses.validate import Validation as Validation
 from ppafo.analyses.validate import validate as validate
 from ppafo.errors import ArgumentError as ArgumentError

@@ -25,7 +25,7 @@ FILES = {
     "parameters": "parameters/sets/ppafo2011.toml",
     "scenario": "scenarios/torque-task-proportional.toml",
     "study": "studies/library/torque-task-uncertainty.toml",
-    "tuning": "analyses/tune/library",
+    "tuning": "analyses/tunings",
     "design": "analyses/design/library",
     "walk": "walking/configurations/solenoid.toml",
     "rig": "rig/presets",

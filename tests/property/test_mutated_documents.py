@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ppafo.analyses.design.problem import load_design
-from ppafo.analyses.tune.problem import load_tuning
+from ppafo.analyses.tuning import load_tuning
 from ppafo.errors import PpafoError
 from ppafo.gait import Gait
 from ppafo.gait.document import load_gait

@@ -78,9 +78,9 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
             f"{_ANALYSES}.find:find", "Find the lowest or highest value that meets a condition on a metric."
         ),
         "tune": Command(
-            f"{_ANALYSES}.tune.question:tune",
+            f"{_ANALYSES}.tune:tune",
             first_line="Tune gains for an objective under constraints, optionally robust.",
-            library="ppafo.analyses.tune.problem:TUNING",
+            library="ppafo.analyses.tuning:TUNING",
         ),
         "linearise": _of_scenario(
             f"{_ANALYSES}.linearise.question:linearise",

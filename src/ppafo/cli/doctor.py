@@ -15,7 +15,7 @@ FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.loading",
     "scenario": "ppafo.loading",
     "study": "ppafo.studies.declaration",
-    "tuning": "ppafo.analyses.tune.problem",
+    "tuning": "ppafo.analyses.tuning",
     "design": "ppafo.analyses.design.problem",
     "walk": "ppafo.walking.declaration",
     "identification": "ppafo.identification.problem",

@@ -88,7 +88,7 @@ effort = { starts = 1, generations = 1, candidates_per_gain = 4 }
 """
     )
     assert main(["tune", str(path)]) == 1
-    assert "the torque ceiling is the cause" in capsys.readouterr().out.splitlines()[0]
+    assert "the reference requires more torque than the actuator gives" in capsys.readouterr().out.splitlines()[0]
 
 
 def test_an_interruption_leaves_nothing(

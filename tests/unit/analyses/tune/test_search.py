@@ -6,15 +6,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.tune.problem import ObjectiveTerm, Problem, SearchedParameter, SearchEffort, Spread
-from ppafo.analyses.tune.result import INFEASIBLE, agreement
-from ppafo.analyses.tune.solve import UNUSABLE, CandidateMetrics, judge, search
+from ppafo.analyses.tuning import (
+    INFEASIBLE,
+    UNUSABLE,
+    ObjectiveTerm,
+    Problem,
+    SearchedParameter,
+    SearchEffort,
+    agreement,
+    judge,
+    search,
+)
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats, NormalAround
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.limits import MetricLimit
 from ppafo.studies.study import RandomValue
 from ppafo.studies.varying import varied_path
+from ppafo.study.runs import Rows
 
 EFFORT = SearchEffort(starts=3, generations=200, candidates_per_gain=12, seed=4)
 SCALES = {"rms_error": 2.0, "gas_supplied": 1.0}
@@ -30,19 +39,16 @@ def problem(**changes: Any) -> Problem:
         "searched": (),
         "goals": (ObjectiveTerm("rms_error", 1.0, None),),
         "constraints": (MetricLimit("gas_supplied", 0.5, True, "500 g"),),
-        "spread": None,
         "effort": EFFORT,
     }
     return Problem(**(given | changes))
 
 
-def runs(error: list[list[float]], gas: list[list[float]], failed: list[list[bool]] | None = None) -> CandidateMetrics:
+def runs(error: list[list[float]], gas: list[list[float]], failed: list[list[bool]] | None = None) -> Rows:
     """Runs of candidates (rows) over draws (columns)."""
-    shape = np.shape(error)
-    metrics = {"rms_error": np.array(error), "gas_supplied": np.array(gas)}
-    return CandidateMetrics(
-        metrics, metrics, np.zeros(shape, bool) if failed is None else np.array(failed), np.zeros(shape)
-    )
+    unusable = np.zeros(np.shape(error), bool) if failed is None else np.array(failed)
+    judged = {"judged_rms_error": np.array(error), "judged_gas_supplied": np.array(gas)}
+    return judged | {"unusable": unusable, "off": np.zeros(np.shape(error))}
 
 
 def bowl(best: Floats) -> Any:
@@ -115,36 +121,35 @@ def test_feasible_comes_before_infeasible_and_both_before_failed() -> None:
         problem(),
         SCALES,
     )
-    assert ((judged.violation == 0.0) & (judged.without_value == 0.0)).tolist() == [True, False, False, False]
-    assert judged.cost[0] == 4.5
-    assert judged.violation[:3] == pytest.approx([0.0, 0.2, 0.8])
-    assert judged.cost[0] < INFEASIBLE < judged.cost[1] < judged.cost[2] < UNUSABLE < judged.cost[3]
+    assert ((judged["violation"] == 0.0) & (judged["without_value"] == 0.0)).tolist() == [True, False, False, False]
+    assert judged["cost"][0] == 4.5
+    assert judged["violation"][:3] == pytest.approx([0.0, 0.2, 0.8])
+    assert judged["cost"][0] < INFEASIBLE < judged["cost"][1] < judged["cost"][2] < UNUSABLE < judged["cost"][3]
 
 
 def test_a_loop_that_does_not_follow_is_behind_those_that_do_however_little_it_costs() -> None:
     tried = runs([[9.0], [0.1], [0.2]], [[0.5], [0.1], [0.1]])
-    judged = judge(replace(tried, off=np.array([[0.0], [0.2], [1.5]])), problem(), SCALES)
-    assert judged.cost[0] == 4.5
-    assert judged.cost[0] < INFEASIBLE < judged.cost[1] < judged.cost[2] < UNUSABLE
+    judged = judge(tried | {"off": np.array([[0.0], [0.2], [1.5]])}, problem(), SCALES)
+    assert judged["cost"][0] == 4.5
+    assert judged["cost"][0] < INFEASIBLE < judged["cost"][1] < judged["cost"][2] < UNUSABLE
 
 
 def test_a_run_without_the_metric_counts_as_failed() -> None:
     judged = judge(runs([[np.nan, 1.0]], [[0.1, 0.1]]), problem(), SCALES)
-    assert judged.without_value.tolist() == [0.5]
-    assert np.isfinite(judged.cost[0])
+    assert judged["without_value"].tolist() == [0.5]
+    assert np.isfinite(judged["cost"][0])
 
 
 @pytest.mark.parametrize(("share", "deviations"), [(None, 2.0), (0.75, 0.0)])
 def test_candidates_are_judged_by_their_bad_end(share: float | None, deviations: float) -> None:
-    spread = Spread(Uncertainty((RandomValue("x", NormalAround(0.0, 1.0)),)), "s", 5, 1, deviations, share)
+    drawn = Uncertainty((RandomValue("x", NormalAround(0.0, 1.0)),))
+    given = problem(uncertainty=drawn, draws=5, deviations=deviations, fraction=share)
     values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     goals = (ObjectiveTerm("rms_error", 1.0, None), ObjectiveTerm("gas_supplied", -1.0, None))
-    judged = judge(
-        runs([values.tolist()], [values.tolist()]), problem(spread=spread, goals=goals, constraints=()), SCALES
-    )
+    judged = judge(runs([values.tolist()], [values.tolist()]), replace(given, goals=goals, constraints=()), SCALES)
     high = 4.0 if share else 3.0 + 2.0 * np.std(values, ddof=1)
     low = 2.0 if share else 3.0 - 2.0 * np.std(values, ddof=1)
-    assert judged.objective[0] == pytest.approx(high / 2.0 - low)
+    assert judged["objective"][0] == pytest.approx(high / 2.0 - low)
 
 
 def test_logarithmic_bounds_and_what_lies_at_them() -> None:

@@ -1,4 +1,4 @@
-"""Public function ``tune``: search for gains."""
+"""Search for gains by an objective under constraints: the question; ``tuning`` has its file, search and report."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
-    from ppafo.analyses.tune.problem import Problem
-    from ppafo.analyses.tune.result import Tuned
+    from ppafo.analyses.tuning import Problem, Tuned
     from ppafo.report.finding import Finding
 
 TuningLike = Annotated["Problem | str | Path | Mapping[str, Any]", Word("TUNING")]
@@ -52,9 +51,7 @@ def tune(
     pid-gains: objective 1 before, 0.008313 after (-99.2 %)
     """
     name_plugins(plugins)
-    from ppafo.analyses.tune.answer import finding_of
-    from ppafo.analyses.tune.problem import Problem, load_tuning
-    from ppafo.analyses.tune.solve import solve_tuning
+    from ppafo.analyses.tuning import Problem, load_tuning, solve_tuning
     from ppafo.errors import StudyError
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 
@@ -64,4 +61,4 @@ def tune(
     if seed is not None:
         problem = problem.with_seed(seed)
     warn_of_coarse_pairs([problem.scenario], problem.before)
-    return finding_of(solve_tuning(problem, threads, progress))
+    return solve_tuning(problem, threads, progress)

@@ -1,1 +1,0 @@
-"""Tuning of gains: bounded search for a weighted objective with constraints, robust if requested."""
