@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 from ppafo.arguments import Overrides, Threads, checked
-from ppafo.arguments.conversion import shown
-from ppafo.arguments.values import accepted_values
+from ppafo.arguments.values import accepted_values, shown
 from ppafo.engine.run import batch_of
 from ppafo.errors import ArgumentError, SimulationError
 from ppafo.loading import scenario_or_load

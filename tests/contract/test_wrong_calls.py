@@ -34,7 +34,7 @@ def test_the_table_has_every_public_function_and_each_of_its_arguments() -> None
     [
         (
             lambda: ppafo.sweep("s", []),
-            "too many positional arguments; available by position: study; by name: overrides",
+            "too many positional arguments; available: study, overrides=, draws=",
         ),
         (lambda: ppafo.find("s", vary="a", such_that="b", higest=True), "did you mean 'highest'?"),
         (lambda: ppafo.find("s"), "find() needs vary and such_that: "),

@@ -224,7 +224,7 @@ def compare(
     [('torque-task-proportional', '0.869 N m'), ('torque-task-solenoid', '1.026 N m')]
     """
     name_plugins(plugins)
-    from ppafo.arguments.conversion import taken_tasks
+    from ppafo.arguments.values import taken_tasks
     from ppafo.metrics import METRICS
     from ppafo.metrics.tracking import ONE_INSTANT, TRACKING
     from ppafo.simulation.ensemble.running import lacking

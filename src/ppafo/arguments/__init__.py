@@ -1,43 +1,120 @@
-"""Arguments: one signature defines both the command line and the checks of Python calls."""
+"""Arguments: one signature defines both the command line and the checks of Python calls.
 
-from ppafo.arguments.door import checked as checked
-from ppafo.arguments.reading import fraction as fraction
-from ppafo.arguments.reading import minutes as minutes
-from ppafo.arguments.reading import number as number
-from ppafo.arguments.reading import point as point
-from ppafo.arguments.reading import quantity as quantity
-from ppafo.arguments.reading import task as task
-from ppafo.arguments.reading import times as times
-from ppafo.arguments.reading import whole_number as whole_number
-from ppafo.arguments.words import Angle as Angle
-from ppafo.arguments.words import Confidence as Confidence
-from ppafo.arguments.words import Count as Count
-from ppafo.arguments.words import Duration as Duration
-from ppafo.arguments.words import FigureWidth as FigureWidth
-from ppafo.arguments.words import File as File
-from ppafo.arguments.words import Flow as Flow
-from ppafo.arguments.words import Folder as Folder
-from ppafo.arguments.words import Fraction as Fraction
-from ppafo.arguments.words import Frequency as Frequency
-from ppafo.arguments.words import Gait as Gait
-from ppafo.arguments.words import Length as Length
-from ppafo.arguments.words import Mass as Mass
-from ppafo.arguments.words import MaximumFailed as MaximumFailed
-from ppafo.arguments.words import Metrics as Metrics
-from ppafo.arguments.words import Minutes as Minutes
-from ppafo.arguments.words import Name as Name
-from ppafo.arguments.words import Overrides as Overrides
-from ppafo.arguments.words import Point as Point
-from ppafo.arguments.words import Pressure as Pressure
-from ppafo.arguments.words import Scenario as Scenario
-from ppafo.arguments.words import Seed as Seed
-from ppafo.arguments.words import SetName as SetName
-from ppafo.arguments.words import Side as Side
-from ppafo.arguments.words import Speed as Speed
-from ppafo.arguments.words import Tasks as Tasks
-from ppafo.arguments.words import Threads as Threads
-from ppafo.arguments.words import Time as Time
-from ppafo.arguments.words import Torque as Torque
-from ppafo.arguments.words import Volume as Volume
-from ppafo.arguments.words import Whole as Whole
-from ppafo.arguments.words import Word as Word
+Functions annotate their parameters with these types: ``mass: Mass | None = None`` is the option ``--mass MASS``,
+converted from text with a unit, and in Python a number in SI or such a text. ``Word`` defines all else; the help of a
+parameter is its line in the docstring.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from ppafo.arguments.reading import (
+    ABOVE_ZERO,
+    ANY,
+    FROM_ZERO,
+    MAXIMUM_DIGITS,
+    NumberRange,
+    fraction,
+    minutes,
+    point,
+    quantity,
+    task,
+    whole_number,
+)
+from ppafo.arguments.reading import Word as Word
+from ppafo.arguments.values import checked as checked
+from ppafo.arguments.values import taken_number, taken_overrides, taken_tasks, taken_whole
+
+
+def _quantity_word(metavar: str, si_unit: str, allowed: NumberRange = ANY) -> Word:
+    """Return the argument type of a quantity: a text with a unit, in Python also a number in SI."""
+    read = quantity(si_unit, allowed)
+    unit = {"Pa_a": "Pa (absolute)"}.get(si_unit, si_unit)
+    limits = f", {allowed.words(unit)}," if allowed.words(unit) else ""
+    what = f"a number in {unit}{limits} or a text with its unit such as '1 {si_unit}'"
+    return Word(metavar, read, taken_number(allowed, read), what)
+
+
+def fraction_word(help_text: str = "") -> Word:
+    """Return the argument type of a fraction from 0 to 1."""
+    return Word(
+        "FRACTION",
+        fraction,
+        taken_number(NumberRange(0.0, highest=1.0), fraction),
+        "a number from 0 to 1, or a percentage such as '95%'",
+        help=help_text,
+    )
+
+
+def whole_word(lowest: int, help_text: str = "") -> Word:
+    """Return the argument type of a whole number not below ``lowest``."""
+    what = f"a whole number, {lowest} or more, of at most {MAXIMUM_DIGITS} digits"
+    return Word("N", partial(whole_number, lowest=lowest), taken_whole(lowest), what, help=help_text)
+
+
+Whole = Annotated[int, whole_word(0)]
+Count = Annotated[int, whole_word(1)]
+Minutes = Annotated[
+    float,
+    Word(
+        "N",
+        minutes,
+        taken_number(ABOVE_ZERO, minutes),
+        "a number of minutes above 0, or a text with its unit such as '90 s'",
+    ),
+]
+Mass = Annotated[float, _quantity_word("MASS", "kg", ABOVE_ZERO)]
+Length = Annotated[float, _quantity_word("LENGTH", "m", ABOVE_ZERO)]
+FigureWidth = Annotated[float, _quantity_word("WIDTH", "m", NumberRange(lowest=0.06, highest=0.4))]
+Time = Annotated[float, _quantity_word("TIME", "s")]
+Duration = Annotated[float, _quantity_word("TIME", "s", FROM_ZERO)]
+Torque = Annotated[float, _quantity_word("TORQUE", "N m", ABOVE_ZERO)]
+Pressure = Annotated[float, _quantity_word("PRESSURE", "Pa_a", ABOVE_ZERO)]
+Flow = Annotated[float, _quantity_word("FLOW", "kg/s", ABOVE_ZERO)]
+Volume = Annotated[float, _quantity_word("VOLUME", "m^3", ABOVE_ZERO)]
+Speed = Annotated[float, _quantity_word("SPEED", "m/s", ABOVE_ZERO)]
+Frequency = Annotated[float, _quantity_word("FREQUENCY", "Hz", ABOVE_ZERO)]
+Angle = Annotated[float, _quantity_word("ANGLE", "rad")]
+Name = Annotated[str, Word("NAME")]
+Folder = Annotated[Path, Word("DIR", Path)]
+File = Annotated[Path, Word("FILE", Path)]
+Scenario = Annotated[str, Word("SCENARIO", help="name of a scenario or of a walk, or a .toml file")]
+SetName = Annotated[str, Word("SET", help="name of a parameter set, or a .toml file")]
+Gait = Annotated[str | Path, Word("GAIT", help="name of a gait, or a gait file (.toml)")]
+Overrides = Annotated[
+    Mapping[str, Any] | Iterable[str],
+    Word(
+        "PATH=VALUE",
+        take=taken_overrides,
+        what="texts such as 'valve.area=12.6 mm^2', or a dictionary such as {'valve.area': '12.6 mm^2'}, "
+        "where a number is in SI units",
+        option="--set",
+        help="override one value, for example valve.area=12.6mm^2; may be repeated",
+    ),
+]
+Seed = Annotated[int, whole_word(0, "random seed; default: the file's")]
+Threads = Annotated[int, whole_word(1, "number of threads; default: all cores")]
+Confidence = Annotated[float, fraction_word("confidence of all intervals; default 95%")]
+MaximumFailed = Annotated[
+    float, fraction_word("fraction of the runs that may fail before the study is refused; default {default}")
+]
+Fraction = Annotated[float, fraction_word()]
+Side = Annotated[str, Word("right|left", help="which foot; default right")]
+Metrics = Annotated[Sequence[str], Word("NAME", option="--metric")]
+Point = Annotated[
+    float | str,
+    Word("TIME", point, taken_number(read=point), "a number of seconds, a time such as '1.5 s', or 'equilibrium'"),
+]
+Tasks = Annotated[
+    Mapping[str, Mapping[str, Any] | Sequence[str]] | Sequence[tuple[str, Sequence[str]]],
+    Word(
+        "NAME:PATH=VALUE[,PATH=VALUE]",
+        task,
+        taken_tasks,
+        "overrides by the name of a task, such as {'slow': {'reference.ramp_time': '2 s'}}",
+        option="--task",
+        is_repeated=True,
+    ),
+]

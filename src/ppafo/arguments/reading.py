@@ -1,4 +1,4 @@
-"""Argument values from text, as typed on the command line: numbers with and without a unit, times and tasks.
+"""Argument values from text, as typed on the command line, and the type of an argument.
 
 The module imports nothing that is slow to load.
 """
@@ -149,3 +149,26 @@ def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
         if isinstance(value, NumberWithUnit) and value.unit != SI:
             units |= units_beside(si_unit, value.unit)
     return units
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """Argument type: display and parsing on the command line, and accepted values of a Python call.
+
+    ``metavar`` is the name in the help. ``read`` converts the text to the value. ``take`` converts a Python value, with
+    a ValueError for an unsuitable one, and ``what`` describes the accepted values; without ``take`` the annotated type
+    decides. ``option`` is the name of the option if different from the parameter; it also makes an option of a
+    parameter that Python passes by position. ``help`` is the default help text. ``const`` is the value of an option
+    given without a value. ``off`` is the option that clears a flag. ``is_repeated`` marks several values whose type is
+    not just a sequence.
+    """
+
+    metavar: str = ""
+    read: Callable[[str], Any] = str
+    take: Callable[[Any], Any] | None = None
+    what: str = ""
+    option: str = ""
+    help: str = ""
+    const: Any = None
+    off: str = ""
+    is_repeated: bool = False

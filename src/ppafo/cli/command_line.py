@@ -16,7 +16,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
 
-from ppafo.arguments import Word, number, whole_number
+from ppafo.arguments.reading import Word, number, whole_number
 from ppafo.arguments.values import annotated_parameters
 from ppafo.cli import output
 from ppafo.errors import ArgumentError, PpafoError

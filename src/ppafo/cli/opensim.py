@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from ppafo.arguments import Folder, Gait, Mass, Minutes, Overrides, Word, times
+from ppafo.arguments import Folder, Gait, Mass, Minutes, Overrides, Word
+from ppafo.arguments.reading import times
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError

@@ -8,8 +8,8 @@ from contextvars import ContextVar
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ppafo.arguments import FigureWidth
 from ppafo.arguments.values import accepted_values
-from ppafo.arguments.words import FigureWidth
 from ppafo.signals import RecordingKind
 from ppafo.wording import set_within
 

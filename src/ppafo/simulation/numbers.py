@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
-from ppafo.arguments.conversion import shown, taken_number
+from ppafo.arguments.values import shown, taken_number
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.controlled import CONTROLLED

@@ -15,7 +15,7 @@ from pandas import DataFrame, Series
 
 import ppafo
 from ppafo import ArgumentError, Channel, DataError, ScenarioError
-from ppafo.arguments.conversion import taken_document, taken_overrides, taken_text
+from ppafo.arguments.values import taken_document, taken_overrides, taken_text
 from ppafo.simulation.scenario import Sensors
 
 TASK = "torque-task-proportional"

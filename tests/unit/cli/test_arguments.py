@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.arguments import whole_number
+from ppafo.arguments.reading import whole_number
 from ppafo.cli.main import main
 from ppafo.parameters.bottles.bottle import list_bottles
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ppafo.arguments import fraction, quantity
+from ppafo.arguments.reading import fraction, quantity
 from ppafo.errors import ArgumentError
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.validate import validate
-from ppafo.arguments import quantity
+from ppafo.arguments.reading import quantity
 from ppafo.errors import ArgumentError, DataError, PpafoError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device

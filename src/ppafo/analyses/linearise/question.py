@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ppafo.arguments import Overrides, Word, checked, words
+from ppafo.arguments import Overrides, Point, Word, checked
 from ppafo.plugins import Plugins, name_plugins
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ ScenarioLike = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of
 
 @checked
 def linearise(
-    scenario: ScenarioLike, *, at: words.Point = "equilibrium", overrides: Overrides = (), plugins: Plugins = ()
+    scenario: ScenarioLike, *, at: Point = "equilibrium", overrides: Overrides = (), plugins: Plugins = ()
 ) -> Finding[LinearModel]:
     """Make a linear model of the plant near one point, for control design.
 
