@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ppafo.errors import DataError, check_all
-from ppafo.gait.gait import Gait
+from ppafo.gait.gait import HARMONICS, Gait, fit_curve
 from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride, SignSource, other_sign
 from ppafo.gait.plausible_angles import check_ankle, check_ankle_range, check_shank
 from ppafo.gait.plausible_knee import check_knee, check_knee_means
@@ -70,6 +70,44 @@ def check_stance(walk: MeanStride) -> None:
         f"{file}: the foot is on the ground for {100.0 * walk.stance_share:.0f} % of the stride "
         f"(plausible: {100.0 * low:.0f} to {100.0 * high:.0f} %); {hint}"
     )
+
+
+# Far from 0 and nearer to the half stride at which the other foot lies.
+_OTHER_FOOT = 0.3
+"""Least delay between ankle and shank [strides] that shows two different feet, which are half a stride apart."""
+_ALIKE, _UNLIKE = 0.65, 0.4
+"""Limits of the correlation with a usual ankle angle [-]: least at the best shift (0.76), largest without a shift."""
+_ALIKE_SHANK = 0.8
+"""Least correlation with a usual shank angle without a shift [-] (0.97); a reversed sign gives less."""
+_FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
+
+
+def check_side(walk: MeanStride, usual: Gait) -> None:
+    """Raise DataError if the ankle is half a stride out of phase with its shank; ``usual`` is a healthy gait."""
+    if not STANCE_FRACTION[0] <= walk.stance_share <= STANCE_FRACTION[1]:
+        # Nothing has a place in such a stride, which is refused by itself.
+        return
+    shank, _, in_place = _lag(walk, usual, "shank_angle")
+    ankle, best, own = _lag(walk, usual, "ankle_angle")
+    apart = abs((ankle - shank + 0.5) % 1.0 - 0.5)
+    if apart > _OTHER_FOOT and in_place > _ALIKE_SHANK and best > _ALIKE and own < _UNLIKE:
+        raise DataError(
+            f"{walk.file['ankle_angle']}: ankle_angle is shifted by {100.0 * apart:.0f} % of the stride against "
+            "shank_angle, so it belongs to the other foot; give ankle and shank of the same side"
+        )
+
+
+def _lag(walk: MeanStride, usual: Gait, name: str) -> tuple[float, float, float]:
+    """Return the delay of a curve against a usual gait [strides], and the correlations with and without this delay."""
+    # Stance on stance and swing on swing: a toe-off that comes early or late is no delay.
+    at = np.interp(_FINE, (0.0, walk.stance_share, 1.0), (0.0, usual.stance_share, 1.0))
+    smooth = fit_curve(walk.curves[name], HARMONICS[name])[0].values_at(_FINE)
+    lags, expected = (values - np.mean(values) for values in (smooth, usual.curve(name).values_at(at)))
+    # Correlation at all 1000 shifts at once.
+    spectrum = np.fft.rfft(lags) * np.conj(np.fft.rfft(expected))
+    scale = float(np.sqrt(np.sum(lags**2) * np.sum(expected**2)))
+    alike = np.fft.irfft(spectrum, _FINE.size) / scale
+    return float(_FINE[np.argmax(alike)]), float(np.max(alike)), float(alike[0])
 
 
 MOMENT_PEAK = (0.05, 3.5)

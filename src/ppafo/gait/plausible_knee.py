@@ -1,6 +1,5 @@
 """Plausibility of knee accelerations: range, mean, sign, and rotation of the knee about the standing ankle."""
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -19,67 +18,28 @@ SHANK_LENGTHS = (0.25, 0.6)
 
 _FITS = 0.6
 """Largest misfit to a rotation about the ankle [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
-_LEFT_BY_MISTAKE, _LEFT_BY_ONE = 0.7, 0.62
-"""Fractions of the misfit that remain after correction of a mistake: below the first for a remark, below the second
-for an error. Correct knees in units of g leave 0.48 to 0.57, and a correct knee in its own unit has shown 0.68."""
-
-Factors = tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class _Mistake:
-    """Possible mistake in the knee accelerations: description, remedy, and correction.
-
-    ``forward`` and ``up`` are the coefficients with which each corrected curve is computed from the given (forward,
-    up).
-    """
-
-    words: str
-    remedy: str
-    forward: Factors
-    up: Factors
-
+_LEFT_BY_ONE = 0.62
+"""Fraction of the misfit below which a correction explains it; correct knees in units of g leave 0.48 to 0.57."""
 
 _G = STANDARD_GRAVITY
+_FACTORS = {
+    **{f"multiply %s by {factor:g}": factor for factor in (_G, 1000.0)},
+    **{f"divide %s by {factor:g}": 1.0 / factor for factor in (_G, 1000.0)},
+}
+_CORRECTIONS = {
+    "exchange them": ((0.0, 1.0), (1.0, 0.0)),
+    "exchange them and reverse knee_up": ((0.0, -1.0), (1.0, 0.0)),
+    **{words % "both": ((factor, 0.0), (0.0, factor)) for words, factor in _FACTORS.items() if factor > 1.0},
+    **{words % "knee_forward": ((factor, 0.0), (0.0, 1.0)) for words, factor in _FACTORS.items()},
+    **{words % "knee_up": ((1.0, 0.0), (0.0, factor)) for words, factor in _FACTORS.items() if factor < 1.0},
+    **{words % "both": ((factor, 0.0), (0.0, factor)) for words, factor in _FACTORS.items() if factor < 1.0},
+    f"exchange them and multiply both by {_G:g}": ((0.0, _G), (_G, 0.0)),
+}
+"""Coefficients of each corrected curve (forward, up) in the given ones; the first that fits is reported.
 
-
-def _too_small(factor: float, words: str) -> tuple[_Mistake, ...]:
-    """Return the mistakes of values too small by a factor; for knee_up alone, the mistake cannot be recognised."""
-    return (
-        _Mistake(f"are {words}", f"multiply both by {factor:g}", (factor, 0.0), (0.0, factor)),
-        _Mistake(
-            f"differ (knee_forward is {words})", f"multiply knee_forward by {factor:g}", (factor, 0.0), (0.0, 1.0)
-        ),
-    )
-
-
-def _too_large(factor: float) -> tuple[_Mistake, ...]:
-    """Return the mistakes of values too large by a factor, first for one curve alone.
-
-    The order matters because knee_up divided by the factor fits almost as well as the given curves.
-    """
-    words, fraction = f"{factor:g} times too large", 1.0 / factor
-    return (
-        _Mistake(
-            f"differ (knee_forward is {words})", f"divide knee_forward by {factor:g}", (fraction, 0.0), (0.0, 1.0)
-        ),
-        _Mistake(f"differ (knee_up is {words})", f"divide knee_up by {factor:g}", (1.0, 0.0), (0.0, fraction)),
-        _Mistake(f"are {words}", f"divide both by {factor:g}", (fraction, 0.0), (0.0, fraction)),
-    )
-
-
-_MISTAKES = (
-    _Mistake("are exchanged", "exchange them", (0.0, 1.0), (1.0, 0.0)),
-    _Mistake(
-        "are exchanged, and knee_up has the opposite sign", "exchange them and reverse knee_up", (0.0, -1.0), (1.0, 0.0)
-    ),
-    *_too_small(_G, "in units of g"),
-    *_too_small(1000.0, "1000 times too small"),
-    *_too_large(_G),
-    *_too_large(1000.0),
-    _Mistake("are exchanged and in units of g", f"exchange them and multiply both by {_G:g}", (0.0, _G), (_G, 0.0)),
-)
-"""Possible mistakes; the first that fits is reported. A wrong sign alone is recognised from the swing."""
+A knee_up too small by a factor and a wrong sign alone are not recognised here. One that is divided by a factor fits
+almost as well as the given curves.
+"""
 
 _WHERE: dict[SignSource, str] = {
     "map": "in the gait map or the file",
@@ -88,33 +48,22 @@ _WHERE: dict[SignSource, str] = {
 }
 
 
-def turning_remarks(walk: MeanStride) -> list[str]:
-    """Return a remark if a mistake would partly explain the misfit of the knee to a rotation about the ankle."""
-    found = _mistaken_turning(walk)
-    return [] if found is None else [f"{found[0]}; the walk itself may be the cause"]
-
-
-def _mistaken_turning(walk: MeanStride) -> tuple[str, str, float] | None:
-    """Return the mistake that explains the knee's misfit, its remedy, and the remaining fraction of the misfit [-]."""
-    if any(name not in walk.curves for name in KNEE):
-        return None
+def _check_turning(walk: MeanStride) -> None:
+    """Raise DataError for a knee that turns about the resting ankle only after a correction."""
     expected = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
     # Over a stride that repeats the mean is 0; gravity in it is refused elsewhere and must not hide a unit here.
     forward, up = (walk.curves[name] - np.mean(walk.curves[name][:-1]) for name in KNEE)
     turned = np.stack([forward, up])[:, FOOT_FLAT]
     missed = _misfit(turned, expected)
-    for mistake in _MISTAKES:
-        is_of_one_alone = mistake.forward[1] == mistake.up[0] == 0.0 and mistake.forward[0] != mistake.up[1]
-        if walk.is_knee_one_marker and is_of_one_alone:
-            continue
-        left = _misfit(np.array([mistake.forward, mistake.up]) @ turned, expected)
-        if left < _FITS and left < _LEFT_BY_MISTAKE * missed:
-            statement = (
-                f"knee_forward and knee_up {mistake.words}: they differ by {100.0 * missed:.0f} % ({100.0 * left:.0f} "
-                "% if corrected) from a rotation of the knee about the resting ankle while the foot is flat"
+    for remedy, factors in _CORRECTIONS.items():
+        is_of_one_alone = factors[0][1] == factors[1][0] == 0.0 and factors[0][0] != factors[1][1]
+        left = _misfit(np.array(factors) @ turned, expected)
+        if left < min(_FITS, _LEFT_BY_ONE * missed) and not (walk.is_knee_one_marker and is_of_one_alone):
+            raise DataError(
+                f"{walk.file['knee_forward']}: knee_forward and knee_up differ by {100.0 * missed:.0f} % "
+                f"({100.0 * left:.0f} % if corrected) from a rotation of the knee about the resting ankle while the "
+                f"foot is flat; {remedy} {_WHERE[walk.signs_from]}"
             )
-            return statement, mistake.remedy, left / missed
-    return None
 
 
 def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
@@ -163,10 +112,8 @@ def check_knee(walk: MeanStride) -> None:
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
         raise DataError(f"{walk.file[there[0]]}: {there[0]} needs {missing}; give both or neither")
-    found = _mistaken_turning(walk)
-    if found is not None and found[2] < _LEFT_BY_ONE:
-        statement, remedy, _ = found
-        raise DataError(f"{walk.file['knee_forward']}: {statement}; {remedy} {_WHERE[walk.signs_from]}")
+    if there:
+        _check_turning(walk)
     check_knee_means(walk)
     check_all([partial(_check_knee_curve, walk, name)] for name in there)
 

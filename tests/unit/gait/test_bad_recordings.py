@@ -103,24 +103,18 @@ CASES: dict[str, tuple[Change, str]] = {
         "correct the sign in the file, or change the sign of knee.up in a gait map",
     ),
     "knee with gravity": (changed(UP, lambda x: x + 9.81), "subtract gravity from accelerometer data"),
-    "knee in millimetres": (
-        scaled((FORWARD, UP), 1000.0),
-        "knee_forward and knee_up are 1000 times too large: they differ by",
-    ),
-    "knee forward alone times g": (scaled((FORWARD,), 9.80665), "differ (knee_forward is 9.80665 times too large)"),
+    "knee in millimetres": (scaled((FORWARD, UP), 1000.0), "divide both by 1000 in the file"),
+    "knee forward alone times g": (scaled((FORWARD,), 9.80665), "divide knee_forward by 9.80665"),
     "knee times g": (scaled((FORWARD, UP), 9.80665), "divide both by 9.80665 in the file"),
     "knee in centimetres": (
         scaled((FORWARD, UP), 100.0),
         "knee_forward has a range of 2.02e+03 m/s^2 per stride (plausible: 0.5 to 80 m/s^2); check the unit",
     ),
-    "knee exchanged": (
-        exchanged,
-        "knee_forward and knee_up are exchanged: they differ by",
-    ),
+    "knee exchanged": (exchanged, "exchange them in the file"),
     "knee in g": (
         scaled((FORWARD, UP), 1.0 / 9.80665),
-        "knee_forward and knee_up are in units of g: they differ by 79 % (42 % if corrected) from a "
-        "rotation of the knee about the resting ankle while the foot is flat; multiply both by 9.80665 in the file",
+        "knee_forward and knee_up differ by 79 % (42 % if corrected) from a rotation of the knee about the resting "
+        "ankle while the foot is flat; multiply both by 9.80665 in the file",
     ),
     "shank in noise": (
         changed(SHANK, lambda x: x + np.random.default_rng(4).normal(0.0, 0.7, x.size)),
@@ -318,18 +312,6 @@ def test_a_hip_below_the_ground_is_a_sign_and_no_unit(opensim_files: dict[str, P
     with pytest.raises(DataError) as caught:
         import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=1.63))
     assert re.search(r"the hip is -0\.87 m high \(pelvis_ty\), .* its sign is reversed", str(caught.value))
-
-
-def test_few_samples_and_a_scattering_plate_are_remarked(
-    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording
-) -> None:
-    few = {name: values[::5] for name, values in columns.items()}
-    found = import_gait([csv_of(few, walk.time[::5])], ImportSettings(62.0))
-    (said,) = (line for line in found.remarks if "sampled at" in line)
-    assert said.endswith("sampled at 40 Hz; heel strikes and toe-offs are accurate to about 12 ms")
-    noise = np.random.default_rng(4).normal(0.0, 0.025, columns[FORCE].size)
-    found = import_gait([csv_of({**columns, FORCE: columns[FORCE] - 0.025 + noise})], ImportSettings(62.0))
-    assert any("vertical_force has noise of 0.0" in line for line in found.remarks)
 
 
 def test_a_moment_that_hardly_shows_its_sign_is_remarked() -> None:

@@ -123,7 +123,7 @@ IMPLAUSIBLE = {
     ),
     "knee in g": (
         {"knee_forward": lambda c: c.scale(1.0 / 9.80665), "knee_up": lambda c: c.scale(1.0 / 9.80665)},
-        "are in units of g: they differ by",
+        "multiply both by 9.80665",
     ),
 }
 

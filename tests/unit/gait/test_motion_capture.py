@@ -149,9 +149,9 @@ def test_a_marker_that_is_held_until_it_jumps_was_lost_and_one_at_rest_was_not(
 @pytest.mark.parametrize(
     ("forward", "vertical", "said"),
     [
-        ("y", "z", "along x; in a gait map, replace shank_angle.forward = 'y' by the walking direction, 'x' or '-x'"),
+        ("y", "z", "correct the columns or the forward axis of the shank"),
         ("-x", "z", "shank_angle.forward = '-x' is reversed: 'RTOE' is behind 'RHEE' along it; give 'x'"),
-        ("x", "y", "is longest along 'z'; give 'z' in a gait map, also for ankle_angle"),
+        ("x", "y", "is no shank upright along it"),
     ],
 )
 def test_a_wrong_axis_of_a_map_is_named_before_any_sign(forward: str, vertical: str, said: str, tmp_path: Path) -> None:

@@ -10,11 +10,10 @@ import numpy as np
 from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.mapping import setting_text
-from ppafo.gait.recorded.near_columns import nearest_column
 from ppafo.gait.recorded.table import COORDINATES, MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import to_si
-from ppafo.wording import one_line
+from ppafo.wording import nearest_name, one_line
 
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
@@ -123,7 +122,7 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
                 f"{curve}: {files} has several different columns {_marker(missing)!r}; choose {either} in a gait "
                 f"map ({setting_text('columns')})"
             )
-        reason = f"there is no column {missing!r}{nearest_column(missing, known)}"
+        reason = f"there is no column {missing!r}{nearest_name(missing, known)}"
         reasons.append(f"{curve}: {'no file has all columns of this curve' if missing in known else reason}")
     # A marker counts once, not by its coordinates.
     markers = list(dict.fromkeys(one_line(_marker(name)) for name in known))

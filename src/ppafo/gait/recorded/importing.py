@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
-from ppafo.gait.agreement import check_side
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
 from ppafo.gait.mean_stride import MeanStride
-from ppafo.gait.plausible import check_plausible
+from ppafo.gait.plausible import check_plausible, check_side
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.curves import CurveStatistics, check_scatter, over_strides, statistics
 from ppafo.gait.recorded.footfalls import SHANK, Footfalls, Stride, find_footfalls, strides_of_curve, strides_within

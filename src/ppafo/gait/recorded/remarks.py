@@ -1,30 +1,21 @@
 """Remarks on an imported gait: strides, signs and sizes of the curves, sampling, zero of the ankle, and scatter."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
-from ppafo.gait.agreement import delay_remarks, size_remarks
 from ppafo.gait.gait import FitError
 from ppafo.gait.mean_stride import MeanStride
 from ppafo.gait.plausible import force_remarks, moment_remarks
 from ppafo.gait.plausible_angles import sign_remarks, standing_tilt, zero_remarks
-from ppafo.gait.plausible_knee import turning_remarks
 from ppafo.gait.recorded.curves import CurveStatistics, scatter_remarks
-from ppafo.gait.recorded.footfalls import FORCE, SHANK, Stride
+from ppafo.gait.recorded.footfalls import FORCE, SHANK
 from ppafo.gait.recorded.knee import knee_remarks
 from ppafo.gait.recorded.mapping import setting_text
 from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.source import GaitSource
 from ppafo.gait.recorded.strides import StrideSelection
-
-_COARSE_RATE = 50.0
-"""Sampling rate [Hz] below which the error of an event exceeds a hundredth of a stride."""
-_NOISY_FORCE = 0.02
-"""Standard deviation of the force in swing [body weights] for a remark; events are at 0.05 and 0.03."""
-_WITHIN_SWING = 0.1
-"""Fraction of the swing at both ends in which the foot may still touch the plate."""
 
 
 def import_remarks(
@@ -59,36 +50,6 @@ def import_remarks(
         *knee_remarks(source.columns.knee, walk, settings.stature),
         *sign_remarks(means["shank_angle"], means["ankle_angle"]),
         *(moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []),
-        *turning_remarks(mean_stride),
-        *delay_remarks(mean_stride),
-        *size_remarks(mean_stride),
-        *_sampling_remarks(walk, strides.taken),
         *zero_remarks(tilt, correction),
         *scatter_remarks(curves, errors),
     ]
-
-
-def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[str]:
-    """Return remarks on curves with few samples, and on noise of the force while the foot is in the air."""
-    rates: dict[int, list[str]] = {}
-    for name, signal in walk.items():
-        if signal.rate < _COARSE_RATE:
-            rates.setdefault(round(signal.rate), []).append(name)
-    remarks = [
-        f"{', '.join(names)}: sampled at {rate} Hz; heel strikes and toe-offs are accurate to about "
-        f"{500.0 / rate:.0f} ms"
-        for rate, names in rates.items()
-    ]
-    force = walk.get(FORCE)
-    if force is None:
-        return remarks
-    spans = [(stride.toe_off, stride.end, _WITHIN_SWING * (stride.end - stride.toe_off)) for stride in strides]
-    # Only the middle of the swing: at its ends the foot may still be on the plate.
-    swings = [force.values[(force.time > off + slack) & (force.time < end - slack)] for off, end, slack in spans]
-    scatter = max((float(np.std(values)) for values in swings if values.size > 1), default=0.0)
-    if scatter > _NOISY_FORCE:
-        remarks.append(
-            f"vertical_force has noise of {scatter:.2g} body weights in swing, close to the thresholds of heel strike "
-            "and toe-off, 0.05 and 0.03; filter the force in the file for reliable events"
-        )
-    return remarks

@@ -157,39 +157,23 @@ def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -
 
 
 def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
-    """Raise DataError for a shank with wrong axes, or with too small a rotation for walking."""
+    """Raise DataError for a shank with a wrong vertical axis, or with too small a rotation for walking."""
     if shank.time[-1] - shank.time[0] < _SHORTEST_WALK:
         return
     low, high = SHANK_RANGE
     travel = float(np.ptp(np.degrees(shank.values)))
-    range_text = f"has a range of {travel:.2g} deg in the whole recording (walking: at least {low:g} deg)"
-    message = f"{shank.file}: shank_angle {range_text}"
-    if mapped.terms is not None:
-        # Radians that are called degrees have no event either, but a unit as a remedy.
-        if travel < low and not low <= np.degrees(travel) <= high:
-            raise DataError(f"{message}: give a recording of walking, or check the columns of the shank")
+    if mapped.terms is None:
+        ahead, up = between_markers(columns, mapped, str(mapped.knee), str(mapped.ankle))
+        if abs(np.nanmean(up)) < _LEAST_UPRIGHT * math.hypot(np.nanmean(ahead), np.nanmean(up)):
+            raise DataError(
+                f"{shank.file}: shank_angle.vertical = {mapped.vertical!r}, but the line from {mapped.knee!r} to "
+                f"{mapped.ankle!r} is no shank upright along it; correct the axes of shank_angle and ankle_angle"
+            )
+    # Radians that are called degrees have no event either, but a unit as a remedy.
+    elif low <= np.degrees(travel) <= high:
         return
-    ends = {
-        axis: [columns.table.columns.get(f"{label}.{axis}") for label in (mapped.knee, mapped.ankle)] for axis in "xyz"
-    }
-    # A text of two axes has no third, and one of a marker that was lost throughout no number.
-    shin = {axis: below - above for axis, (above, below) in ends.items() if above is not None and below is not None}
-    means = {axis: float(np.nanmean(along)) for axis, along in shin.items() if np.isfinite(along).any()}
-    length, longest = math.hypot(*means.values()), max(means, key=lambda axis: abs(means[axis]))
-    if abs(means[mapped.vertical]) < _LEAST_UPRIGHT * length:
+    if travel < low:
         raise DataError(
-            f"{shank.file}: shank_angle.vertical = {mapped.vertical!r}, but the line from {mapped.knee!r} to "
-            f"{mapped.ankle!r} is longest along {longest!r}; give {longest!r} in a gait map, also for ankle_angle"
+            f"{shank.file}: shank_angle has a range of {travel:.2g} deg in the whole recording (walking: at least "
+            f"{low:g} deg): give a recording of walking, or correct the columns or the forward axis of the shank"
         )
-    if travel >= low:
-        return
-    leans, across = 0.0, min(means.keys() - {mapped.forward[-1], mapped.vertical}, default="")
-    if across:
-        lean = np.degrees(np.arctan2(shin[across], -shin[mapped.vertical]))
-        leans = float(np.nanmax(lean) - np.nanmin(lean))
-    if leans >= low:
-        raise DataError(
-            f"{message}, but of {leans:.2g} deg along {across}; in a gait map, replace shank_angle.forward = "
-            f"{mapped.forward!r} by the walking direction, {across!r} or '-{across}', also for ankle_angle"
-        )
-    raise DataError(f"{message}: give a recording of walking")
