@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import PpafoError
-from ppafo.exports.c_library.walk_preparation import settings_of_walk
+from ppafo.exports.c_library import settings
 from ppafo.loading import load_scenario
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import ATMOSPHERE_PATH
@@ -104,7 +104,9 @@ def numbers_of(scenario: Scenario) -> dict[str, tuple[Quantity, float]]:
 def numbers_of_walk(walk: Scenario) -> dict[str, tuple[Quantity, float]]:
     """The same of a walk; its length is given in minutes and its record follows from that."""
     apart = ("run.duration", "run.output_interval")
-    return {item.path: (item.quantity, item.value) for item in settings_of_walk(walk) if item.path not in apart}
+    return {
+        item.path: (item.quantity, item.value) for item in settings.settings_of(walk, 1.0) if item.path not in apart
+    }
 
 
 @dataclass

@@ -190,10 +190,7 @@ def _settings(scenario: Scenario, library: Library, first: Sequence[str]) -> lis
 
 def _rules(setting: ExportParameter, library: Library, words: str) -> str:
     """Return what a setting has to be beside others, in words; empty for what only its program knows."""
-    paths = {other.name: other.path for other in library.settings}
-    rules = [
-        f"{one.relation} {label_of(paths[one.other], words)}" for one in library.relations if one.name == setting.name
-    ]
+    rules = [f"{one.relation} {label_of(one.other, words)}" for one in library.relations if one.path == setting.path]
     return f"it must be {' and '.join(rules)}" if rules else ""
 
 

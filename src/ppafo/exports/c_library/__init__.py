@@ -13,16 +13,15 @@ from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import Library, Switch, c_identifier
-from ppafo.exports.c_library.preparation import VANE_PREPARATION
-from ppafo.exports.c_library.prepared import Preparation
+from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation
+from ppafo.exports.c_library.profile_rules import has_rules
 from ppafo.exports.c_library.readme import words_of, words_of_walk
-from ppafo.exports.c_library.settings import relations_of, second_chamber, settings_of
+from ppafo.exports.c_library.settings import links_of, relations_of, relations_of_vane, settings_of
 from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of
 from ppafo.simulation.clock import links_of_times, time_texts
 from ppafo.simulation.motion_kind import VANE, WALK
-from ppafo.simulation.numbers import links_that_hold
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.wording import argument_text
@@ -55,10 +54,7 @@ def scenario_library(scenario: Scenario) -> Library:
         )
     program = exported(batch_of(plan_run(scenario)).program)
     settings = settings_of(scenario)
-    # Settings that follow others as long as nobody changes them.
-    absent = second_chamber(scenario)
-    links = {**links_that_hold(scenario), **links_of_times(time_texts(scenario))}
-    links = {path: followed for path, followed in links.items() if c_identifier(path) not in absent}
+    links = links_of(scenario, settings, links_of_times(time_texts(scenario)))
     of_sensors = [
         (("sensors_delay",), program.program.late_signals),
         (_FLAWS, not program.program.ideal_sensors),
@@ -76,7 +72,7 @@ def scenario_library(scenario: Scenario) -> Library:
         description=" ".join(scenario.description.split()),
         program=program,
         settings=settings,
-        relations=relations_of(scenario),
+        relations=relations_of(scenario, settings, relations_of_vane(scenario)),
         switches=_switches(scenario.device, of_sensors),
         other_program=(
             *other_samples(settings, program.program.samples_inside),
@@ -85,7 +81,7 @@ def scenario_library(scenario: Scenario) -> Library:
         words=words_of(scenario, links),
         further=partial(prepare_entry, preparation, VANE_PREPARATION, settings),
         following=partial(follow_entry, preparation, settings, links) if links else None,
-        checking=partial(check_entry, preparation, settings) if preparation.has_rules else None,
+        checking=partial(check_entry, preparation, settings) if has_rules(preparation) else None,
         defaults=frozenset(setting.name for setting in settings if setting.path in links and setting.quantity.follows),
         links=links,
         rules=RULES_OF_TIMES,
@@ -95,20 +91,20 @@ def scenario_library(scenario: Scenario) -> Library:
 def walk_library(configuration: Scenario) -> Library:
     """Return a library whose settings are all numbers of a walk; ScenarioError for a walk that cannot be exported."""
     from ppafo.exports.c_library.walk_preparation import (
+        LINKS_OF_WALK,
+        RELATIONS_OF_WALK,
         WALK_PREPARATION,
         check_can_be_exported,
-        links_of_walk,
-        relations_of_walk,
         rules_of_walk,
-        settings_of_walk,
     )
+    from ppafo.walking.motion import record_interval
     from ppafo.walking.planning import plan_walk
 
     # Before anything is planned: what cannot be exported should be said at once.
     check_can_be_exported(configuration)
     program = exported(batch_of(plan_walk(configuration)).program)
-    settings = settings_of_walk(configuration)
-    links = links_of_walk(configuration)
+    settings = settings_of(configuration, record_interval(configuration.run.duration))
+    links = links_of(configuration, settings, LINKS_OF_WALK)
     preparation = Preparation(configuration, program.program)
     of_readings = [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]
     return Library(
@@ -116,15 +112,15 @@ def walk_library(configuration: Scenario) -> Library:
         description=" ".join(configuration.description.split()),
         program=program,
         settings=settings,
-        relations=relations_of_walk(configuration),
+        relations=relations_of(configuration, settings, RELATIONS_OF_WALK),
         switches=_switches(configuration.device, of_readings),
-        other_program=(),
+        other_program=(other_supply(configuration.device),),
         words=words_of_walk(configuration, links),
         further=partial(prepare_entry, preparation, WALK_PREPARATION, settings),
         following=partial(follow_entry, preparation, settings, links) if links else None,
         links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
-        rules=rules_of_walk(configuration),
+        rules=rules_of_walk(configuration, settings),
     )
 
 

@@ -4,15 +4,13 @@ import itertools
 import sys
 from collections.abc import Sequence
 
-from ppafo.exports.c_library.library import ExportParameter, Library, Rule
+from ppafo.exports.c_library.library import Condition, ExportParameter, Library
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 
-_SIGNS = {"below": "<", "at most": "<=", "at least": ">=", "above": ">"}
 
-
-def conditions_of_program(library: Library) -> list[tuple[str, str]]:
+def conditions_of_program(library: Library) -> list[Condition]:
     """C conditions under which settings require another compiled program, each with the setting to report."""
     values = {setting.name: setting.value for setting in library.settings}
     conditions = []
@@ -28,16 +26,16 @@ def conditions_of_program(library: Library) -> list[tuple[str, str]]:
 
 _TIMES = ("run_output_interval", "run_step", "controller_period", "run_duration")
 
-RULES_OF_TIMES: tuple[Rule, ...] = (
-    ("run_output_interval", "is_whole({} / {})", ("run_duration", "run_output_interval")),
-    ("run_duration", "{} / {} <= 1.0e8", ("run_duration", "run_step")),
-    ("run_duration", "{} / {} <= 5.0e6", ("run_duration", "run_output_interval")),
-    ("sensors_delay", "{} / {} <= 1.0e5", ("sensors_delay", "run_step")),
+RULES_OF_TIMES: tuple[Condition, ...] = (
+    ("is_whole(settings->run_duration / settings->run_output_interval)", "run_output_interval"),
+    ("settings->run_duration / settings->run_step <= 1.0e8", "run_duration"),
+    ("settings->run_duration / settings->run_output_interval <= 5.0e6", "run_duration"),
+    ("settings->sensors_delay / settings->run_step <= 1.0e5", "sensors_delay"),
 )
 """Rules of the times of a scenario (``simulation/clock.py``)."""
 
 
-def other_supply(device: Device) -> tuple[str, str]:
+def other_supply(device: Device) -> Condition:
     """C condition under which gas is drawn where the program feeds it or the reverse, and the setting to report."""
     plant = "prepared->parameters.plant"
     pressures = f"{plant}.supply_pressure", f"{plant}.dorsiflexion_pressure"
@@ -45,30 +43,13 @@ def other_supply(device: Device) -> tuple[str, str]:
     return f"!({below})" if device.supply.is_vacuum else below, "supply_pressure"
 
 
-def other_samples(settings: Sequence[ExportParameter], samples_inside: bool) -> list[tuple[str, str]]:
+def other_samples(settings: Sequence[ExportParameter], samples_inside: bool) -> list[Condition]:
     """C conditions under which samples begin or cease to lie between steps, each with the changed time to report."""
     interval = "prepared->counts.interval"
     moved = f"({interval} != (double)(int64_t){interval}) != {'true' if samples_inside else 'false'}"
     values = {setting.name: setting.value for setting in settings}
     changed = [(f"{moved} && settings->{name} != {values[name]!r}", name) for name in _TIMES]
     return [*changed, (moved, _TIMES[0])]
-
-
-def relations_of_library(library: Library) -> list[tuple[str, str]]:
-    """C conditions between settings, each with the name of the setting to report on failure."""
-    relations = []
-    for relation in library.relations:
-        other, sign = f"settings->{relation.other}", "-" if relation.relation == "at least" else "+"
-        if relation.tolerance:
-            # With the tolerance of files, or a setting that a file accepts would be refused in C.
-            slack = repr(relation.tolerance)
-            other = f"{other} * (1.0 {sign} {slack})" if relation.is_share else f"{other} {sign} {slack}"
-        required = f"settings->{relation.name} {_SIGNS[relation.relation]} {other}"
-        relations.append((f"{required} || ({relation.unless})" if relation.unless else required, relation.name))
-    return [
-        *relations,
-        *((rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in library.rules),
-    ]
 
 
 def limits_in_c(quantity: Quantity) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
-from ppafo.exports.c_library.prepared import Preparation
+from ppafo.exports.c_library.preparation import Preparation
 from ppafo.exports.c_library.profile_rules import PROFILE_RULES
 from ppafo.exports.c_library.settings import numbers_of_second_chamber
 from ppafo.exports.c_library.structs import given

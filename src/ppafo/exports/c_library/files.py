@@ -8,7 +8,7 @@ from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.exports import filled, in_comment, in_markdown, template
-from ppafo.exports.c_library.conditions import conditions_of_program, limits_in_c, relations_of_library
+from ppafo.exports.c_library.conditions import conditions_of_program, limits_in_c
 from ppafo.exports.c_library.library import Library
 from ppafo.exports.c_library.program import c_text_of_run
 from ppafo.signals import CHANNELS
@@ -85,7 +85,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
     # The last argument of the loop of a run in C, where it has both kinds of steps.
     in_parts = ", run->needs_parts" if program.program.chooses_parts else ""
     steps = {"name": name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts}
-    relations = relations_of_library(library)
+    relations = [*(relation.condition for relation in library.relations), *library.rules]
     table, fields = [], []
     for setting in settings:
         quantity = setting.quantity

@@ -33,24 +33,39 @@ class ExportParameter:
     value: float
 
 
+_SIGNS = {"below": "<", "at most": "<=", "at least": ">=", "above": ">"}
+
+
 @dataclass(frozen=True, slots=True)
 class Relation:
     """Required relation between two settings: ``below``, ``at most``, ``at least`` or ``above``, with ``tolerance``.
 
-    The tolerance is in the unit of both settings, or a fraction of the other if ``is_share``. ``unless`` is a C
-    condition under which the relation is not required.
+    Settings are given by path. The tolerance is in the unit of both, or a fraction of the other if ``is_share``.
+    ``unless`` is a C condition under which the relation is not required.
     """
 
-    name: str
+    path: str
     relation: str
     other: str
     tolerance: float = 0.0
     is_share: bool = False
     unless: str = ""
 
+    @property
+    def condition(self) -> tuple[str, str]:
+        """C condition, and the setting to report if it is not met."""
+        other, sign = f"settings->{c_identifier(self.other)}", "-" if self.relation == "at least" else "+"
+        if self.tolerance:
+            # With the tolerance of files, or a setting that a file accepts would be refused in C.
+            slack = repr(self.tolerance)
+            other = f"{other} * (1.0 {sign} {slack})" if self.is_share else f"{other} {sign} {slack}"
+        name = c_identifier(self.path)
+        required = f"settings->{name} {_SIGNS[self.relation]} {other}"
+        return f"{required} || ({self.unless})" if self.unless else required, name
 
-Rule = tuple[str, str, tuple[str, ...]]
-"""Rule of settings: setting to report, condition as C text, and settings on which the condition depends, in order."""
+
+Condition = tuple[str, str]
+"""Condition between settings as C text, and the setting to report."""
 
 
 Switch = tuple[Sequence[str], bool]
@@ -100,7 +115,7 @@ class Library:
     settings: tuple[ExportParameter, ...]
     relations: tuple[Relation, ...]
     switches: tuple[Switch, ...]
-    other_program: tuple[tuple[str, str], ...]
+    other_program: tuple[Condition, ...]
     words: Mapping[str, str]
     further: Further | None = None
     following: Further | None = None
@@ -108,7 +123,7 @@ class Library:
     defaults: frozenset[str] = frozenset()
     links: Graph = field(default_factory=dict)
     api: LibraryApi = LOOP
-    rules: tuple[Rule, ...] = ()
+    rules: tuple[Condition, ...] = ()
     joint: JointNames = ANKLE
     actuator: str = VANE
 

@@ -292,4 +292,5 @@ def _commanded_walk(motion: WalkMotion, walk: Scenario) -> Scenario:
         run=replace(walk.run, step=step, output_interval=step),
         sensors=Sensors(),
         motion=replace(motion, forces=forces),
+        links=outside(walk.links, "controller"),
     )

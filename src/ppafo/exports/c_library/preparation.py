@@ -5,89 +5,174 @@ be filled, and ``settings``, numbers in SI units by path. A library contains the
 (``engine.generator``), with all conditions on ``parts`` evaluated beforehand.
 """
 
+from collections import namedtuple
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
-from ppafo.engine.rows import rebuilt, section_row
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths, numbers, rebuilt, section_row
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.scheme.pneumatics import is_slow
-from ppafo.engine.step.lane import LaneResult, LaneTiming
-from ppafo.exports.c_library.prepared import VANE_ONLY_FIELDS, Preparation, PreparedLane, names_of
+from ppafo.engine.step.lane import Lane, LaneResult, LaneTiming
 from ppafo.model.actuators.kind import Range, mean_growth
+from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import larger, smaller
+from ppafo.model.declaration import Quantity
 from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import SupplyLines, lines_at_start
 from ppafo.model.sensors import SensorParameters
+from ppafo.parameters.declaration import members
+from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.effects import SEEN_BY_EFFECTS
 from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
-from ppafo.simulation.declaration import THERMAL_GAS
+from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL_GAS
 from ppafo.simulation.leg import foot_load, with_load
 from ppafo.simulation.numbers import path_of_locked_angle
-from ppafo.simulation.plan import relative_tolerance, state_with_volumes, step_counts, thermal_gas
+from ppafo.simulation.plan import StepCounts, relative_tolerance, state_with_volumes, step_counts, thermal_gas
+from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 
 FOOT_SETTINGS = ("foot_mass", "foot_mass_centre", "foot_inertia", "shank_length")
 """Settings of a foot on a prescribed shank, in the order of ``foot_load``."""
+OF_SHANK = {"shank.start": "motion.shank.start", "shank.toe_lever": "motion.toe_lever"}
+"""Paths of the settings of a shank on a gait, by the path of the number in ``ShankSeries``."""
+LINE_PATHS = tuple(
+    f"{SUPPLY_LINE}.{line}.{name}" for line in SUPPLY_LINES for name in ("droop", "largest_flow", "volume")
+)
+"""Settings of the supply lines, in the order of ``SupplyLines``."""
+RELIEVING = "relieving"
+"""Last number of ``SupplyLines``, which is no setting."""
+VANE_ONLY_FIELDS = ("torque_constant", "displacement_per_radian")
+"""Parameters of the vane without meaning for an actuator of another shape."""
+
+
+class PreparedLane(Lane):
+    """Numbers of one run by group, and intermediate numbers of its preparation."""
+
+    counts_of_steps: StepCounts
+    tolerance: float  # error that a step may have, over the default [-]
+    needs_parts: bool  # True where the error decides about the parts of a step
+    step: float  # length of a step [s]
+    signal_steps: float  # whole steps in the delay of the sensors [-]
+    command_steps: float  # whole steps in the dead time of the valve [-]
+    fault: float  # place of the setting that breaks a rule on profiles, counted from 1; 0 for none [-]
+    gas: Any
+    device: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Preparation:
+    """Scenario and program of a library: all data that does not depend on the settings.
+
+    ``places`` has the place of each setting in the library, counted from 1, by path.
+    """
+
+    scenario: Scenario
+    program: Program
+    places: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def device(self) -> Device:
+        """Device of the scenario."""
+        return self.scenario.device
+
+    @property
+    def leg(self) -> Leg | None:
+        """Leg on a prescribed shank, attached to the vane; None for other motions and in a walk."""
+        return None if self.program.walks else vane_motion(self.scenario).leg
+
+    @property
+    def locked_angle(self) -> str:
+        """Path of the setting for the angle of a locked joint."""
+        return path_of_locked_angle(self.scenario) or LOCKED_ANGLE
+
+    @property
+    def moves_on_path(self) -> bool:
+        """True for a joint that a profile moves."""
+        return self.program.angle is not None and path_of_locked_angle(self.scenario) is None
+
+    @property
+    def actuator_settings(self) -> Any:
+        """Class of the settings of the actuator."""
+        return ACTUATORS[self.device.actuator.kind].settings
+
+    def row(self, name: str, fields: Iterable[str]) -> Any:
+        """Return a NamedTuple class of settings with the given field names."""
+        new_class: Any = namedtuple
+        row = new_class(name.title().replace("_", ""), list(fields), module=__name__)
+        row.__doc__ = ""  # not the list of its fields, which stands in the library below it
+        return row
+
+    def class_of_section(self, name: str, *further: str) -> Any:
+        """Return a NamedTuple class of a device section as visible to effects, with ``further`` fields."""
+        return self.row(name, [*names_of(members(name, self.device.actuator.kind)), *further])
+
+    def is_sonic(self, section: str) -> bool:
+        """True for an orifice specified by ISO 6358 sonic conductance and critical ratio."""
+        return isinstance(self.device.valve.orifice if section == "valve" else self.device.actuator.leak, SonicOrifice)
+
+    def constant(self, row: Any) -> Any:
+        """Return a NamedTuple of constants that no setting changes, converted to floats."""
+        return rebuilt(type(row), numbers(row))
+
+
+def names_of(quantities: Iterable[Quantity]) -> list[str]:
+    """Return the names of declared quantities."""
+    return [quantity.name for quantity in quantities]
 
 
 def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the plant parameters without a walking leg, and the parameters of effects."""
+    plant_without_leg = "bare" if parts.program.walks else "plant"
+    # An actuator of another shape has no parameters of a vane; its shape comes last.
+    vane_only = () if parts.program.actuator.shape is None else VANE_ONLY_FIELDS
+    of_vane = f"vane_{plant_without_leg}" if vane_only else plant_without_leg
     constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, settings["gas.molar_mass"])
-    lane.gas = section_row(parts.section_row("gas", "specific_gas_constant"), settings, "gas", constant)
-    lane["actuator"] = section_row(
-        parts.section_row("actuator", *parts.vane_only_fields),
-        settings,
-        "actuator",
-        *(0.0 for _ in parts.vane_only_fields),
-    )
-    for section in ("friction", "foot_plate"):
-        lane[section] = section_row(parts.section_row(section), settings, section)
     # Lines have a check valve of their own, so that the valve may push gas back into them.
     relieving = float(parts.device.supply.takes_back or parts.scenario.supply_lines is not None)
-    lane["supply"] = section_row(parts.section_row("supply", "relieving"), settings, "supply", relieving)
+    lane.gas = section_row(parts.class_of_section("gas", "specific_gas_constant"), settings, "gas", constant)
+    actuator = parts.class_of_section("actuator", *vane_only)
+    lane["actuator"] = section_row(actuator, settings, "actuator", *(0.0 for _ in vane_only))
+    for section in ("friction", "foot_plate"):
+        lane[section] = section_row(parts.class_of_section(section), settings, section)
+    lane["supply"] = section_row(parts.class_of_section("supply", "relieving"), settings, "supply", relieving)
     lane.device = parts.row("Device", SEEN_BY_EFFECTS)(*(lane[section] for section in SEEN_BY_EFFECTS))
     for section, orifice in (("valve", "valve"), ("leak", "actuator.leak")):
-        lane[f"{section}_restriction"] = (sonic_restriction if parts.is_sonic(orifice) else area_restriction)(
-            section_row(parts.orifice_row(orifice), settings, orifice), lane.gas, settings["flow.linear_ratio"]
-        )
+        if parts.is_sonic(orifice):
+            sonic = section_row(parts.row("SonicOrifice", ("sonic_conductance", "critical_ratio")), settings, orifice)
+            lane[f"{section}_restriction"] = sonic_restriction(sonic, lane.gas, settings["flow.linear_ratio"])
+        else:
+            area = section_row(parts.row("Orifice", ("area", "discharge_coefficient")), settings, orifice)
+            lane[f"{section}_restriction"] = area_restriction(area, lane.gas, settings["flow.linear_ratio"])
     for effect in parts.program.effects:
         if effect.prepare is None:
             lane[effect.name] = section_row(effect.parameters, settings, effect.section)
         else:
-            lane[effect.name] = effect.prepare(
-                section_row(parts.effect_row(effect), settings, effect.section), lane.device
-            )
-    is_led = parts.program.angle is not None or parts.program.walks
-    lane[parts.plant_of_vane] = plant_with(
-        lane.device,
-        lane["valve_restriction"],
-        lane["leak_restriction"],
-        0.0
-        if is_led
-        else (settings["motion.external_torque"] if parts.leg is None else -settings["motion.ankle_torque"]),
-    )
-    if parts.program.actuator.shape is not None:
+            own = parts.row(f"{effect.name}_settings", names_of(effect.quantities))
+            lane[effect.name] = effect.prepare(section_row(own, settings, effect.section), lane.device)
+    if parts.program.angle is not None or parts.program.walks:
+        torque = 0.0
+    else:
+        torque = settings["motion.external_torque"] if parts.leg is None else -settings["motion.ankle_torque"]
+    lane[of_vane] = plant_with(lane.device, lane["valve_restriction"], lane["leak_restriction"], torque)
+    if vane_only:
         stops = section_row(Range, settings, "actuator")
-        # What came from a file that the set names is constant.
+        tables = [] if parts.device.actuator.table is None else [parts.device.actuator.table]
         shape = parts.program.actuator.prepare(
             section_row(parts.actuator_settings, settings, "actuator"),
             stops,
-            *(parts.constant(table) for table in parts.tables),
+            # What came from a file that the set names is constant.
+            *(parts.constant(table) for table in tables),
         )
         # The mean growth is taken at the supply's pressure, at which most of the work is done.
-        growth = mean_growth(
-            shape,
-            stops,
-            lane[parts.plant_of_vane].supply_pressure - lane[parts.plant_of_vane].atmospheric_pressure,
-            parts.program.actuator.chambers,
-        )
-        lane[parts.plant_without_leg] = parts.program.actuator.plant(
-            *(
-                growth if name in VANE_ONLY_FIELDS else getattr(lane[parts.plant_of_vane], name)
-                for name in PlantParameters._fields
-            ),
+        gauge = lane[of_vane].supply_pressure - lane[of_vane].atmospheric_pressure
+        growth = mean_growth(shape, stops, gauge, parts.program.actuator.chambers)
+        lane[plant_without_leg] = parts.program.actuator.plant(
+            *(growth if name in VANE_ONLY_FIELDS else getattr(lane[of_vane], name) for name in PlantParameters._fields),
             shape,
         )
 
@@ -96,9 +181,7 @@ def put_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Add a foot on a prescribed shank to the plant."""
     if parts.leg is not None:
         lane.load = foot_load(
-            lane.plant.inertia,
-            lane.plant.gravity_torque,
-            *(settings[f"motion.{name}"] for name in FOOT_SETTINGS),
+            lane.plant.inertia, lane.plant.gravity_torque, *(settings[f"motion.{name}"] for name in FOOT_SETTINGS)
         )
         lane.plant = with_load(lane.plant, lane.load)
 
@@ -106,39 +189,30 @@ def put_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 def set_shank(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the motion of the shank that carries a foot; of a gait, only start time and toe lever can be set."""
     if parts.leg is not None:
+        shank = parts.program.shank
+        assert shank is not None, "a leg has a shank"
         if parts.leg.curves is None:
-            shank = parts.program.shank
-            assert shank is not None, "a leg has a shank"
             lane.shank = rebuilt(
-                shank.parameters,
-                (settings[f"motion.shank.{name}"] for name in names_of(shank.quantities)),
+                shank.parameters, (settings[f"motion.shank.{name}"] for name in names_of(shank.quantities))
             )
         else:
+            of_gait = dict(zip(leaf_paths(ShankSeries, "shank"), numbers(parts.leg.curves), strict=True))
             lane.shank = rebuilt(
-                ShankSeries,
-                (
-                    settings["motion.shank.start"]
-                    if path == "shank.start"
-                    else (settings["motion.toe_lever"] if path == "shank.toe_lever" else parts.shank_numbers[path])
-                    for path in parts.shank_numbers
-                ),
+                ShankSeries, (settings[OF_SHANK[path]] if path in OF_SHANK else of_gait[path] for path in of_gait)
             )
 
 
 def count_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set number and length of the steps."""
     lane.counts_of_steps = step_counts(
-        settings["run.duration"],
-        settings["run.step"],
-        settings["run.output_interval"],
-        settings["controller.period"],
+        settings["run.duration"], settings["run.step"], settings["run.output_interval"], settings["controller.period"]
     )
     lane.tolerance = relative_tolerance(settings["run.tolerance"])
 
 
 def set_timing(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set valve parameters, delays in steps, and the time grid."""
-    lane["valve_settings"] = section_row(parts.valve_settings, settings, "valve")
+    lane["valve_settings"] = section_row(VALVES[parts.device.valve.kind].settings, settings, "valve")
     lane.valve = parts.program.valve.prepare(lane["valve_settings"])
     # The step that the counts found, not the one that was asked for.
     lane.step = lane.counts_of_steps.step
@@ -180,8 +254,7 @@ def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     controller, reference, path = parts.program.controller, parts.program.reference, parts.program.angle
     if controller is not None:
         lane.controller = rebuilt(
-            controller.parameters,
-            (settings[f"controller.{name}"] for name in names_of(controller.quantities)),
+            controller.parameters, (settings[f"controller.{name}"] for name in names_of(controller.quantities))
         )
     # Where no reference is followed, the one that stands in its place is written out.
     lane.reference = rebuilt(
@@ -198,7 +271,7 @@ def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
             path.parameters,
             (
                 settings[parts.locked_angle]
-                if name == "level" and path_of_locked_angle(parts.scenario) is not None
+                if name == "level" and not parts.moves_on_path
                 else settings[f"motion.profile.{name}"]
                 for name in names_of(path.quantities)
             ),
@@ -209,35 +282,27 @@ def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set sensor noise, heat transfer to the gas, and supply lines."""
     lane.sensors = section_row(SensorParameters, settings, "sensors")
     if parts.program.is_thermal:
-        lane.thermal = thermal_gas(
-            section_row(parts.row("Walls", names_of(THERMAL_GAS)), settings, "gas_model"), lane.gas
-        )
+        walls = parts.row("Walls", names_of(THERMAL_GAS))
+        lane.thermal = thermal_gas(section_row(walls, settings, "gas_model"), lane.gas)
     if parts.scenario.supply_lines is not None:
         relieving = parts.scenario.supply_lines.relieving
         lane.lines = rebuilt(
-            SupplyLines, (relieving if path == "relieving" else settings[path] for path in parts.line_fields)
+            SupplyLines, (relieving if path == RELIEVING else settings[path] for path in (*LINE_PATHS, RELIEVING))
         )
 
 
 def fill_chambers(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the initial angle, angular velocity and gas."""
-    path = parts.program.angle
-    if path is not None:
-        angle, angular_velocity, _ = path.value(lane.path, 0.0)
-    filled = parts.program.actuator.chambers(
-        lane.plant,
-        settings["motion.angle"] if path is None else angle,
-        settings["initial.pressure_1"],
-        settings["initial.pressure_2"],
-    )
+    if parts.program.angle is not None:
+        angle, angular_velocity, _ = parts.program.angle.value(lane.path, 0.0)
+    else:
+        angle = settings["motion.angle"]
+        angular_velocity = settings["motion.angular_velocity"]
+    pressure_1 = settings["initial.pressure_1"]
+    pressure_2 = settings["initial.pressure_2"]
+    filled = parts.program.actuator.chambers(lane.plant, angle, pressure_1, pressure_2)
     lane.state = state_with_volumes(
-        lane.plant,
-        settings["motion.angle"] if path is None else angle,
-        settings["motion.angular_velocity"] if path is None else angular_velocity,
-        filled.volume_1,
-        filled.volume_2,
-        settings["initial.pressure_1"],
-        settings["initial.pressure_2"],
+        lane.plant, angle, angular_velocity, filled.volume_1, filled.volume_2, pressure_1, pressure_2
     )
 
 

@@ -3,18 +3,25 @@
 The functions take what those of ``preparation`` take. A fault is the place of the setting to name, counted from 1.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from ppafo.control.profiles import TabulatedProfile, disordered_knot
 from ppafo.engine.rows import section_row
-from ppafo.exports.c_library.preparation import count_steps, set_laws, set_shank
-from ppafo.exports.c_library.prepared import Preparation, PreparedLane
+from ppafo.exports.c_library.preparation import Preparation, PreparedLane, count_steps, set_laws, set_shank
 from ppafo.model.actuators.kind import Range
-from ppafo.model.controlled import Ends
-from ppafo.simulation.profiles import excursion, widened
+from ppafo.model.catalog import ACTUATORS
+from ppafo.model.controlled import CONTROLLED, Ends
+from ppafo.simulation.profiles import ProfileCourse, excursion, widened
 
 KNOTS = {"reference": "reference.time_02", "path": "motion.profile.time_02", "shank": "motion.shank.time_02"}
 """Path of the time of the second knot of a profile, by the group of its settings."""
+
+ENDS = (
+    *("actuator.angle_min", "actuator.angle_max"),
+    *("supply.pressure", "supply.dorsiflexion_pressure", "supply.atmospheric_pressure"),
+)
+"""Settings that decide what a reference may reach, in the order of ``Ends``."""
 
 
 def fault_of_knots(profile: TabulatedProfile, second: float) -> float:
@@ -29,60 +36,53 @@ def first_fault(found: float, further: float) -> float:
     return found if found > 0.0 else further
 
 
+def reach_of(parts: Preparation) -> Callable[[Ends], tuple[float, float]] | None:
+    """Return the function for the range of the reference; None for a reference that nothing limits."""
+    return CONTROLLED[parts.scenario.controlled].reach if parts.scenario.follows_reference else None
+
+
+def has_rules(parts: Preparation) -> bool:
+    """Return whether there are rules on the profiles, of knots or of what they may reach, or on the actuator."""
+    has_knots = not parts.places.keys().isdisjoint(KNOTS.values())
+    flaw = ACTUATORS[parts.device.actuator.kind].flaw
+    return has_knots or flaw is not None or reach_of(parts) is not None or parts.moves_on_path
+
+
 def check_knots(parts: Preparation, lane: PreparedLane, settings: Any) -> None:  # noqa: ARG001
     """Set the fault of the knots of reference, prescribed angle and shank."""
     lane.fault = 0.0
     for group, second in KNOTS.items():
         if second in parts.places:
-            lane.fault = first_fault(lane.fault, fault_of_knots(lane[group], parts.place_of(second)))
+            lane.fault = first_fault(lane.fault, fault_of_knots(lane[group], parts.places[second]))
 
 
 def check_courses(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the fault of a prescribed angle beyond the stops, or of a reference out of reach."""
+    duration = settings["run.duration"]
     if parts.moves_on_path:
-        lane["stops"] = widened(settings["actuator.angle_min"], settings["actuator.angle_max"])
-        lane["outside"] = excursion(
-            lane.path,
-            lane["stops"][0],
-            lane["stops"][1],
-            settings["run.duration"],
-            lane.counts_of_steps.step,
-            parts=parts.course_of_angle,
-        )
-        lane.fault = first_fault(
-            lane.fault, parts.place_of("motion.profile.level") if lane["outside"][0] >= 0.0 else 0.0
-        )
-    if parts.reach is not None:
-        lane["reach"] = parts.reach(
-            parts.row("Ends", Ends._fields)(
-                settings["actuator.angle_min"],
-                settings["actuator.angle_max"],
-                settings["supply.pressure"],
-                settings["supply.dorsiflexion_pressure"],
-                settings["supply.atmospheric_pressure"],
-            )
-        )
-        lane["limits"] = widened(lane["reach"][0], lane["reach"][1])
-        lane["beyond"] = excursion(
-            lane.reference,
-            lane["limits"][0],
-            lane["limits"][1],
-            settings["run.duration"],
-            lane.counts_of_steps.step,
-            parts=parts.course_of_reference,
-        )
-        lane.fault = first_fault(lane.fault, parts.place_of("reference.level") if lane["beyond"][0] >= 0.0 else 0.0)
+        assert parts.program.angle is not None, "a joint on a path"
+        stops = widened(settings["actuator.angle_min"], settings["actuator.angle_max"])
+        course = ProfileCourse(parts.program.angle.value)
+        outside = excursion(lane.path, stops[0], stops[1], duration, lane.counts_of_steps.step, parts=course)
+        lane.fault = first_fault(lane.fault, parts.places["motion.profile.level"] if outside[0] >= 0.0 else 0.0)
+    reach = reach_of(parts)
+    if reach is not None:
+        reached = reach(parts.row("Ends", Ends._fields)(*(settings[path] for path in ENDS)))
+        limits = widened(reached[0], reached[1])
+        wanted = ProfileCourse(parts.program.reference.value)
+        beyond = excursion(lane.reference, limits[0], limits[1], duration, lane.counts_of_steps.step, parts=wanted)
+        lane.fault = first_fault(lane.fault, parts.places["reference.level"] if beyond[0] >= 0.0 else 0.0)
 
 
 def check_actuator(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the fault of an actuator whose numbers are impossible together."""
-    if parts.flaw is not None:
-        lane["flaw"] = parts.flaw(
+    find_flaw = ACTUATORS[parts.device.actuator.kind].flaw
+    if find_flaw is not None:
+        flaw = find_flaw(
             section_row(parts.actuator_settings, settings, "actuator"), section_row(Range, settings, "actuator")
         )
-        lane.fault = first_fault(
-            lane["flaw"] + (parts.place_of(parts.first_of_actuator) - 1.0) if lane["flaw"] > 0.0 else 0.0, lane.fault
-        )
+        before_first = parts.places[f"actuator.{next(iter(parts.device.actuator.settings))}"] - 1.0
+        lane.fault = first_fault(flaw + before_first if flaw > 0.0 else 0.0, lane.fault)
 
 
 def faults(parts: Preparation, lane: PreparedLane, settings: Any) -> float:  # noqa: ARG001

@@ -1,14 +1,14 @@
 """README paragraphs of an exported library on its scenario or walk."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 from ppafo.exports.c_library.conditions import choosing
 from ppafo.exports.c_library.library import c_identifier
-from ppafo.exports.c_library.settings import second_chamber
+from ppafo.exports.c_library.settings import numbers_of_second_chamber
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.effects import effects_of
-from ppafo.parameters.graph import Graph
+from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
 from ppafo.simulation.scenario import Scenario, vane_motion
 
 _METRICS_OF_SCENARIO = """\
@@ -39,7 +39,7 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     return {
         "fixed": _listed(fixed),
         "precomputed": "nothing",
-        "traps": _followers(links, second_chamber(scenario)),
+        "traps": _followers(links, numbers_of_second_chamber(scenario)),
         "metrics_said": _METRICS_OF_SCENARIO.format(left_out=", ".join(f"`{name}`" for name in left_out)),
     }
 
@@ -61,22 +61,21 @@ def words_of_walk(walk: Scenario, links: Graph) -> dict[str, str]:
     return {
         "fixed": _listed(fixed),
         "precomputed": "the gait alone",
-        "traps": f"{_followers(links, second_chamber(walk))}\n{_TRAPS_OF_WALK}",
+        "traps": f"{_followers(links, numbers_of_second_chamber(walk))}\n{_TRAPS_OF_WALK}",
         "metrics_said": _METRICS_OF_WALK,
     }
 
 
-def _followers(links: Graph, absent: Mapping[str, str]) -> str:
-    """Return the README line on parameters that follow others; ``absent`` gives numbers of a missing chamber by name.
+def _followers(links: Graph, absent: Collection[str]) -> str:
+    """Return the README line on parameters that follow others; ``absent`` are the numbers of a missing chamber.
 
-    Pressures of a missing chamber appear as the atmospheric pressure; its other numbers are constants and omitted.
+    Its pressures appear as the atmospheric pressure; its other numbers are constants and omitted.
     """
     followers = []
     for path, follows in links.items():
-        names = (c_identifier(source) for link in follows for source in link.sources)
-        sources = dict.fromkeys(
-            f"`{text}`" for text in (absent.get(name, name) for name in names) if text.isidentifier()
-        )
+        paths = [each for link in follows for each in link.sources if each not in absent or "pressure" in each]
+        paths = [ATMOSPHERE_PATH if each in absent else each for each in paths]
+        sources = dict.fromkeys(f"`{c_identifier(each)}`" for each in paths)
         followers.append(f"`{c_identifier(path)}` ({', '.join(sources)})")
     return _FOLLOWS.format(followers=", ".join(followers) or "none")
 

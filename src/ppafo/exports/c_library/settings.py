@@ -1,6 +1,6 @@
 """Settings of an exported scenario: every number by path, in SI units, and required relations between them."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
@@ -10,10 +10,10 @@ from ppafo.parameters.building import SUPPLIES, consistency
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.declared import value_at
 from ppafo.parameters.effects import effects_of
-from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH, Graph
 from ppafo.simulation.clock import step_unless_given, step_with_output, time_texts
-from ppafo.simulation.declaration import LOCKED_ANGLE
-from ppafo.simulation.numbers import declared_numbers, number_at, other_form, path_of_locked_angle
+from ppafo.simulation.declaration import LOCKED_ANGLE, RUN
+from ppafo.simulation.numbers import declared_numbers, links_that_hold, number_at, other_form, path_of_locked_angle
 from ppafo.simulation.profiles import TOLERANCE
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
@@ -26,31 +26,19 @@ _DESCRIPTIONS = {
 """Descriptions of settings that differ from those in a file."""
 
 
-def settings_of(scenario: Scenario) -> tuple[ExportParameter, ...]:
-    """Return every number of a scenario in SI units, by the path used in overrides."""
-    # The file's step, from which the engine makes one that divides a sample.
-    texts = time_texts(scenario)
-    duration, period = scenario.run.duration, scenario.controller.period
-    step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
-    if step is not None:
-        longest = parse_quantity(str(step), "s")
-    elif output is None:
-        longest = step_unless_given(duration, period)
+def settings_of(scenario: Scenario, recorded: float | None = None) -> tuple[ExportParameter, ...]:
+    """Return every number of a scenario in SI units, by the path used in overrides.
+
+    ``recorded`` is the output interval [s] of a walk, which follows from its duration; else the scenario has its own.
+    """
+    run, declared = scenario.run, declared_settings(scenario)
+    times = {"run.duration": run.duration, "run.step": run.step, "controller.period": scenario.controller.period}
+    times["run.output_interval"] = run.output_interval if recorded is None else recorded
+    if recorded is None:
+        times["run.step"] = _longest_step(scenario)
     else:
-        longest = step_with_output(duration, period, scenario.run.output_interval)
-    times = {
-        "run.duration": duration,
-        "run.step": longest,
-        "run.output_interval": scenario.run.output_interval,
-        "controller.period": period,
-    }
-    return export_parameters(scenario, declared_settings(scenario), times)
-
-
-def export_parameters(
-    scenario: Scenario, declared: Mapping[str, Quantity], times: Mapping[str, float]
-) -> tuple[ExportParameter, ...]:
-    """Return declared numbers by path with their SI values: from ``times`` [s], else from the scenario."""
+        # A library may walk longer than a file; its step is that of a walk.
+        declared |= {f"run.{quantity.name}": quantity for quantity in RUN if quantity.name != "step"}
     return tuple(
         ExportParameter(
             c_identifier(path),
@@ -62,62 +50,66 @@ def export_parameters(
     )
 
 
-def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
-    """Return the required relations between settings, as checked in a file."""
-    rules: list[tuple[str, str, str, float]] = [
-        *((path, relation, other, 0.0) for path, relation, other, _ in consistency(scenario.device)),
-        ("run.step", "at most", "run.duration", 0.0),
-        ("run.output_interval", "at most", "run.duration", 0.0),
-        ("sensors.delay", "at most", "run.duration", 0.0),
+def _longest_step(scenario: Scenario) -> float:
+    """Return the step [s] of the file, from which the engine makes one that divides a sample."""
+    texts, duration, period = time_texts(scenario), scenario.run.duration, scenario.controller.period
+    step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
+    if step is not None:
+        return parse_quantity(str(step), "s")
+    if output is None:
+        return step_unless_given(duration, period)
+    return step_with_output(duration, period, scenario.run.output_interval)
+
+
+def links_of(scenario: Scenario, settings: Iterable[ExportParameter], of_times: Graph) -> Graph:
+    """Return the links by which settings follow others unless changed; ``of_times`` are those of the times of a run."""
+    known = {setting.path for setting in settings}
+    return {path: links for path, links in {**links_that_hold(scenario), **of_times}.items() if path in known}
+
+
+def relations_of(
+    scenario: Scenario, settings: Iterable[ExportParameter], further: Iterable[Relation]
+) -> tuple[Relation, ...]:
+    """Return the required relations between settings, as checked in a file: of the device, and ``further`` ones."""
+    known = {setting.path for setting in settings}
+    relations = [
+        Relation(path, relation, other, unless=all_opposite(relation, known) if other == ATMOSPHERE_PATH else "")
+        for path, relation, other, _ in consistency(scenario.device)
     ]
-    # A vane that stays at an angle, or starts there.
-    start_angle = path_of_locked_angle(scenario) or LOCKED_ANGLE
-    if start_angle in declared_settings(scenario):
-        rules.append((start_angle, "at least", "actuator.angle_min", TOLERANCE))
-        rules.append((start_angle, "at most", "actuator.angle_max", TOLERANCE))
     if scenario.supply_lines is not None:
-        rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure", 0.0))
-    rules = [rule for rule in rules if c_identifier(rule[0]) not in second_chamber(scenario)]
-    of_steps = (
-        Relation("run_step", "at most", longer, TOLERANCE, is_share=True)
-        for longer in ("controller_period", "run_output_interval")
-    )
+        relations.append(Relation(SECOND_PRESSURE_PATH, "at most", PRESSURE_PATH))
+    return tuple(one for one in (*relations, *further) if one.path in known and one.other in known)
+
+
+def relations_of_vane(scenario: Scenario) -> tuple[Relation, ...]:
+    """Return the relations of the file of a vane alone: of its times, and of the angle where it stays or starts."""
+    angle = path_of_locked_angle(scenario) or LOCKED_ANGLE
     return (
+        *(Relation(path, "at most", "run.duration") for path in ("run.step", "run.output_interval", "sensors.delay")),
+        Relation(angle, "at least", "actuator.angle_min", TOLERANCE),
+        Relation(angle, "at most", "actuator.angle_max", TOLERANCE),
         *(
-            Relation(
-                c_identifier(path), relation, c_identifier(other), slack, unless=all_opposite(scenario, relation, other)
-            )
-            for path, relation, other, slack in rules
+            Relation("run.step", "at most", longer, TOLERANCE, is_share=True)
+            for longer in ("controller.period", "run.output_interval")
         ),
-        *of_steps,
     )
 
 
-def all_opposite(scenario: Scenario, relation: str, other: str) -> str:
-    """C condition that every supply is on the opposite side of the atmosphere; empty for a relation to another number.
+def all_opposite(relation: str, known: Collection[str]) -> str:
+    """C condition that every supply is on the opposite side of the atmosphere.
 
     Then another program runs, with suction or without; between the two, supplies contradict each other.
     """
-    if other != ATMOSPHERE_PATH:
-        return ""
-    names = [name for name in map(c_identifier, SUPPLIES) if name not in second_chamber(scenario)]
-    sign = "<=" if relation == "at least" else ">="
-    return " && ".join(f"settings->{name} {sign} settings->{c_identifier(ATMOSPHERE_PATH)}" for name in names)
-
-
-def second_chamber(scenario: Scenario) -> dict[str, str]:
-    """Return substitutes for the numbers of a missing second chamber, as C text by name; empty if it exists.
-
-    Pressures are atmospheric, so that no gas flows; all other numbers are constants.
-    """
-    return {
-        c_identifier(path): c_identifier(ATMOSPHERE_PATH) if "pressure" in path else repr(number)
-        for path, number in numbers_of_second_chamber(scenario).items()
-    }
+    sign, room = "<=" if relation == "at least" else ">=", c_identifier(ATMOSPHERE_PATH)
+    names = [c_identifier(path) for path in SUPPLIES if path in known]
+    return " && ".join(f"settings->{name} {sign} settings->{room}" for name in names)
 
 
 def numbers_of_second_chamber(scenario: Scenario) -> dict[str, float]:
-    """Return substitutes [SI] for the numbers of a missing second chamber by path; empty if it exists."""
+    """Return substitutes [SI] for the numbers of a missing second chamber by path; empty if it exists.
+
+    In C its pressures are atmospheric, so that no gas flows; all other numbers are constants.
+    """
     if not scenario.device.actuator.has_one_chamber:
         return {}
     unused = {f"actuator.leak.{name}" for name in other_form(scenario.device, "actuator.leak")}
