@@ -20,7 +20,7 @@ from tests.costs import BUILT
 
 FOLDER = "PPAFO_TEST_BUILDS"
 """The variable by which the processes of a session know its folder."""
-BUILDERS = ("ppafo.exports.fmu.platforms", "ppafo.page.module")
+BUILDERS = ("ppafo.exports.fmu.platforms", "ppafo.page.workbench")
 """Modules of the package that let a compiler build in a folder."""
 Done = subprocess.CompletedProcess[str]
 

@@ -3,12 +3,14 @@
 import os
 import re
 import shlex
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated
+import tomllib
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any
 
 from ppafo.arguments import File, Name, Word
-from ppafo.cli.output import CommandOutput
+from ppafo.cli.output import CommandOutput, listing
 from ppafo.errors import DataError
 from ppafo.kinds import kind_at
 from ppafo.wording import known_names, one_line
@@ -24,6 +26,50 @@ _NOTES = re.compile(r'^notes *= *""".*?"""\n', re.MULTILINE | re.DOTALL)
 _TABLE = re.compile(r"^(?=\[)", re.MULTILINE)
 _OF_THE_OTHER = "[reported.", "[[accepted]]"
 _FIRST_TABLE = re.compile(r"^\s*\[", re.MULTILINE)
+_FOLDER = resources.files("ppafo") / "examples"
+
+
+def load_examples() -> dict[str, dict[str, Any]]:
+    """Load the bundled examples by name: summary, documentation page, commands in order."""
+    return tomllib.loads((_FOLDER / "catalogue.toml").read_text(encoding="utf-8"))
+
+
+def example_files(name: str) -> dict[PurePosixPath, bytes]:
+    """Return the files of an example by relative path."""
+    files, folders = {}, [(_FOLDER / name, PurePosixPath())]
+    for folder, path in folders:
+        for item in folder.iterdir():
+            if item.is_file():
+                files[path / item.name] = item.read_bytes()
+            # A script of an example that was run where it is leaves one.
+            elif item.name != "__pycache__":
+                folders.append((item, path / item.name))
+    return dict(sorted(files.items()))
+
+
+def list_examples() -> CommandOutput:
+    """List the bundled examples with summaries."""
+    rows = [{"name": name, **example} for name, example in load_examples().items()]
+    examples = listing("example", rows, ("name", "summary"))
+    return replace(examples, text=f"{examples.text}\n\nppafo new example NAME writes one into a new folder.")
+
+
+def write_example(name: str, folder: Path) -> CommandOutput:
+    """Write all files of an example into a new folder, or none; the output names the next command."""
+    from ppafo.storage.files import replace_folder
+
+    examples = load_examples()
+    if name not in examples:
+        raise DataError(f"there is no example '{name}'{known_names(name, examples)}")
+    example = examples[name]
+    if os.path.lexists(folder):
+        raise DataError(f"{folder}: already exists; remove it or choose another with --out")
+    files = example_files(name)
+    replace_folder(folder, {str(path): content for path, content in files.items()})
+    lines = [f"written: {folder}, {', '.join(map(str, files))}", f"page: {example['page']}"]
+    lines += ["run there:", *(f"  {command}" for command in example["commands"])]
+    document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **example}
+    return CommandOutput("\n".join(lines), document)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +143,6 @@ def new(
                 if source
                 else "--out: needs the NAME of the example to write"
             )
-        from ppafo.cli.examples import list_examples, write_example
 
         return list_examples() if name is None else write_example(name, out or Path(name))
     known = (*KINDS, EXAMPLE)

@@ -7,8 +7,8 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
-from ppafo.cli.examples import example_files, load_examples
 from ppafo.cli.main import build_parser, main
+from ppafo.cli.new import example_files, load_examples
 from tests.page_code import code_blocks
 
 EXAMPLES = load_examples()

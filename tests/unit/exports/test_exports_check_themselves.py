@@ -4,7 +4,7 @@ import pytest
 
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.expected import expected_csv
-from ppafo.exports.fmu import trial
+from ppafo.exports.fmu import unit
 from ppafo.exports.fmu.interface import closed_loop, plant_alone
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
@@ -29,7 +29,7 @@ def test_a_unit_with_other_numbers_than_python_is_not_written(
         last[head.split(",").index("pressure_1")] = "7.0"
         return "\n".join([head, *rows[:-1], ",".join(last)]).encode()
 
-    monkeypatch.setattr(trial, "expected_csv", of_another_device)
+    monkeypatch.setattr(unit, "expected_csv", of_another_device)
     with pytest.raises(
         ProgramError, match=r"at 0\.\d+ s: pressure_1 is \d+\.\d+, Python has 7\.0; no file was written"
     ):

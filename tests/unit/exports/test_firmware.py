@@ -9,8 +9,7 @@ import pytest
 
 from ppafo.errors import ProgramError, ScenarioError, SimulationError
 from ppafo.processor.controller import FIXED_LAWS, PythonProcessor, fixed_point_controller
-from ppafo.processor.firmware import firmware
-from ppafo.processor.law_in_c import proof
+from ppafo.processor.firmware import firmware, proof
 from ppafo.processor.simulated import (
     CLOCK,
     FLASH,

@@ -1,5 +1,6 @@
 """The page that simulates, in a headless Chromium: asks for nothing, complains of nothing, has the bits of Python."""
 
+import importlib.util
 import json
 import random
 import shlex
@@ -11,7 +12,6 @@ from typing import Any
 import pytest
 
 from ppafo.errors import PpafoError, ProgramError, ScenarioError
-from ppafo.page import module
 from ppafo.page.workbench import _checksum, workbench
 from ppafo.running import simulate
 from ppafo.simulation.loading import list_scenarios
@@ -32,8 +32,8 @@ def test_a_slider_that_no_scenario_has_is_refused() -> None:
 
 
 def test_without_a_compiler_the_refusal_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module.importlib.util, "find_spec", lambda _name: None)
-    monkeypatch.setattr(module.shutil, "which", lambda _name: None)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setattr(shutil, "which", lambda _name: None)
     with pytest.raises(ProgramError, match=r"^a page needs a compiler .*pip install 'ppafo\[workbench\]', or clang"):
         workbench(TASKS[:1])
 

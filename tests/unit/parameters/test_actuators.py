@@ -11,9 +11,14 @@ from scipy.interpolate import CubicSpline
 from ppafo.engine.rows import leaves
 from ppafo.errors import ParameterError, PpafoError
 from ppafo.model.actuators.table import bases_at, level_of
-from ppafo.parameters.actuator_table import read_actuator_table, table_of, within_resolution
+from ppafo.parameters.actuator_table import (
+    MeasuredVolumes,
+    read_actuator_table,
+    read_measured_volumes,
+    table_of,
+    within_resolution,
+)
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
-from ppafo.parameters.measured_volumes import MeasuredVolumes, read_measured_volumes
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
