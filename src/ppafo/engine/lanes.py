@@ -147,26 +147,36 @@ def load_programs(programs: Iterable[tuple[Program, Effort]]) -> None:
 
 def _current_source(program: Program) -> str:
     """Return the source of a program, regenerated if out of date."""
-    made_from, source = _known_source(program)
+    return current_source("lanes", program, write_source)
+
+
+def current_source(kind: str, parts: Any, write: Any) -> str:
+    """Return the source of some parts from the function ``write``, which has a cache; regenerated if out of date.
+
+    ``kind`` is the beginning of its file name in the cache folder.
+    """
+    made_from, source = _known_source(kind, parts, write)
     # It may rest on a number or function that a session has changed since.
     if made_from.is_current():
         return source
     _known_source.cache_clear()
-    write_source.cache_clear()
-    return _known_source(program)[1]
+    write.cache_clear()
+    return _known_source(kind, parts, write)[1]
 
 
 @lru_cache(maxsize=64)
-def _known_source(program: Program) -> tuple[MadeFrom, str]:
-    """Return the inputs of a program and its source text, from the cache or newly written."""
-    key = package_key(program)
+def _known_source(kind: str, parts: Any, write: Any) -> tuple[MadeFrom, str]:
+    """Return the inputs of some parts and their source text, from the cache or newly written."""
+    key = package_key(parts)
     if key is None:
-        return write_source(program)
+        known: tuple[MadeFrom, str] = write(parts)
+        return known
 
     def written() -> bytes:
-        return write_source(program)[1].encode()
+        source: str = write(parts)[1]
+        return source.encode()
 
-    return key.made_from, kept_bytes("lanes", key.words, written).decode()
+    return key.made_from, kept_bytes(kind, key.words, written).decode()
 
 
 @lru_cache(maxsize=64)

@@ -18,7 +18,16 @@ from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mea
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
 from ppafo.model.columns import choose, larger, smaller
 from ppafo.model.helping import PUSH_OFF
-from ppafo.signals.meter import REQUESTED, SLOW_RATE, WALK, MeterKind, ReferenceSummary, Sample
+from ppafo.signals.meter import (
+    REQUESTED,
+    SLOW_RATE,
+    WALK,
+    MeterKind,
+    ReferenceSummary,
+    Sample,
+    advance_part,
+    deciding_sample,
+)
 
 LARGEST_SHARE = 0.05
 """RMS error at rest divided by the wanted change, above which a law with gradual openings does not follow [-]."""
@@ -254,6 +263,33 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
         met_downwards=met_downwards,
         bottom=value if met_downwards > state.met_downwards else min(state.bottom, value),
     )
+
+
+class RecordedSettled(NamedTuple):
+    """State of the settled meter over a recording: summary of the reference, meter, and end of the worst earlier part.
+
+    ``is_cut`` is 1 for a reference that has rests and moves, and ``worst_end`` the number of a sample, 0 without one.
+    """
+
+    course: ReferenceSummary
+    sums: SettledSums
+    is_cut: float
+    worst_end: float = 0.0
+
+
+def sample_ahead(state: RecordedSettled, sample: Sample) -> float:
+    """Return the number of the recorded sample whose reference decides on the part of a sample."""
+    return deciding_sample(state.course, sample)
+
+
+def update_recorded(state: RecordedSettled, sample: Sample, later: Sample) -> RecordedSettled:
+    """Update the settled meter with a recorded sample, as a run does, and with the sample that decides on its part."""
+    number = sample_ahead(state, sample)
+    parted = advance_part(state.course, sample, number, later.reference)
+    course = parted if state.is_cut > 0.0 else state.course
+    sums = update_settled(state.sums, course, sample)
+    is_same = sums.worst_badness == state.sums.worst_badness
+    return RecordedSettled(course, sums, state.is_cut, state.worst_end if is_same else sample.number - 1.0)
 
 
 SETTLED = MeterKind("settled", SettledSums, start_settled, update_settled, needs_course=True, needs_parts=True)

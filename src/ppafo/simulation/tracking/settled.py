@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
-from ppafo.engine.step.meters import NO_FOOT, NO_STRIDE
+from ppafo.engine.recorded_samples import RunningEvaluation, evaluate_samples, first_sample
 from ppafo.metrics.command import requested_samples
 from ppafo.metrics.metric import Floats, Readings, controlled_in, extent, followed, hold_start, reference_of
 from ppafo.metrics.settled import (
@@ -21,9 +21,10 @@ from ppafo.metrics.settled import (
     SETTLED,
     SETTLED_METRICS,
     SUSTAINED,
-    SettledSums,
+    RecordedSettled,
+    sample_ahead,
     start_settled,
-    update_settled,
+    update_recorded,
 )
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.model.columns import first
@@ -32,14 +33,10 @@ from ppafo.model.helping import PUSH_OFF
 from ppafo.parameters.reach import torque_reach
 from ppafo.signals import Recording
 from ppafo.signals.meter import (
-    NO_ENERGY,
-    NO_GAS,
     SAME_LEVEL,
     SLOW_RATE,
     ReferenceSummary,
     Sample,
-    advance_part,
-    deciding_sample,
     start_up_of,
 )
 from ppafo.simulation.profiles import limits_of, profile_bounds, profile_parameters, profile_values
@@ -57,6 +54,15 @@ _LONG_RAMP = 0.5
 """Share of the way of a reference from which its last part, in one direction, is a ramp that does not end [-]."""
 _TINY = 1.0e-300
 """Divisor in place of 0."""
+
+_OF_RECORDING = RunningEvaluation(
+    RecordedSettled,
+    Sample,
+    ("number", "value", "reference", "angular_velocity", "command"),
+    sample_ahead,
+    update_recorded,
+)
+"""Settled meter of a recording, which reads no other channel."""
 
 WHERE_REQUESTED, IN_PUSH_OFF = -1.0, -2.0
 """In place of the start of a judged part, for a walk."""
@@ -180,7 +186,13 @@ def task_parts(scenario: Scenario, recording: Recording) -> tuple[SettledPart, S
     They are the two of a run without recording: its settled meter is fed with the recorded samples.
     """
     course, end = _course(scenario, recording), len(recording) - 1
-    sums, worst_end = _metered(course, recording, is_cut=not PROFILES[scenario.reference.kind].is_wave)
+    reference, value = followed(recording)
+    columns = {"number": np.arange(end + 1.0), "value": value, "reference": reference}
+    columns |= {name: recording[name] for name in _OF_RECORDING.channels[3:]}
+    sums = start_settled(course, first_sample(_OF_RECORDING, columns))
+    is_cut = not PROFILES[scenario.reference.kind].is_wave
+    state = evaluate_samples(_OF_RECORDING, RecordedSettled(course, sums, float(is_cut)), columns)
+    sums, worst_end = state.sums, int(state.worst_end)
     readings = Readings({SETTLED.name: sums}, course, np.asarray(course.interval), len(recording), {})
     numbers = {name: np.asarray(kind.read(readings)) for name, kind in SETTLED_METRICS.items()}
     last_part, worst_part = map(_single, settled_parts(scenario, numbers, smallest_change(scenario)))
@@ -197,44 +209,6 @@ def task_parts(scenario: Scenario, recording: Recording) -> tuple[SettledPart, S
         begins, first_judged, until = (float(time[each]) for each in (int(sums.worst.start), judged.start, worst_end))
         worst_part = worst_part._replace(samples=judged, start=begins, end=until, duration=until - first_judged)
     return last_part, worst_part
-
-
-def _metered(course: ReferenceSummary, recording: Recording, is_cut: bool) -> tuple[SettledSums, int]:
-    """State of the settled meter after all samples, and the last sample of the worst earlier part; 0 without one.
-
-    ``is_cut`` is true for a reference that has rests and moves.
-    """
-    reference, value = (series.tolist() for series in followed(recording))
-    series = (recording[name].tolist() for name in ("angular_velocity", "command"))
-    # The settled meter reads no other channel.
-    samples = [
-        Sample(
-            float(number),
-            0.0,
-            speed,
-            0.0,
-            0.0,
-            0.0,
-            command,
-            now,
-            wanted,
-            0.0,
-            0.0,
-            NO_GAS,
-            NO_ENERGY,
-            NO_FOOT,
-            NO_STRIDE,
-        )
-        for number, (speed, command, now, wanted) in enumerate(zip(*series, value, reference, strict=True))
-    ]
-    state, worst_end, last = start_settled(course, samples[0]), 0, len(samples) - 1
-    for before, sample in enumerate(samples[1:]):
-        if is_cut:
-            later = deciding_sample(course, sample)
-            course = advance_part(course, sample, later, reference[min(int(later), last)])
-        worst, state = state.worst, update_settled(state, course, sample)
-        worst_end = worst_end if state.worst is worst else before
-    return state, worst_end
 
 
 def _single(part: SettledPart) -> SettledPart:
