@@ -362,8 +362,10 @@ def judge(result: Result, only_switches: bool) -> str:
         # verdict says, the second half of the hold.
         hold = int(np.flatnonzero(np.abs(np.append(np.inf, reference - reference[-1])) > 1.0e-9 * change)[-1])
         swing = float(np.ptp((value - reference)[(hold + value.size) // 2 :])) / max(_SWING, _SWING_SHARE * way)
+        # A joint that is thrown off by more than it should move fails, however it ends.
+        thrown_off = float(np.max(np.abs(value - reference))) / way
         is_moving = np.ptp(reference[last]) > 0.02 * change
-        measure = max(measure, farthest, 0.0 if is_moving else swing)
+        measure = max(measure, farthest, thrown_off, 0.0 if is_moving else swing)
     command = recording["command"][last]
     open_ways = np.sign(command[np.abs(command) > 0.5])
     turns = np.count_nonzero(np.diff(open_ways)) / float(np.ptp(recording.time[last][[0, -1]]))

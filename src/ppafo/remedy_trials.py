@@ -11,6 +11,7 @@ from ppafo.model.controlled import TORQUE
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.remedies import change_text, rank
 from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
@@ -83,7 +84,9 @@ def _first_strides(scenario: Scenario) -> Scenario:
 def _trials(scenario: Scenario, verdict: "Tracking", is_of_file: bool) -> "list[tuple[str, Remedy, Scenario]]":
     """Return cause, remedy and changed scenario for each remedy that can be applied, the most certain cause first."""
     causes = [(verdict.cause, remedy) for remedy in verdict.remedies]
-    causes += [(other.text, remedy) for other in verdict.others for remedy in other.remedies]
+    causes += [(other.text, remedy) for other in verdict.others for remedy in sorted(other.remedies, key=rank)]
+    # The task is changed last, whichever cause asks for it; before it each cause has the loop before the device.
+    causes.sort(key=lambda each: rank(each[1]) > 1)
     # Without its file a scenario takes numbers alone, no other kinds.
     causes = [(cause, remedy) for cause, remedy in causes if is_of_file or remedy.numbers]
     trials = []
@@ -103,7 +106,6 @@ def _remainder_text(verdict: "Tracking", errors: "list[tuple[Remedy, float]]", s
 
     ``strides`` are words for the part of a walk over which the errors are taken.
     """
-    from ppafo.simulation.tracking.remedies import change_text
     from ppafo.simulation.tracking.verdict import time_text
 
     best, error = min(errors, key=lambda pair: pair[1], default=(None, verdict.error))

@@ -2,9 +2,9 @@
 
 A stretch is straight, slow and no shorter than a tenth of a second; a sine is one move. Judged are the second half of
 each stretch and the whole of each move; of a move at the start of a run, what follows once the value has met the
-reference; of a reference that repeats, what follows a start-up in which it is met, and a time as long in which the
-value may settle. The error that is allowed at a sample is the same in both. The last part and the worst of the earlier
-ones are kept. These numbers are for verdicts only: no table and no study lists them.
+reference; of a reference that repeats, what follows a start-up. The error that is allowed at a sample is the same in
+both. The last part and the worst of the earlier ones are kept. These numbers are for verdicts only: no table and no
+study lists them.
 """
 
 import math
@@ -16,7 +16,7 @@ import numpy as np
 from ppafo.metrics.command import Reversals, is_torque_requested, start_reversals, update_reversals
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
-from ppafo.model.columns import choose, larger, smaller
+from ppafo.model.columns import Numeric, choose, larger
 from ppafo.model.helping import PUSH_OFF
 from ppafo.signals.meter import (
     REQUESTED,
@@ -27,6 +27,7 @@ from ppafo.signals.meter import (
     Sample,
     advance_part,
     deciding_sample,
+    shortest_rest,
 )
 
 LARGEST_SHARE = 0.05
@@ -37,6 +38,8 @@ LAG_TIME = 0.2
 """Lag behind a moving reference that is allowed beside the error at rest [s]."""
 RETURNING = 20.0
 """Share of the error of a quick move that counts, divided by the share of its path that leads back [-]."""
+LARGEST_EXCUSED = 1.1
+"""Largest error divided by the path of the reference, or its largest value, that a quick ramp excuses [-]."""
 LAG_OF_JOINT = 0.6
 """Lag that a moving joint allows, divided by its speed and the wanted change [s/rad]."""
 LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
@@ -53,8 +56,9 @@ class PartSums(NamedTuple):
     ``rests`` is 1 for a slow stretch, 0 for a move. ``squares`` is the sum of squared errors, ``total`` that of errors,
     ``taken`` the number of samples, ``reference_squares`` and ``reference_total`` the sums for the reference less the
     initial value, ``lag_squares`` and ``lag_total`` those of the allowed lag, ``swing`` the reversal state of the
-    error, ``lowest_error`` and ``highest_error`` its extremes. ``first`` and ``last`` are the reference before the part
-    and at its end, and ``path`` is the sum of its changes in between, without their sign.
+    error, ``lag_swing`` that of a loop that only lags, ``lowest_error`` and ``highest_error`` its extremes. ``first``
+    and ``last`` are the reference before the part and at its end, and ``path`` is the sum of its changes in between,
+    without their sign.
     """
 
     start: float = 0.0
@@ -67,18 +71,12 @@ class PartSums(NamedTuple):
     lag_squares: float = 0.0
     lag_total: float = 0.0
     swing: Swing = Swing(0.0, UNDECIDED, 0.0)
+    lag_swing: Swing = Swing(0.0, UNDECIDED, 0.0)
     lowest_error: float = 0.0
     highest_error: float = 0.0
     first: float = 0.0
     last: float = 0.0
     path: float = 0.0
-
-
-def judged_share(first: Floats, last: Floats, path: Floats) -> Floats:
-    """Share of the error of a quick move that counts [-]: 0 on a ramp, on which every loop is behind, 1 of a wave."""
-    share: Floats = choose(path > 0.0, RETURNING * (1.0 - abs(last - first) / larger(path, _TINY)), 0.0)
-    limited: Floats = smaller(share, 1.0)
-    return limited
 
 
 def stands(rests: Floats, path: Floats) -> Floats:
@@ -87,20 +85,42 @@ def stands(rests: Floats, path: Floats) -> Floats:
     return found
 
 
+def allowed_squares(at_rest: Numeric, mean_lag: Numeric, lag_squares: Numeric) -> Numeric:
+    """Mean square of the error that is allowed for a part, from the error at rest and the lag; also of columns."""
+    return at_rest * at_rest + 2.0 * at_rest * mean_lag + lag_squares
+
+
+def weight_of(rests: float, path: float, way: float, time: float, shortest: float, extent: float) -> float:
+    """Weight of the error of a part [-]: 1 at rest, less on a quick ramp, on which every loop is behind.
+
+    ``path`` of the reference leads by ``way``, with ``time`` [s] judged. A rest that is hardly longer than the
+    ``shortest`` one [s], which would be judged with a move, counts little, too.
+    """
+    inverse = 1.0 / (path if path > 0.0 else 1.0)
+    slow = min(SLOW_RATE * extent * time * inverse, 1.0)
+    moving = max(min(RETURNING * (1.0 - way * inverse), 1.0), slow * slow)
+    resting = 1.0 if time >= shortest else max(2.0 * time / shortest - 1.0, 0.0)
+    return resting if rests > 0.0 or path == 0.0 else moving
+
+
 def badness(part: PartSums, course: ReferenceSummary) -> float:
     """Squared ratio of the largest number of a part to its limit, by which the worst of the earlier parts is chosen."""
-    way, taken = max(course.largest, _TINY), max(part.taken, 1.0)
-    lag_squares, share = part.lag_squares / taken, LARGEST_SHARE * way
-    allowed = max(share * share + 2.0 * share * part.lag_total / taken + lag_squares, _TINY)
-    returns = min(RETURNING * (1.0 - abs(part.last - part.first) / max(part.path, _TINY)), 1.0)
-    quickness = part.path / (SLOW_RATE * way * taken * course.interval)
-    weight = 1.0 if part.rests > 0.0 else max(returns, 1.0 / max(quickness * quickness, 1.0))
-    error = weight * weight * part.squares / taken / allowed
-    turns = float(int(max(abs(part.swing.turns) - 1.0, 0.0))) / SUSTAINED
+    extent, taken = max(course.largest, _TINY), max(part.taken, 1.0)
+    way, shortest = abs(part.last - part.first), shortest_rest(course.interval, course.samples) * course.interval
+    weight = weight_of(part.rests, part.path, way, taken * course.interval, shortest, extent)
+    # Sums in place of means: one division for all.
+    allowed = allowed_squares(LARGEST_SHARE * extent * taken, part.lag_total, part.lag_squares * taken)
+    error = weight * weight * part.squares * taken / max(allowed, _TINY)
+    of_lag = 1.0 if part.rests > 0.0 else max(abs(part.lag_swing.turns), 1.0)
+    turns = float(int(max(abs(part.swing.turns) - of_lag, 0.0))) / (SUSTAINED - 1.0)
     # Of an angle at rest the range has a limit, too.
-    span = (part.highest_error - part.lowest_error) / max(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * way)
-    swing = max(turns * turns, span * span * (1.0 - course.of_joint))
-    return max(error, swing) if part.rests > 0.0 else error
+    span = (part.highest_error - part.lowest_error) / max(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * extent)
+    at_rest = weight * max(turns, span * (1.0 - course.of_joint))
+    full_motion = LARGEST_LAG * extent * LARGEST_LAG * extent * taken
+    reversing = error * max(full_motion, part.lag_squares) / max(part.lag_squares, _TINY)
+    far = max(part.highest_error, -part.lowest_error) / (LARGEST_EXCUSED * max(extent, part.path))
+    moving = max(min(turns * turns, reversing), far * far)
+    return max(error, at_rest * at_rest if part.rests > 0.0 else moving)
 
 
 def is_new_part(before: PartSums, course: ReferenceSummary) -> bool:
@@ -150,6 +170,7 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
             lag_squares=0.0,
             lag_total=0.0,
             swing=Swing(error, UNDECIDED, error),
+            lag_swing=Swing(0.0, UNDECIDED, 0.0),
             lowest_error=error,
             highest_error=error,
             first=reference,
@@ -160,7 +181,7 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
         worst_badness=0.0,
         waits=0.0,
         lagged=reference,
-        met=1.0 if meets_in_time(course, sample) else 0.0,
+        met=1.0 if meets(course, sample) else 0.0,
         command=start_reversals(course, sample),
         begun=value,
         lowest=value,
@@ -183,25 +204,30 @@ def allowed_lag(course: ReferenceSummary, lag: float, change: float, speed: floa
     return min(of_reference + of_joint, LARGEST_LAG * course.largest)
 
 
-def meets_in_time(course: ReferenceSummary, sample: Sample) -> bool:
-    """Return whether a value is near its reference, and of a repeated one before the end of the start-up."""
-    is_early = course.start_up == 0.0 or sample.number < course.start_up
-    return is_early and abs(sample.value - sample.reference) <= LARGEST_SHARE * course.largest
+def meets(course: ReferenceSummary, sample: Sample) -> bool:
+    """Return whether a value is near a reference that is not repeated, and so may be judged from here on."""
+    return course.start_up == 0.0 and abs(sample.value - sample.reference) <= LARGEST_SHARE * course.largest
 
 
-def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, lag: float) -> PartSums:
-    """Return the sums of the present part with a sample, anew where the part begins or is not judged yet."""
+def begun(swing: Swing, value: float, anew: bool) -> Swing:
+    """Return the reversal state ``swing`` with a value, or that of a part that begins ``anew`` with the value."""
+    return Swing(value if anew else swing.play, UNDECIDED if anew else swing.turns, value if anew else swing.highest)
+
+
+def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late: float, lag: float) -> PartSums:
+    """Return the sums of the present part with a sample, anew where the part begins or is not judged yet.
+
+    ``late`` is the lead of the reference over a late one, ``lag`` what is allowed of that.
+    """
     before, error, reference = state.part, sample.value - sample.reference, sample.reference
     # From the initial value, or the square of a pressure would hide its change.
     ahead = reference - state.begun
     is_new = is_new_part(before, course)
-    twice, of_run = 2.0 * sample.number, course.samples - 1.0
     is_first = course.part_start == 0.0 and course.rests == 0.0
-    judged_from = course.start_up * (2.0 if state.met > 0.0 else 1.0)
-    begins = course.start_up > 0.0 and sample.number >= judged_from and sample.number < judged_from + 1.0
-    meets = state.met == 0.0 and twice < of_run and meets_in_time(course, sample)
-    anew = is_new or state.waits > 0.0 or (is_first and (begins or meets))
-    swing = next_swing(before.swing, error, OSCILLATION_THRESHOLD * course.largest)
+    begins = course.start_up > 0.0 and sample.number >= course.start_up and sample.number < course.start_up + 1.0
+    is_met = state.met == 0.0 and 2.0 * sample.number < course.samples - 1.0 and meets(course, sample)
+    anew = is_new or state.waits > 0.0 or (is_first and (begins or is_met))
+    least = OSCILLATION_THRESHOLD * course.largest
     return PartSums(
         start=course.part_start,
         rests=course.rests,
@@ -212,9 +238,9 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, lag:
         reference_total=ahead + (0.0 if anew else before.reference_total),
         lag_squares=lag * lag + (0.0 if anew else before.lag_squares),
         lag_total=lag + (0.0 if anew else before.lag_total),
-        swing=Swing(
-            error if anew else swing.play, UNDECIDED if anew else swing.turns, error if anew else swing.highest
-        ),
+        # What motion excuses is no reversal.
+        swing=begun(next_swing(before.swing, error, least + lag), error, anew),
+        lag_swing=begun(next_swing(before.lag_swing, late, least), late, anew),
         lowest_error=error if anew else min(before.lowest_error, error),
         highest_error=error if anew else max(before.highest_error, error),
         first=before.last if is_new else before.first,
@@ -240,7 +266,8 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     met_downwards = 1.0 if state.met_downwards > 0.0 or error >= 0.0 else 0.0
     before = state.part
     lagged = state.lagged + (sample.reference - state.lagged) * course.interval / (LAG_TIME + course.interval)
-    lag = allowed_lag(course, sample.reference - lagged, sample.reference - before.last, sample.angular_velocity)
+    late = sample.reference - lagged
+    lag = allowed_lag(course, late, sample.reference - before.last, sample.angular_velocity)
     ends = is_new_part(before, course) and (before.rests > 0.0 or before.path > 0.0)
     # At the start of a run the value may be on its way yet.
     is_late = course.start_up > 0.0 and sample.number > course.start_up + 1.0
@@ -248,12 +275,12 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     found = badness(before, course)
     is_worse = ends and is_begun and found > state.worst_badness
     return SettledSums(
-        part=next_part(state, course, sample, lag),
+        part=next_part(state, course, sample, late, lag),
         worst=before if is_worse else state.worst,
         worst_badness=found if is_worse else state.worst_badness,
         waits=course.in_first_half,
         lagged=lagged,
-        met=1.0 if state.met > 0.0 or meets_in_time(course, sample) else 0.0,
+        met=1.0 if state.met > 0.0 or meets(course, sample) else 0.0,
         command=Reversals(command.way, command.task, 0.0 if in_last_half else command.turns),
         begun=state.begun,
         lowest=min(state.lowest, value),
@@ -334,7 +361,8 @@ _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
             ("turns", ("swing.turns",), count_of),
             ("lag", ("lag_squares", "taken"), root_mean),
             ("mean_lag", ("lag_total", "taken"), mean_of),
-            ("returning", ("first", "last", "path"), judged_share),
+            ("lag_turns", ("lag_swing.turns",), count_of),
+            ("way", ("last", "first"), less),
             ("rests", ("rests", "path"), stands),
             ("path", ("path",), None),
             ("taken", ("taken",), None),
@@ -345,6 +373,7 @@ _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
     "settled_extent": ReadAt(("course.largest",)),
     "settled_last": ReadAt(("course.last",)),
     "settled_interval": ReadAt(("course.interval",)),
+    "settled_samples": ReadAt(("course.samples",)),
 }
 SETTLED_METRICS = {
     name: MetricKind(name, "-", "for verdicts", (), None, read, (SETTLED,)) for name, read in _NUMBERS.items()

@@ -96,9 +96,9 @@ class ReferenceSummary(NamedTuple):
     ``last`` is the last value. ``largest`` is the largest distance over all samples from 0 for a torque, otherwise from
     the initial value of the controlled quantity. ``tolerance`` is the difference from the last value up to which the
     reference rests. ``hold_start`` is the number of the sample after the last one not at rest, ``samples`` the number
-    of samples. ``start_up`` is the number of samples in which a value should meet a repeated reference, 0 for
-    another. ``interval`` is the time between two samples [s], and ``of_joint`` 0 for an angle, 1 for a quantity that a
-    moving joint disturbs.
+    of samples. ``start_up`` is the number of samples before a repeated reference is judged, 0 for another.
+    ``interval`` is the time between two samples [s], and ``of_joint`` 0 for an angle, 1 for a quantity that a moving
+    joint disturbs.
 
     The present part of the reference begins after sample ``part_start``; ``rests`` is 1 for a slow straight stretch and
     0 for a move, and ``in_first_half`` is 1 in the first half of a stretch. The reference is straight from sample
@@ -125,8 +125,8 @@ SAME_LEVEL = 1.0e-9
 """Largest difference of equal levels of a reference, relative to its largest value [-]."""
 SLOW_RATE = 0.75
 """Largest rate of a slow reference, relative to its largest value [1/s]: a lag behind it is within the largest one."""
-START_UP = 0.5
-"""Time for a value to meet a repeated reference [s], at most a quarter of the run; as long again it may settle."""
+START_UP = 1.0
+"""Time for a value to meet a repeated reference and to settle [s], at most half of the run."""
 SHORTEST_REST, SHORTEST_SHARE, FEWEST_OF_REST = 0.1, 0.1, 2.0
 """Length of the shortest stretch [s] or, if that is less, divided by the run's [-]; and its least number of samples."""
 
@@ -144,8 +144,8 @@ def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary
 
 
 def start_up_of(period: float, duration: float, is_wave: bool) -> float:
-    """Return the time for a value to meet a repeated reference [s]; 0 for a table that does not repeat."""
-    return min(START_UP, 0.25 * duration) if is_wave or period < duration else 0.0
+    """Return the time before a repeated reference is judged [s]; 0 for a table that does not repeat."""
+    return min(START_UP, 0.5 * duration) if is_wave or period < duration else 0.0
 
 
 def is_straight(course: ReferenceSummary, change: float, later: float, samples: float) -> bool:
@@ -153,9 +153,9 @@ def is_straight(course: ReferenceSummary, change: float, later: float, samples: 
     return abs(later - change * samples) <= course.tolerance * samples
 
 
-def shortest_rest(course: ReferenceSummary) -> float:
-    """Return the least number of samples of a slow stretch."""
-    least = min(SHORTEST_REST / course.interval, SHORTEST_SHARE * course.samples)
+def shortest_rest(interval: float, samples: float) -> float:
+    """Return the least number of samples of a slow stretch, from their interval [s] and the number of all."""
+    least = min(SHORTEST_REST / interval, SHORTEST_SHARE * samples)
     return max(FEWEST_OF_REST, float(int(least)) + 1.0)
 
 
@@ -167,7 +167,11 @@ def deciding_sample(course: ReferenceSummary, sample: Sample) -> float:
     """
     goes_on = is_straight(course, course.change, sample.reference - course.previous, 1.0)
     middle = 2.0 * sample.number - course.line_start + 1.0
-    return middle if goes_on and course.rests > 0.0 else sample.number - 1.0 + shortest_rest(course)
+    return (
+        middle
+        if goes_on and course.rests > 0.0
+        else sample.number - 1.0 + shortest_rest(course.interval, course.samples)
+    )
 
 
 def advance_part(course: ReferenceSummary, sample: Sample, later: float, reference: float) -> ReferenceSummary:

@@ -14,7 +14,7 @@ from ppafo.metrics.metric import followed
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
-from ppafo.simulation.tracking.rule import rms_error_limit
+from ppafo.simulation.tracking.rule import limits_of
 from ppafo.simulation.tracking.settled import settled_parts, smallest_change, task_parts
 from ppafo.study.runs import excess, with_companions
 
@@ -80,7 +80,7 @@ def test_no_limit_jumps_where_an_amplitude_passes_zero(path: str) -> None:
     limits = []
     for amplitude in np.linspace(-0.02, 0.02, 21):
         scenario = with_numbers(base, {path: float(amplitude)})
-        limits.append(float(rms_error_limit(task_parts(scenario, simulate(scenario).recording)[0], False)))
+        limits.append(float(limits_of(task_parts(scenario, simulate(scenario).recording)[0], False).rms_error))
     assert limits[10] == pytest.approx(0.05 * 3.0, rel=1e-3)
     assert np.max(np.abs(np.diff(limits))) < 0.15 * limits[10]
 
@@ -112,7 +112,7 @@ def test_limits_move_in_small_steps_with_amplitude_frequency_and_slope(
 def test_a_wave_that_is_met_late_does_not_follow() -> None:
     slow = [*sine(0.2, 2.0), "run.duration=2 s", "valve.area=2 mm^2"]
     verdict = simulate(load_scenario(TASK, slow)).tracking
-    assert (verdict.follows, verdict.since) == (False, 0.5)
+    assert (verdict.follows, verdict.since) == (False, 1.0)
 
 
 def test_a_verdict_is_one_of_three_states_and_a_check_passes_only_where_it_follows_or_nothing_is_followed(

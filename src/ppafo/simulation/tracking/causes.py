@@ -388,7 +388,7 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
     if not found:
         return None
     # Gains are changed with less effort than sensors.
-    remedies = [*rescaled_gains(scenario, case.law, (0.5,))] if _DELAY in found else []
+    remedies = [*rescaled_gains(scenario, case.law, (0.5,))]
     remedies += [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
     told = [f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in found.items()]
     late = f"the measured {CONTROLLED[scenario.controlled].words} comes late ({told.pop(0)})" if _DELAY in found else ""

@@ -54,6 +54,15 @@ class Remedy:
         return override_text(self.overrides)
 
 
+_RANKS = {"controller": 0, "reference": 2, "motion": 2, "run": 2, "initial": 2}
+"""Order of remedies by the first word of a path: the loop, the device (any other word), the task."""
+
+
+def rank(remedy: Remedy) -> int:
+    """Order of a remedy: 0 for the loop, 1 for the device, 2 for the task."""
+    return max(_RANKS.get(text.partition(".")[0], 1) for text in remedy.overrides)
+
+
 CASCADE = Remedy({}, ("controller.kind=cascade",))
 """Remedy for a law that opens the valve by an angle alone: a torque loop inside."""
 

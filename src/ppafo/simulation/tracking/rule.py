@@ -12,10 +12,12 @@ from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import Floats
 from ppafo.metrics.settled import (
     LARGEST_ANGLE_SWING,
+    LARGEST_EXCUSED,
     LARGEST_LAG,
     LARGEST_SHARE,
     LARGEST_SWING_SHARE,
     SUSTAINED,
+    allowed_squares,
 )
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.model.columns import first
@@ -170,75 +172,58 @@ class _TaskExcess(NamedTuple):
         return largest
 
 
-def rms_error_limit(settled: SettledPart, is_switched: bool) -> Floats:
-    """Largest RMS error with which a task follows its reference [SI]; the numbers of ``settled`` may be arrays (runs,).
+class Limits(NamedTuple):
+    """Largest numbers with which a part of a task follows its reference [SI], inf without a limit; arrays (runs,)."""
 
-    A lag is allowed beside the error at rest. ``is_switched`` is true for a valve without gradual openings.
+    rms_error: Floats
+    """RMS error: at rest, with a lag beside it; of a wave its share, which does not count the mean error."""
+    mean_error: Floats
+    """Mean error at rest of on/off valves, which swing about the reference by design."""
+    swing: Floats
+    """Range of the error of an angle, and of on/off valves at rest."""
+    largest_error: Floats
+    """Largest error while a reference moves, of an angle and of a smooth wave."""
+
+
+def limits_of(settled: SettledPart, is_switched: bool) -> Limits:
+    """Limits of a part, of which each is a continuous function of amplitude and speed of reference and joint.
+
+    ``is_switched`` is true for a valve without gradual openings. The numbers of ``settled`` may be arrays (runs,).
     """
-    wanted, wave = np.asarray(settled.wanted_change), np.asarray(settled.reference_deviation)
+    wanted, motion = np.asarray(settled.wanted_change), np.asarray(settled.motion)
+    reference_range, none = np.asarray(settled.reference_range), np.full_like(motion, np.inf)
     if is_switched:
-        return LARGEST_SHARE_SWITCHED * wanted
-    at_rest = LARGEST_SHARE * wanted
-    limit = np.sqrt(at_rest**2 + 2.0 * at_rest * settled.mean_lag + np.asarray(settled.lag) ** 2)
-    # The limit of a wave does not count the mean error; of a small wave it is that of any motion.
-    small = at_rest + LARGEST_LAG * wanted - _TIMES_OF_SMALL_WAVE * wave
-    wave_limit = np.maximum(np.maximum(LARGEST_SHARE_OF_WAVE * wave, at_rest), small)
-    return np.asarray(np.minimum(limit, np.hypot(wave_limit, settled.mean_error)))
-
-
-def swing_limit(settled: SettledPart, is_switched: bool) -> Floats:
-    """Largest range of the error, inf without a limit [SI]: of an angle, and of on/off valves at rest.
-
-    The numbers of ``settled`` may be arrays (runs,).
-    """
-    reference_range, motion = np.asarray(settled.reference_range), np.asarray(settled.motion)
-    if is_switched:
-        rest = 1.0 - motion
-        return LARGEST_SPAN_SWITCHED * np.asarray(settled.wanted_change) / np.maximum(rest, _TINY)
+        at_rest = wanted / np.maximum(1.0 - motion, _TINY)
+        mean, span = LARGEST_MEAN_SWITCHED * at_rest, LARGEST_SPAN_SWITCHED * at_rest
+        return Limits(LARGEST_SHARE_SWITCHED * wanted, mean, span, none)
+    share, wave = LARGEST_SHARE * wanted, np.asarray(settled.reference_deviation)
+    # Of a small wave the limit is that of any motion.
+    small = share + LARGEST_LAG * wanted - _TIMES_OF_SMALL_WAVE * wave
+    of_wave = np.hypot(np.maximum(np.maximum(LARGEST_SHARE_OF_WAVE * wave, share), small), settled.mean_error)
+    lag, mean_lag = np.asarray(settled.lag), np.asarray(settled.mean_lag)
+    rms = np.minimum(np.sqrt(allowed_squares(share, mean_lag, lag**2)), of_wave)
     # An error of this many degrees is allowed for an angle, however small its range.
-    at_rest = np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * reference_range)
-    moving = 2.0 * np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * reference_range)
-    return np.where(reference_range > 0.0, at_rest + (moving - at_rest) * motion, np.inf)
-
-
-def largest_error_limit(settled: SettledPart, is_switched: bool) -> Floats:
-    """Largest error while a reference moves, inf without a limit [SI]: of an angle, and of a smooth wave.
-
-    The numbers of ``settled`` may be arrays (runs,).
-    """
-    reference_range, motion = np.asarray(settled.reference_range), np.asarray(settled.motion)
-    if is_switched:
-        return np.full_like(motion, np.inf)
-    angle = np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * reference_range)
-    is_wave = ~np.asarray(settled.rests) & settled.is_reference_smooth
-    wave = np.where(is_wave, LARGEST_CREST * rms_error_limit(settled, False), np.inf)
-    limit: Floats = np.where(reference_range > 0.0, angle, wave) / np.maximum(motion, _TINY)
-    return limit
-
-
-def mean_error_limit(settled: SettledPart, is_switched: bool) -> Floats:
-    """Largest mean error at rest [SI]: of on/off valves, which swing about the reference by design; inf for others."""
-    rest = np.maximum(1.0 - np.asarray(settled.motion), _TINY)
-    return (
-        LARGEST_MEAN_SWITCHED * np.asarray(settled.wanted_change) / rest if is_switched else np.full_like(rest, np.inf)
-    )
+    swing = np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * reference_range)
+    angle, is_angle = np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * reference_range), reference_range > 0.0
+    of_smooth = np.where(~np.asarray(settled.rests) & settled.is_reference_smooth, LARGEST_CREST * rms, np.inf)
+    largest = np.where(is_angle, angle, of_smooth) / np.maximum(motion, _TINY)
+    return Limits(rms, none, np.where(is_angle, swing + (2.0 * angle - swing) * motion, np.inf), largest)
 
 
 def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | float = 0.0) -> _TaskExcess:
     """Tracking numbers of a part of a task divided by their limits, except command reversals: up to 1 it follows.
 
-    Every limit is a continuous function of amplitude and speed of the reference, and of the joint's speed.
     ``is_switched`` is true for a valve without gradual openings, and ``beyond`` the torque beyond reach [N m]. The
     numbers of ``settled`` may be arrays (runs,).
     """
     wanted, mean_error, motion = settled.wanted_change, np.abs(settled.mean_error), np.asarray(settled.motion)
-    rms = np.asarray(settled.rms_error) / rms_error_limit(settled, is_switched)
-    span = np.asarray(settled.error_range) / swing_limit(settled, is_switched)
-    largest = np.asarray(settled.largest_error) / largest_error_limit(settled, is_switched)
-    mean = mean_error / mean_error_limit(settled, is_switched)
-    # On a quick ramp every loop lags.
-    error = np.max([rms, span, largest, mean], axis=0) * settled.weight
-    reversals = np.asarray(settled.error_reversals) / (SUSTAINED - 1)
+    limits = limits_of(settled, is_switched)
+    numbers = settled.rms_error, mean_error, settled.error_range, settled.largest_error
+    ratios = [np.asarray(number) / limit for number, limit in zip(numbers, limits, strict=True)]
+    span = ratios[2] * settled.weight
+    # On a quick ramp every loop lags, by no more than the whole way.
+    error = np.maximum(np.max(ratios, axis=0) * settled.weight, settled.largest_error / (LARGEST_EXCUSED * settled.way))
+    reversals = np.where(settled.rests, settled.weight, 1.0) * settled.error_reversals / (SUSTAINED - 1)
     # A joint that creeps has a range of its error, too, but a mean error above the standard deviation.
     swings = np.asarray(settled.error_deviation > mean_error)
     if is_switched:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
+from ppafo.engine.in_python import over_samples
 from ppafo.engine.recorded_samples import RunningEvaluation, evaluate_samples, first_sample
 from ppafo.metrics.command import requested_samples
 from ppafo.metrics.metric import Floats, Readings, controlled_in, extent, followed, hold_start, reference_of
@@ -25,8 +26,8 @@ from ppafo.metrics.settled import (
     sample_ahead,
     start_settled,
     update_recorded,
+    weight_of,
 )
-from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.model.columns import first
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.helping import PUSH_OFF
@@ -34,12 +35,12 @@ from ppafo.parameters.reach import torque_reach
 from ppafo.signals import Recording
 from ppafo.signals.meter import (
     SAME_LEVEL,
-    SLOW_RATE,
     ReferenceSummary,
     Sample,
+    shortest_rest,
     start_up_of,
 )
-from ppafo.simulation.profiles import limits_of, profile_bounds, profile_parameters, profile_values
+from ppafo.simulation.profiles import limits_of, profile_bounds, profile_parameters
 from ppafo.simulation.scenario import Scenario
 
 FEWEST_PERIODS = 0.5
@@ -111,6 +112,8 @@ class SettledPart(NamedTuple):
     """Mean of the error that motion allows beside the one at rest [SI]."""
     weight: float = 1.0
     """Weight of the error [-]: 1, and less for a quick ramp, on which every loop is behind."""
+    way: float = math.inf
+    """Path of a moving reference in the part, or its largest value if that is more; inf at rest [SI]."""
     ends_on_ramp: bool = False
     """True for a move in one direction to the largest reference, which the run does not see settle."""
     reference_range: float = 0.0
@@ -271,20 +274,16 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
     def part(prefix: str) -> SettledPart:
         of = {name.removeprefix(f"{prefix}_"): number for name, number in metrics.items() if name.startswith(prefix)}
         rms, mean, turns, rests = of["error"], of["missing"], of["turns"], of["rests"] > 0.0
-        time = of["taken"] * metrics["settled_interval"]
+        interval = metrics["settled_interval"]
+        time = of["taken"] * interval
         periods = math.inf if frequency is None else time * frequency
-        # The error of a loop that lags reverses, too: of an earlier move nobody knows how often.
-        of_lag = (
-            0.0
-            if np.all(rests)
-            else _reversals_of_lag(scenario, first(wanted), periods)
-            if prefix == "settled"
-            else turns
-        )
+        # The error of a loop that lags reverses, too.
+        of_lag = np.maximum(of["lag_turns"], 0.0 if frequency is None else np.ceil(2.0 * periods))
         turns = turns - np.where(rests, 0.0, of_lag)
-        motion = np.minimum(of["lag"] / (LARGEST_LAG * np.maximum(change, _TINY)), 1.0)
-        slow = SLOW_RATE * change * time / np.maximum(of["path"], _TINY)
-        is_ramp = (of["path"] > _LONG_RAMP * change) & (of["returning"] <= _NO_RETURN)
+        motion, way = np.minimum(of["lag"] / (LARGEST_LAG * np.maximum(change, _TINY)), 1.0), np.abs(of["way"])
+        is_ramp = (of["path"] > _LONG_RAMP * change) & (of["path"] - way <= _NO_RETURN * of["path"])
+        shortest = 0.0 if prefix == "settled" else over_samples(shortest_rest, interval, metrics["settled_samples"])
+        weight = over_samples(weight_of, of["rests"], of["path"], way, time, shortest * interval, change)
         numbers: dict[str, Any] = {
             "rms_error": rms,
             "mean_error": mean,
@@ -296,7 +295,8 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
             "motion": motion,
             "lag": of["lag"],
             "mean_lag": of["mean_lag"],
-            "weight": np.where(rests, 1.0, np.maximum(of["returning"], np.minimum(slow, 1.0) ** 2)),
+            "weight": weight,
+            "way": np.where(rests, np.inf, np.maximum(of["path"], change)),
             "ends_on_ramp": is_ramp & is_at_peak,
             "reference_mean": metrics["settled_begun"] + of["reference"],
             "reference_deviation": np.where(rests, 0.0, of["wave"]),
@@ -305,22 +305,6 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
         return SettledPart(samples=slice(None), **numbers, **common)
 
     return part("settled"), part("worst")
-
-
-def _reversals_of_lag(scenario: Scenario, wanted: float, periods: Any) -> Any:
-    """Reversals of the error of a loop that lags, in the judged part of a run: of the reference, or of its rate.
-
-    Twice a period of a sine, an array (runs,) if it varies; of another reference those of the first run hold for all.
-    """
-    if np.isfinite(periods).all():
-        return np.ceil(2.0 * periods)
-    choice, duration = scenario.reference, float(first(scenario.run.duration))
-    single = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
-    start = 2.0 * _start_up(scenario, duration) or 0.5 * duration
-    times = np.arange(start, duration, float(first(scenario.run.output_interval)))
-    values, rate, _ = profile_values(single, times)
-    of_rate = reversals(rate, OSCILLATION_THRESHOLD * float(np.max(np.abs(rate))))
-    return max(reversals(values, OSCILLATION_THRESHOLD * wanted), of_rate)
 
 
 def smallest_change(scenario: Scenario) -> float:

@@ -19,6 +19,8 @@ from ppafo.simulation.tracking.settled import SettledPart
 
 _ANGLES = 9
 """Number of angles between the stops at which the torque of a moving joint is evaluated."""
+_LEAST_REACH = 1.0e-9
+"""Torque within reach that is judged at least [N m]: an actuator without a supply gives none."""
 _PHASES = np.sin(np.linspace(0.0, 2.0 * math.pi, 32, endpoint=False))[:, None]
 """Course of a moving reference about its mean, divided by its amplitude [-]."""
 
@@ -76,7 +78,7 @@ def _within_reach(part: SettledPart, lowest: Floats, highest: Floats) -> Settled
     deviation = np.maximum(part.error_deviation - beyond.std(axis=0), 0.0)
     farthest = np.abs(beyond).max(axis=0)
     left: dict[str, Any] = part._asdict() | {
-        "wanted_change": np.minimum(part.wanted_change, np.maximum(highest, -lowest)),
+        "wanted_change": np.minimum(part.wanted_change, np.maximum(np.maximum(highest, -lowest), _LEAST_REACH)),
         "rms_error": np.hypot(mean, deviation),
         "mean_error": mean,
         "error_deviation": deviation,

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ppafo.metrics.metric import controlled_in, extent
-from ppafo.metrics.settled import LARGEST_SHARE, SUSTAINED
+from ppafo.metrics.settled import LARGEST_EXCUSED, LARGEST_SHARE, SUSTAINED
 from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import CAUSES_OF_TASK
 from ppafo.simulation.tracking.load_causes import cuts_wave, torque_beyond_reach
-from ppafo.simulation.tracking.remedies import Remedy, change_text
+from ppafo.simulation.tracking.remedies import Remedy, change_text, rank
 from ppafo.simulation.tracking.rule import (
     CRITERION_TEXTS,
     LARGEST_PEAK,
@@ -30,12 +30,9 @@ from ppafo.simulation.tracking.rule import (
     failure_of_task,
     failure_of_walk,
     is_noisy,
-    largest_error_limit,
-    mean_error_limit,
+    limits_of,
     most_reversals,
     only_switches,
-    rms_error_limit,
-    swing_limit,
 )
 from ppafo.simulation.tracking.settled import IN_PUSH_OFF, settled_walk, task_parts
 from ppafo.simulation.tracking.shortfall import available_torque, misses_for_reach, shortfall
@@ -218,7 +215,7 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
         per="stride" if stride_time else "second",
         cause=cause.text,
         advice=cause.advice,
-        remedies=cause.remedies,
+        remedies=tuple(sorted(cause.remedies, key=rank)),
         others=tuple(other for other in others if other.remedies and other.text != cause.text),
         accepted=scenario.beyond_reach if case.is_for_reach else "",
         at_rest=bool(settled.rests) and not case.is_approaching,
@@ -301,14 +298,13 @@ def _criteria(case: Case) -> tuple[tuple[Criterion, float, float], ...]:
     reach: Criterion = "any reach" if scenario.motion.locked_angle is None else "reach"
     # On a quick ramp an error is allowed that would be none at rest.
     weight = max(float(settled.weight), _LEAST)
-    limits = (rms_error_limit, mean_error_limit, swing_limit, largest_error_limit)
-    rms, of_mean, swing, largest = (float(limit(settled, switches)) / weight for limit in limits)
+    rms, of_mean, swing, largest = (float(limit) / weight for limit in limits_of(settled, switches))
     lacking = ((reach if is_cut else "mean error", beyond if is_cut else mean, LARGEST_SHARE * wanted),)
     return (
         ("RMS error", settled.rms_error, rms),
         ("mean error", mean, of_mean),
         ("swing", settled.error_range, swing),
-        ("largest error", settled.largest_error, largest),
+        ("largest error", settled.largest_error, min(largest, LARGEST_EXCUSED * settled.way)),
         *(lacking if beyond > 0.0 else ()),
     )
 
