@@ -288,9 +288,9 @@ class Program:
         return any(kind.needs_course for kind in self.meters)
 
     @property
-    def needs_parts(self) -> bool:
+    def cuts_reference(self) -> bool:
         """True if a meter needs the parts of a reference that has more than one."""
-        return any(kind.needs_parts for kind in self.meters) and not self.reference.is_wave
+        return any(kind.end_part is not None for kind in self.meters) and not self.reference.is_wave
 
     @property
     def is_parted(self) -> bool:

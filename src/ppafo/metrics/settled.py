@@ -123,11 +123,6 @@ def badness(part: PartSums, course: ReferenceSummary) -> float:
     return max(error, at_rest * at_rest if part.rests > 0.0 else moving)
 
 
-def is_new_part(before: PartSums, course: ReferenceSummary) -> bool:
-    """Return whether the present part of the reference is another one than that of the sample before."""
-    return course.part_start != before.start or course.rests != before.rests
-
-
 class SettledSums(NamedTuple):
     """State of the settled meter: present part of the reference, and the worst of the earlier ones.
 
@@ -222,7 +217,7 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
     before, error, reference = state.part, sample.value - sample.reference, sample.reference
     # From the initial value, or the square of a pressure would hide its change.
     ahead = reference - state.begun
-    is_new = is_new_part(before, course)
+    is_new = course.is_new > 0.0
     is_first = course.part_start == 0.0 and course.rests == 0.0
     begins = course.start_up > 0.0 and sample.number >= course.start_up and sample.number < course.start_up + 1.0
     is_met = state.met == 0.0 and 2.0 * sample.number < course.samples - 1.0 and meets(course, sample)
@@ -250,7 +245,7 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
 
 
 def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample) -> SettledSums:
-    """Update the settled meter with a sample; a part that ends is kept if it is the worst so far.
+    """Update the settled meter with a sample.
 
     Reversals of the command count from three quarters on: a loop that has come to rest by then does not oscillate.
     """
@@ -268,16 +263,10 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     lagged = state.lagged + (sample.reference - state.lagged) * course.interval / (LAG_TIME + course.interval)
     late = sample.reference - lagged
     lag = allowed_lag(course, late, sample.reference - before.last, sample.angular_velocity)
-    ends = is_new_part(before, course) and (before.rests > 0.0 or before.path > 0.0)
-    # At the start of a run the value may be on its way yet.
-    is_late = course.start_up > 0.0 and sample.number > course.start_up + 1.0
-    is_begun = before.start > 0.0 or state.met > 0.0 or is_late
-    found = badness(before, course)
-    is_worse = ends and is_begun and found > state.worst_badness
     return SettledSums(
         part=next_part(state, course, sample, late, lag),
-        worst=before if is_worse else state.worst,
-        worst_badness=found if is_worse else state.worst_badness,
+        worst=state.worst,
+        worst_badness=state.worst_badness,
         waits=course.in_first_half,
         lagged=lagged,
         met=1.0 if state.met > 0.0 or meets(course, sample) else 0.0,
@@ -289,6 +278,19 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
         top=value if met_upwards > state.met_upwards else max(state.top, value),
         met_downwards=met_downwards,
         bottom=value if met_downwards > state.met_downwards else min(state.bottom, value),
+    )
+
+
+def keep_worst(state: SettledSums, course: ReferenceSummary) -> SettledSums:
+    """Keep the part that ends with the sample before a new one, if it is the worst so far."""
+    before, number = state.part, course.line_start + 1.0
+    ends = course.is_new > 0.0 and (before.rests > 0.0 or before.path > 0.0)
+    # At the start of a run the value may be on its way yet.
+    is_late = course.start_up > 0.0 and number > course.start_up + 1.0
+    found = badness(before, course)
+    is_worse = ends and (before.start > 0.0 or state.met > 0.0 or is_late) and found > state.worst_badness
+    return state._replace(
+        worst=before if is_worse else state.worst, worst_badness=found if is_worse else state.worst_badness
     )
 
 
@@ -306,20 +308,20 @@ class RecordedSettled(NamedTuple):
 
 def sample_ahead(state: RecordedSettled, sample: Sample) -> float:
     """Return the number of the recorded sample whose reference decides on the part of a sample."""
-    return deciding_sample(state.course, sample)
+    return deciding_sample(state.course, sample.number, sample.reference)
 
 
 def update_recorded(state: RecordedSettled, sample: Sample, later: Sample) -> RecordedSettled:
     """Update the settled meter with a recorded sample, as a run does, and with the sample that decides on its part."""
     number = sample_ahead(state, sample)
-    parted = advance_part(state.course, sample, number, later.reference)
+    parted = advance_part(state.course, sample.number, sample.reference, number, later.reference)
     course = parted if state.is_cut > 0.0 else state.course
-    sums = update_settled(state.sums, course, sample)
+    sums = update_settled(keep_worst(state.sums, course), course, sample)
     is_same = sums.worst_badness == state.sums.worst_badness
     return RecordedSettled(course, sums, state.is_cut, state.worst_end if is_same else sample.number - 1.0)
 
 
-SETTLED = MeterKind("settled", SettledSums, start_settled, update_settled, needs_course=True, needs_parts=True)
+SETTLED = MeterKind("settled", SettledSums, start_settled, update_settled, needs_course=True, end_part=keep_worst)
 
 
 def farther(highest: Floats, lowest: Floats) -> Floats:

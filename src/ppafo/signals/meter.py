@@ -101,7 +101,8 @@ class ReferenceSummary(NamedTuple):
     joint disturbs.
 
     The present part of the reference begins after sample ``part_start``; ``rests`` is 1 for a slow straight stretch and
-    0 for a move, and ``in_first_half`` is 1 in the first half of a stretch. The reference is straight from sample
+    0 for a move, ``is_new`` is 1 at the first sample of a part after the first, and ``in_first_half`` in the first
+    half of a stretch. The reference is straight from sample
     ``line_start`` on, ``previous`` is its value at the sample before, and ``change`` its change up to that sample.
     """
 
@@ -118,6 +119,7 @@ class ReferenceSummary(NamedTuple):
     line_start: float = 0.0
     part_start: float = 0.0
     rests: float = 0.0
+    is_new: float = 0.0
     in_first_half: float = 0.0
 
 
@@ -159,39 +161,36 @@ def shortest_rest(interval: float, samples: float) -> float:
     return max(FEWEST_OF_REST, float(int(least)) + 1.0)
 
 
-def deciding_sample(course: ReferenceSummary, sample: Sample) -> float:
-    """Return the number of the later sample whose reference decides whether the present one is in a slow stretch.
+def deciding_sample(course: ReferenceSummary, number: float, reference: float) -> float:
+    """Return the number of the later sample whose reference decides whether sample ``number`` is in a slow stretch.
 
     That is the end of the shortest stretch that would be one, or of a stretch of which the present sample is in the
     middle.
     """
-    goes_on = is_straight(course, course.change, sample.reference - course.previous, 1.0)
-    middle = 2.0 * sample.number - course.line_start + 1.0
-    return (
-        middle
-        if goes_on and course.rests > 0.0
-        else sample.number - 1.0 + shortest_rest(course.interval, course.samples)
-    )
+    goes_on = is_straight(course, course.change, reference - course.previous, 1.0)
+    middle = 2.0 * number - course.line_start + 1.0
+    return middle if goes_on and course.rests > 0.0 else number - 1.0 + shortest_rest(course.interval, course.samples)
 
 
-def advance_part(course: ReferenceSummary, sample: Sample, later: float, reference: float) -> ReferenceSummary:
-    """Update the present part of the reference with a sample, and with the ``reference`` of sample ``later``."""
-    change = sample.reference - course.previous
+def advance_part(
+    course: ReferenceSummary, number: float, reference: float, later: float, reference_later: float
+) -> ReferenceSummary:
+    """Update the present part of the reference with sample ``number``, and with the reference at sample ``later``."""
+    change = reference - course.previous
     goes_on = is_straight(course, course.change, change, 1.0)
-    line_start = course.line_start if goes_on else sample.number - 1.0
+    line_start = course.line_start if goes_on else number - 1.0
     is_slow = abs(change) <= SLOW_RATE * course.largest * course.interval
-    lasts = later <= course.samples - 1.0 and is_straight(
-        course, change, reference - sample.reference, later - sample.number
-    )
+    lasts = later <= course.samples - 1.0 and is_straight(course, change, reference_later - reference, later - number)
     rested = course.rests > 0.0
     begins = is_slow and lasts and not goes_on
     ends = rested and not goes_on
     return course._replace(
-        previous=sample.reference,
+        previous=reference,
         change=change,
         line_start=line_start,
         part_start=line_start if begins or ends else course.part_start,
         rests=1.0 if begins or (rested and goes_on) else 0.0,
+        is_new=1.0 if begins or ends else 0.0,
         in_first_half=1.0 if lasts and (begins or (rested and goes_on)) else 0.0,
     )
 
@@ -202,7 +201,8 @@ class MeterKind:
 
     ``start(course, sample)`` creates the state at the first sample, ``update(state, course, sample)`` updates it at
     each later one. The start of the hold in ``course`` is valid up to this sample. A meter without ``needs_course``
-    must not use ``course``, and one without ``needs_parts`` not its present part; a meter that is ``of_motion`` keeps
+    must not use ``course``, and one without ``end_part`` not its present part: that updates the state before the
+    first sample of a new part, which ends the one before; a meter that is ``of_motion`` keeps
     its initial state while the vane stands still.
     """
 
@@ -212,4 +212,4 @@ class MeterKind:
     update: Callable[[Any, ReferenceSummary, Any], Any]
     needs_course: bool = False
     of_motion: bool = False
-    needs_parts: bool = False
+    end_part: Callable[[Any, ReferenceSummary], Any] | None = None

@@ -128,6 +128,13 @@ def take_sample(
             for lane in lanes:
                 meters.start_meters(parts, lane, elapsed, index, interval)
         else:
+            if parts.cuts_reference:
+                for lane in lanes:
+                    meters.update_course(parts, lane, elapsed, index, interval)
+                # Few samples begin a part.
+                if any(lane.course.is_new > 0.0 for lane in lanes):
+                    for lane in lanes:
+                        meters.end_parts(parts, lane)
             for lane in lanes:
                 meters.update_meters(parts, lane, elapsed, index, interval)
     if parts.traced and lanes.traces(index, trace_every):

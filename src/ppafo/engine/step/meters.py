@@ -5,7 +5,8 @@ of steps between samples. ``elapsed`` is the same time [steps] as the loop has r
 
 The loop over steps calls, before the first sample, ``begin_reference_summary`` and, unless the reference is monotone,
 ``update_largest_reference`` for each sample and ``search_final_hold`` for each from the last one backwards. It then
-calls ``start_meters`` at the first sample, ``update_meters`` at the others, and ``store_trace`` at traced samples.
+calls ``start_meters`` at the first sample, ``update_meters`` at the others, after ``update_course`` and, where a part
+of the reference ends, ``end_parts``; and ``store_trace`` at traced samples.
 """
 
 from ppafo.engine.program import Program
@@ -51,7 +52,8 @@ def make_sample(parts: Program, lane: Lane, elapsed: float, index: int, interval
         torque=torque,
         command=lane.result.command,
         value=parts.controlled_value(lane.state.angle, pressure_1, pressure_2, torque),
-        reference=set_point_at(parts, lane, time),
+        # That of a reference with parts has been evaluated for the course.
+        reference=lane.course.previous if parts.cuts_reference else set_point_at(parts, lane, time),
         temperature_1=temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1) if parts.is_thermal else 0.0,
         temperature_2=temperature_of_chamber_2(parts, lane) if parts.is_thermal else 0.0,
         gas=gas_sample(parts, lane),
@@ -192,13 +194,25 @@ def start_meters(parts: Program, lane: Lane, elapsed: float, index: int, interva
         lane[group] = kind.start(lane.course, lane.sample)
 
 
+def update_course(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
+    """Update the present part of the reference with one more sample."""
+    step, number = lane.timing.step, float(index)
+    reference = reference_at(parts, lane, elapsed * step)
+    later = deciding_sample(lane.course, number, reference)
+    reference_later = reference_at(parts, lane, later * interval * step)
+    lane.course = advance_part(lane.course, number, reference, later, reference_later)
+
+
+def end_parts(parts: Program, lane: Lane) -> None:
+    """Update the meters that note the end of a part of the reference."""
+    for group, kind in parts.meter_groups.items():
+        if kind.end_part is not None:
+            lane[group] = kind.end_part(lane[group], lane.course)
+
+
 def update_meters(parts: Program, lane: Lane, elapsed: float, index: int, interval: float) -> None:
     """Update every meter with one more sample; meters of motion keep their first state for a locked vane."""
     sample_with_summary(parts, lane, elapsed, index, interval)
-    if parts.needs_parts:
-        later = deciding_sample(lane.course, lane.sample)
-        reference = reference_at(parts, lane, later * interval * lane.timing.step)
-        lane.course = advance_part(lane.course, lane.sample, later, reference)
     for group, kind in parts.meter_groups.items():
         if not (parts.is_locked and kind.of_motion):
             lane[group] = kind.update(lane[group], lane.course, lane.sample)
