@@ -128,7 +128,7 @@ class SettledSums(NamedTuple):
 
     ``worst_badness`` is that of the latter, ``waits`` is 1 while the present rest is in its first half, ``lagged``
     the reference with the allowed lag, ``met`` 1 once the value has met the reference, and ``command`` the
-    reversals of the command in the last quarter of run or hold. ``begun`` is the initial controlled value,
+    reversals of the command in the judged samples of the part. ``begun`` is the initial controlled value,
     ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been at or below the reference,
     and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the reverse.
     """
@@ -245,32 +245,24 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
 
 
 def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample) -> SettledSums:
-    """Update the settled meter with a sample.
-
-    Reversals of the command count from three quarters on: a loop that has come to rest by then does not oscillate.
-    """
+    """Update the settled meter with a sample."""
     value = sample.value
     error = value - sample.reference
-    of_run, of_hold = 3.0 * (course.samples - 1.0), course.hold_start + 3.0 * (course.samples - 1.0)
-    fourfold = 4.0 * sample.number
-    in_last_half = (fourfold >= of_run and fourfold < of_run + 4.0) or (
-        course.hold_start <= sample.number and fourfold >= of_hold and fourfold < of_hold + 4.0
-    )
-    command = update_reversals(state.command, course, sample)
     met_upwards = 1.0 if state.met_upwards > 0.0 or error <= 0.0 else 0.0
     met_downwards = 1.0 if state.met_downwards > 0.0 or error >= 0.0 else 0.0
     before = state.part
     lagged = state.lagged + (sample.reference - state.lagged) * course.interval / (LAG_TIME + course.interval)
     late = sample.reference - lagged
     lag = allowed_lag(course, late, sample.reference - before.last, sample.angular_velocity)
+    part, command = next_part(state, course, sample, late, lag), update_reversals(state.command, course, sample)
     return SettledSums(
-        part=next_part(state, course, sample, late, lag),
+        part=part,
         worst=state.worst,
         worst_badness=state.worst_badness,
         waits=course.in_first_half,
         lagged=lagged,
         met=1.0 if state.met > 0.0 or meets(course, sample) else 0.0,
-        command=Reversals(command.way, command.task, 0.0 if in_last_half else command.turns),
+        command=Reversals(command.way, command.task, command.turns if part.taken > 1.0 else 0.0),
         begun=state.begun,
         lowest=min(state.lowest, value),
         highest=max(state.highest, value),
@@ -337,12 +329,9 @@ def deviation(squares: Floats, total: Floats, count: Floats) -> Floats:
 
 
 def read_reversals(readings: Readings) -> Floats:
-    """Metric ``settled_reversals`` of the command [1/s], in the last half of the last part.
-
-    A part whose judged samples take less than a second counts as one second.
-    """
+    """Metric ``settled_reversals`` of the command in the last part [1/s]; less than a second counts as one."""
     sums = readings.meters[SETTLED.name]
-    return np.asarray(2.0 * sums.command.turns / larger((sums.part.taken - 1.0) * readings.interval, 1.0))
+    return np.asarray(sums.command.turns / larger((sums.part.taken - 1.0) * readings.interval, 1.0))
 
 
 def _of_sums(part: str, *names: str, by: Callable[..., Floats] | None = None) -> ReadAt:

@@ -14,7 +14,7 @@ from ppafo.metrics.metric import followed
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
-from ppafo.simulation.tracking.rule import limits_of
+from ppafo.simulation.tracking.rule import part_limits
 from ppafo.simulation.tracking.settled import settled_parts, smallest_change, task_parts
 from ppafo.study.runs import excess, with_companions
 
@@ -80,7 +80,7 @@ def test_no_limit_jumps_where_an_amplitude_passes_zero(path: str) -> None:
     limits = []
     for amplitude in np.linspace(-0.02, 0.02, 21):
         scenario = with_numbers(base, {path: float(amplitude)})
-        limits.append(float(limits_of(task_parts(scenario, simulate(scenario).recording)[0], False).rms_error))
+        limits.append(float(part_limits(task_parts(scenario, simulate(scenario).recording)[0], False).rms_error))
     assert limits[10] == pytest.approx(0.05 * 3.0, rel=1e-3)
     assert np.max(np.abs(np.diff(limits))) < 0.15 * limits[10]
 

@@ -34,7 +34,7 @@ def needed_metrics(scenario: Scenario) -> tuple[str, ...]:
 def command_turning(scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float) -> Floats:
     """Command reversals of each run divided by their limit (runs,): above 1 the loop oscillates; 0 if unknown.
 
-    Under sensor noise the reversals of the last half of the settled part count, if known. Arguments as in
+    Under sensor noise the reversals in the settled part count, if known. Arguments as in
     ``tracking_excess``.
     """
     none = np.zeros(next(iter(metrics.values())).size)

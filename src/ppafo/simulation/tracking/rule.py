@@ -172,7 +172,7 @@ class _TaskExcess(NamedTuple):
         return largest
 
 
-class Limits(NamedTuple):
+class PartLimits(NamedTuple):
     """Largest numbers with which a part of a task follows its reference [SI], inf without a limit; arrays (runs,)."""
 
     rms_error: Floats
@@ -185,8 +185,8 @@ class Limits(NamedTuple):
     """Largest error while a reference moves, of an angle and of a smooth wave."""
 
 
-def limits_of(settled: SettledPart, is_switched: bool) -> Limits:
-    """Limits of a part, of which each is a continuous function of amplitude and speed of reference and joint.
+def part_limits(settled: SettledPart, is_switched: bool) -> PartLimits:
+    """PartLimits of a part, of which each is a continuous function of amplitude and speed of reference and joint.
 
     ``is_switched`` is true for a valve without gradual openings. The numbers of ``settled`` may be arrays (runs,).
     """
@@ -195,7 +195,7 @@ def limits_of(settled: SettledPart, is_switched: bool) -> Limits:
     if is_switched:
         at_rest = wanted / np.maximum(1.0 - motion, _TINY)
         mean, span = LARGEST_MEAN_SWITCHED * at_rest, LARGEST_SPAN_SWITCHED * at_rest
-        return Limits(LARGEST_SHARE_SWITCHED * wanted, mean, span, none)
+        return PartLimits(LARGEST_SHARE_SWITCHED * wanted, mean, span, none)
     share, wave = LARGEST_SHARE * wanted, np.asarray(settled.reference_deviation)
     # Of a small wave the limit is that of any motion.
     small = share + LARGEST_LAG * wanted - _TIMES_OF_SMALL_WAVE * wave
@@ -207,7 +207,7 @@ def limits_of(settled: SettledPart, is_switched: bool) -> Limits:
     angle, is_angle = np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * reference_range), reference_range > 0.0
     of_smooth = np.where(~np.asarray(settled.rests) & settled.is_reference_smooth, LARGEST_CREST * rms, np.inf)
     largest = np.where(is_angle, angle, of_smooth) / np.maximum(motion, _TINY)
-    return Limits(rms, none, np.where(is_angle, swing + (2.0 * angle - swing) * motion, np.inf), largest)
+    return PartLimits(rms, none, np.where(is_angle, swing + (2.0 * angle - swing) * motion, np.inf), largest)
 
 
 def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | float = 0.0) -> _TaskExcess:
@@ -217,7 +217,7 @@ def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | flo
     numbers of ``settled`` may be arrays (runs,).
     """
     wanted, mean_error, motion = settled.wanted_change, np.abs(settled.mean_error), np.asarray(settled.motion)
-    limits = limits_of(settled, is_switched)
+    limits = part_limits(settled, is_switched)
     numbers = settled.rms_error, mean_error, settled.error_range, settled.largest_error
     ratios = [np.asarray(number) / limit for number, limit in zip(numbers, limits, strict=True)]
     span = ratios[2] * settled.weight

@@ -133,7 +133,7 @@ class SettledPart(NamedTuple):
     duration: float = 0.0
     """Length of the part [s]; in a walk, the duration of the recording."""
     command_reversal_rate: float = 0.0
-    """Rate of command reversals in the last half of the part [1/s]."""
+    """Rate of command reversals in the part [1/s]."""
 
     @property
     def is_undecided(self) -> Any:

@@ -30,9 +30,9 @@ from ppafo.simulation.tracking.rule import (
     failure_of_task,
     failure_of_walk,
     is_noisy,
-    limits_of,
     most_reversals,
     only_switches,
+    part_limits,
 )
 from ppafo.simulation.tracking.settled import IN_PUSH_OFF, settled_walk, task_parts
 from ppafo.simulation.tracking.shortfall import available_torque, misses_for_reach, shortfall
@@ -298,7 +298,7 @@ def _criteria(case: Case) -> tuple[tuple[Criterion, float, float], ...]:
     reach: Criterion = "any reach" if scenario.motion.locked_angle is None else "reach"
     # On a quick ramp an error is allowed that would be none at rest.
     weight = max(float(settled.weight), _LEAST)
-    rms, of_mean, swing, largest = (float(limit) / weight for limit in limits_of(settled, switches))
+    rms, of_mean, swing, largest = (float(limit) / weight for limit in part_limits(settled, switches))
     lacking = ((reach if is_cut else "mean error", beyond if is_cut else mean, LARGEST_SHARE * wanted),)
     return (
         ("RMS error", settled.rms_error, rms),
