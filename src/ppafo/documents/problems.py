@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from ppafo.documents.faults import no_table, unknown_key
-from ppafo.documents.toml_text import LONGEST_VALUE, NAME, NAME_RULE, quote
+from ppafo.documents.toml_text import NAME, NAME_RULE, quote
 from ppafo.plugins import nearest_kind
 from ppafo.wording import nearest_name, one_line
 
@@ -20,6 +20,7 @@ _TEXT_RULES = {
     LABEL: "must be one line of text without leading or trailing spaces",
 }
 """Message endings for a text that does not match a pattern, by pattern."""
+_FORMS = {"int": "a whole number", "float": "a number", "bool": "true or false"}
 _MISSING = {"missing": "", "union_tag_not_found": ".kind"}
 """Suffix of the path of a missing key, by problem type."""
 
@@ -38,11 +39,9 @@ def faults_of(details: list[ErrorDetails], model: type[BaseModel]) -> dict[str, 
         key = _key_at(detail["loc"], model)
         if detail["type"] in _MISSING:
             # Of a table that is missing its required keys are named, which the next refusal would ask for.
-            fields = key.value_type.model_fields if _is_model(key.value_type) else {}
-            required = [f"{key.path}.{name}" for name, field in fields.items() if field.is_required()]
-            faults |= dict.fromkeys(required or [f"{key.path}{_MISSING[detail['type']]}"], "")
+            faults |= dict.fromkeys(_required(key) or [f"{key.path}{_MISSING[detail['type']]}"], "")
         else:
-            faults.setdefault(key.path, _message(key, detail, model))
+            faults.setdefault(key.path, _message(key, detail))
     return faults
 
 
@@ -96,13 +95,18 @@ def _tables_in(value_type: Any) -> list[type[BaseModel]]:
     return [item for item in get_args(value_type) if _is_model(item)] if is_union else []
 
 
-def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
+def _required(key: _Key) -> list[str]:
+    """Return the paths of the keys that the table at a key must have."""
+    fields = key.value_type.model_fields if _is_model(key.value_type) else {}
+    return [f"{key.path}.{name}" for name, field in fields.items() if field.is_required()]
+
+
+def _message(key: _Key, detail: ErrorDetails) -> str:
     """Return the message on a problem at a key of a document."""
     assignment = f"{key.path} = {quote(detail['input'])}"
     match detail["type"]:
         case "extra_forbidden":
-            name = key.path.rpartition(".")[2]
-            return unknown_key(key.path, name, _tables_with(name, model), list(key.table.model_fields))
+            return unknown_key(key.path, key.path.rpartition(".")[2], (), list(key.table.model_fields))
         case "literal_error":
             words = detail["ctx"]["expected"].replace(" or ", ",")
             return f"{assignment} is not allowed{_allowed_words(detail['input'], words)}"
@@ -111,20 +115,13 @@ def _message(key: _Key, detail: ErrorDetails, model: type[BaseModel]) -> str:
             words = _allowed_words(kind, detail["ctx"]["expected_tags"], nearest_kind)
             return f"{key.path}.kind = {quote(kind)} is not known{words}"
         case "int_type" | "int_from_float" | "float_type" | "bool_type":
-            form = {"float": "a number", "bool": "true or false"}.get(
-                detail["type"].partition("_")[0], "a whole number"
-            )
-            return f"{assignment} must be {form}{', without quotation marks' * isinstance(detail['input'], str)}"
+            return f"{assignment} must be {_FORMS[detail['type'].partition('_')[0]]}"
         case "string_pattern_mismatch":
             return f"{assignment} {_TEXT_RULES.get(detail['ctx']['pattern'], _TEXT_RULES[NAME])}"
         case "string_type":
-            field = key.table.model_fields.get(key.path.rpartition(".")[2]) if _is_model(key.table) else None
-            said = f": {field.description}" if field is not None and field.description else ""
-            return f"{assignment} must be a text in quotation marks{said}"
+            return f"{assignment} must be a text in quotation marks"
         case "model_type" | "model_attributes_type" | "dict_type":
-            fields = key.value_type.model_fields if _is_model(key.value_type) else {}
-            required = [name for name, field in fields.items() if field.is_required()]
-            return no_table(key.path, detail["input"], required)
+            return no_table(key.path, detail["input"], [name.rpartition(".")[2] for name in _required(key)])
     # "Input should be less than 5" becomes "must be less than 5".
     _, separator, requirement = detail["msg"].partition(" should ")
     requirement = requirement if separator else f"be {detail['msg']}"
@@ -135,24 +132,3 @@ def _allowed_words(word: object, allowed: str, nearest: Callable[[str, list[str]
     """Return the message ending for an unknown word: nearest and allowed words; pydantic separates these by commas."""
     words = [item.strip(" '") for item in allowed.split(",")]
     return f"{nearest(str(word), words)}; allowed: {', '.join(words)}"
-
-
-def _tables_with(name: str, model: type[BaseModel]) -> list[str]:
-    """Return the paths of the tables that have a key, outer tables first, without tables in lists."""
-    paths: list[str] = []
-    seen = set()
-    level: list[tuple[str, type[BaseModel]]] = [("", model)]
-    while level:
-        inner: list[tuple[str, type[BaseModel]]] = []
-        for path, table in level:
-            # Tables may contain themselves.
-            if (path, table) in seen or len(path) > LONGEST_VALUE:
-                continue
-            seen.add((path, table))
-            if name in table.model_fields:
-                paths.append(path)
-            for key, field in table.model_fields.items():
-                tables = [field.annotation] if _is_model(field.annotation) else _tables_in(field.annotation)
-                inner += [(f"{path}.{key}".strip("."), inner_table) for inner_table in tables]
-        level = inner
-    return list(dict.fromkeys(paths))

@@ -83,11 +83,9 @@ class DocumentReader:
         except UnitError as error:
             # What decides the unit of a level of the reference or of a gain.
             controlled = controlled_in(self.document)
-            followed = CONTROLLED[controlled]
-            is_level = path.startswith("reference.") and quantity.unit in (followed.level.unit, followed.difference)
-            is_gain = path.startswith("controller.") and controlled != TORQUE and followed.plain_unit in quantity.unit
-            is_unit = "does not fit" in str(error) and (is_level or is_gain)
-            raise self.refusal(path, f"{error}{f'; {REFERENCE_OF} is {controlled!r}' * is_unit}") from error
+            is_of = path.startswith("reference.") or (path.startswith("controller.") and controlled != TORQUE)
+            of = f"; {REFERENCE_OF} is {controlled!r}" if is_of and "does not fit" in str(error) else ""
+            raise self.refusal(path, f"{error}{of}") from error
 
     def section(
         self, section: str, quantities: tuple[Quantity, ...], atmosphere: float = STANDARD_ATMOSPHERE

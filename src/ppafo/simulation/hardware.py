@@ -2,7 +2,7 @@
 
 import functools
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.declared import value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
-from ppafo.parameters.overrides import CHOSEN_VALVE, Override, check_valve, one_path, read_overrides, with_overrides
+from ppafo.parameters.overrides import CHOSEN_VALVE, Override, check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
     PATHS_THAT_SET_UNITS,
     atmospheric_pressure,
@@ -25,7 +25,7 @@ from ppafo.parameters.parameter_set import (
 from ppafo.simulation.document import DocumentReader, ScenarioRequest
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Origin
-from ppafo.wording import nearest_name, one_line, override_text
+from ppafo.wording import one_line
 
 logger = logging.getLogger("ppafo")
 
@@ -57,7 +57,7 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
         of_file = read_overrides(section.get("overrides", ()))
         check_valve(of_file, in_file.get("valve"), f"device.valve = '{in_file.get('valve')}'")
         plain_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
-        valve_name = _valve_in(plain_set, valve)
+        valve_name = chosen_valve(plain_set, valve)
         owner, replacing = "", tuple[Override, ...]()
         if section["set"] != in_file.get("set"):
             of_file = _without_second_chamber(of_file, plain_set)
@@ -67,7 +67,8 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
             replacing = tuple(item for item in of_file if item.typed.startswith(CHOSEN_VALVE))
         overridden = {override.typed for override in overrides}
         in_force = [item for item in replacing if item.typed not in overridden]
-        replaced = _replaced_text(plain_set, valve_name, owner, in_force) if in_force else ""
+        listed = ", ".join(map(str, in_force))
+        replaced = f"values of the scenario replace values of {owner}: {listed}" if in_force else ""
         set_of_file = with_overrides(plain_set, of_file, valve)
         if replaced:
             _warn_once(f"ppafo: {reading.file}: {replaced}")
@@ -78,31 +79,10 @@ def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: 
     return Hardware(changed, valve_name, links_of_set(changed, overridden, before), replaced)
 
 
-def _valve_in(parameter_set: ParameterSet, valve: str | None) -> str:
-    """Return the name of the selected or default valve. Raises ParameterError, with a remedy, if there is none."""
-    kinds = parameter_set.valve_kinds
-    if valve is not None and valve not in kinds and not nearest_name(valve, kinds):
-        # Not a misspelt name: the scenario names the valve of another device.
-        raise ParameterError(
-            f"{parameter_set.file}: there is no valve '{valve}'; available: {', '.join(kinds)}; give "
-            f"{override_text((f'device.valve={parameter_set.default_valve}',))}"
-        )
-    return chosen_valve(parameter_set, valve)
-
-
 def _without_second_chamber(overrides: tuple[Override, ...], parameter_set: ParameterSet) -> tuple[Override, ...]:
     """Return the overrides of a file that apply to another set than its own, which may have one chamber only."""
     missing = OF_SECOND_CHAMBER if parameter_set.has_one_chamber else ()
     return tuple(item for item in overrides if item.typed not in missing)
-
-
-def _replaced_text(plain_set: ParameterSet, valve: str, owner: str, replacing: Sequence[Override]) -> str:
-    """Sentence on overrides of a scenario file that replace values of ``owner``, with overrides that restore them."""
-    entries = {one_path(path, valve): entry for path, entry in plain_set.numbers.items()}
-    replaced = [(item.typed, entries[item.typed]) for item in replacing if item.typed in entries]
-    restoring = [f"{path}={entry.value:.12g} {entry.unit}".rstrip() for path, entry in replaced]
-    remedy = f"; {override_text(restoring)} restores the replaced values" if restoring else ""
-    return f"values of the scenario replace values of {owner}: {', '.join(map(str, replacing))}{remedy}"
 
 
 _warn_once = functools.lru_cache(maxsize=64)(logger.warning)

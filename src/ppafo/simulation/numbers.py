@@ -242,12 +242,9 @@ def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
         if not missing:
             changing.append(section)
         elif len(missing) < len(form):
-            # Declared are the numbers of both forms: those of the device's own are left.
-            own = [f"{section}.{quantity.name}" for quantity in ORIFICE]
             raise ScenarioError(
-                f"{scenario.name}: the device is given by {' and '.join(path for path in own if path not in form)}; to "
-                f"give {' or '.join(path for path in form if path in paths)} instead, also give "
-                f"{' and '.join(missing)}, or first set {' and '.join(form)}"
+                f"{scenario.name}: {' and '.join(form)} take the place of the other form together: also give "
+                f"{' and '.join(missing)}, or set both before"
             )
     return changing
 

@@ -82,14 +82,8 @@ def override_document(
 def _unknown(own: Mapping[str, Override], path: str, known: tuple[str, ...], file: str) -> ScenarioError:
     """Return the error for an override of an unknown path, which a newly chosen kind may have made unknown."""
     deciding = deciding_kinds(path, filter(_is_kind_path, own))
-    if not deciding:
-        return unknown_value(own[path], known, f"{file} has")
-    section = f"{deciding[-1].rpartition('.')[0]}."
-    names = [name for name in known if name.startswith(section)]
-    hint = nearest_name(path, names) or f"; available: {', '.join(names)}"
-    return ScenarioError(
-        f"override '{own[path]}': {file} has no value '{path}' after override '{own[deciding[-1]]}'{hint}"
-    )
+    after = f" after override '{own[deciding[-1]]}'" if deciding else ""
+    return unknown_value(own[path], known, f"{file}{after} has")
 
 
 def _kept_text(
@@ -215,12 +209,11 @@ def unknown_value(override: Override, known: tuple[str, ...], owner: str) -> Sce
     """Return the error for an override of an unknown path; ``owner`` starts the message, such as ``task.toml has``."""
     EFFECTS.load_own()
     allowed = [*known, *device_paths()]
-    section = override.typed.partition(".")[0]
-    examples = [name for name in known if name.startswith(f"{section}.")] or known
-    hint = nearest_name(override.typed, allowed) or f"; for example {', '.join(examples[:6])}"
-    # No file has a torque sensor.
-    source = "; the torque is computed from the measured pressures" * override.typed.startswith("sensors.torque")
-    return ScenarioError(f"override '{override}': {owner} no value '{override.typed}'{hint}{source}")
+    section = override.typed.rpartition(".")[0]
+    inside = [name for name in known if name.startswith(f"{section}.")]
+    hint = nearest_name(override.typed, inside) or nearest_name(override.typed, allowed)
+    hint = hint or f"; available: {', '.join(inside or known)}"
+    return ScenarioError(f"override '{override}': {owner} no value '{override.typed}'{hint}")
 
 
 def _set(document: dict[str, Any], path: str, text: str, file: str, content: Content) -> None:

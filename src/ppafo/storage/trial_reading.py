@@ -42,19 +42,11 @@ def check_can_be_read(path: Path, read: Callable[[str], object], library: str) -
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise DataError(
-            f"{path}: is damaged: the library {library} does not finish reading it; write the file again"
-        ) from error
+        raise DataError(f"{path}: is damaged: the library {library} does not finish reading it") from error
     if ended.returncode == REFUSED:
         raise DataError(os.fsdecode(ended.stdout))
     if ended.returncode == OUT_OF_MEMORY:
-        raise DataError(
-            f"{path}: is damaged: the library {library} requires far more memory than the size of the file justifies; "
-            "write the file again"
-        )
+        raise DataError(f"{path}: is damaged: the library {library} needs far more memory than a file of its size")
     # Below 0 is the signal that ended it. Any other end is of no file, and the reading itself shows what is wrong.
     if ended.returncode < 0:
-        raise DataError(
-            f"{path}: cannot be read, because the library {library} crashes; the file is probably damaged: write the "
-            "file again"
-        )
+        raise DataError(f"{path}: is damaged: the library {library} crashes")

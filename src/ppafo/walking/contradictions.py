@@ -24,7 +24,6 @@ from ppafo.walking.declaration import OF_A_WALK
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import Wearer
-from ppafo.wording import override_text
 
 _IN_FILES = {"m": "m"}
 """Units of leg segments in walk files; other lengths are in millimetres."""
@@ -103,10 +102,7 @@ def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
             number = getattr(walk_of(scenario).wearer if section == "wearer" else scenario.controller, name)
             # In six digits, as the number that it contradicts.
             default = shown_text(number, quantity.unit, unit=_IN_FILES.get(quantity.unit, ""))
-            raise ScenarioError(
-                f"{reading.file}: {path} is not given and has its default, {default}: {reason(0)}; "
-                f"give a value in the file or with {override_text([f'{path}=...'])}"
-            )
+            raise ScenarioError(f"{reading.file}: {path} is not given and has its default, {default}: {reason(0)}")
 
 
 def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:

@@ -201,13 +201,6 @@ def test_what_the_new_set_keeps_beside_values_fitted_with_it_is_said(both: Ident
     assert not inconsistent.passed
 
 
-def test_a_key_of_the_wrong_type_is_said_with_what_it_means(solve: Solve) -> None:
-    with pytest.raises(
-        PpafoError, match=r"locked = true must be a text in quotation marks: angle at which .* '75 deg'"
-    ):
-        solve(FIT.replace('scenario = "step-response"', "locked = true"))
-
-
 def test_the_fit_starts_from_what_the_bench_found_and_keeps_the_rest_of_it(solve: Solve) -> None:
     outcome = solve(STATIC + FIT)
     assert outcome.trajectory is not None

@@ -177,7 +177,7 @@ def test_file_of_texts_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("code", "message"),
     [
-        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "cannot be read, because the library h5py crashes"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "is damaged: the library h5py crashes"),
         ("import time; time.sleep(60)", "is damaged: the library h5py does not finish reading it"),
     ],
 )

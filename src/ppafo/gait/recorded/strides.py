@@ -4,7 +4,6 @@ Rejected are recordings that no leg can produce: columns that stay constant whil
 with the last value, and strides whose curve differs from all others.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,7 +12,6 @@ import numpy as np
 from ppafo.errors import DataError, PpafoError, noted_in
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.columns import LOADS
-from ppafo.gait.recorded.contacts import contacts_of
 from ppafo.gait.recorded.curves import CurveStatistics
 from ppafo.gait.recorded.footfalls import (
     FORCE,
@@ -100,35 +98,19 @@ def check_enough(strides: StrideSelection, footfalls: Footfalls) -> None:
     walk = {name: footfalls.walk[name] for name in (*REQUIRED, footfalls.events) if name in footfalls.walk}
     spans = ", ".join(f"{name} {signal.time[0]:.4g} to {signal.time[-1]:.4g} s" for name, signal in walk.items())
     count = count_of(taken, "whole stride")
-    where = FORCE if FORCE in walk else SHANK
     events = f"{count_of(len(footfalls.strides), 'stride')} in the events"
     if not footfalls.strides:
-        strikes = heel_strikes(where, walk)
-        if strikes:
-            events = f"{where} has one heel strike only, at {strikes[0]:.3g} s; a stride needs two"
-        elif where == FORCE and any(off is not None for _, off in contacts_of(walk[FORCE])):
-            events = (
-                f"no heel strike in {where}: the foot is on the ground at the start, and a heel strike follows a swing"
-            )
-        else:
-            events = f"no heel strikes were found in {where}: check its column"
+        where = FORCE if FORCE in walk else SHANK
+        events = f"{count_of(len(heel_strikes(where, walk)), 'heel strike')} in {where}; a stride needs two"
     fewer = f", or accept fewer with {setting_text('least_strides')}" if taken else ""
     # From the last sample before the longest gap to the first one after it.
     longest = max(
         0.0 if signal.lost is None else float(np.max(np.diff(signal.time[~signal.lost]))) for signal in walk.values()
     )
-    if longest > 0.0:
-        # Rounded up, so that the value in the remedy fills the gap.
-        needed = math.ceil(100.0 * longest - 1e-6) / 100.0
-        filled = f"fill the gaps ({setting_text('longest_gap', needed, f'{needed:g} s')})"
-        remedy = filled if needed <= LONGEST_FILLED else f"the longest gap of {longest:.3g} s cannot be filled"
-        raise DataError(
-            f"{walk['shank_angle'].file}: has {count} without missing samples, but at least {least} are needed; "
-            f"{remedy}{(', give' if fewer else ', or give')} a longer recording{fewer}"
-        )
+    gap = f"; the longest gap is {longest:.3g} s, and {setting_text('longest_gap')} fills up to {LONGEST_FILLED:g} s"
     raise DataError(
         f"{walk['shank_angle'].file}: has {count} covered by both angles and events ({events}; {spans}), but at least "
-        f"{least} are needed; give a longer recording{fewer}"
+        f"{least} are needed{gap if longest > 0.0 else ''}; give a longer recording{fewer}"
     )
 
 
