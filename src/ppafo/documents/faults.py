@@ -66,6 +66,7 @@ def _lines_in(text: str) -> dict[str, int]:
         if found["table"]:
             table = name
         if found["opens"] == "[[":
+            lines.setdefault(name, number)
             count = 1
             while (table := f"{name}.{count}") in lines:
                 count += 1
