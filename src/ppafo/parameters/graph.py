@@ -25,6 +25,18 @@ _LEVEL, _GAUGE = "Pa_a", "_g"
 _COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.", "reference.")
 
 
+class Asked(dict[str, Any]):
+    """Numbers by path, read by ``present`` when they are asked for; the keys are the paths asked for, in order."""
+
+    def __init__(self, present: Callable[[str], Any]) -> None:
+        super().__init__()
+        self.present = present
+
+    def __missing__(self, path: str) -> Any:
+        self[path] = self.present(path)
+        return self[path]
+
+
 @dataclass(frozen=True, slots=True)
 class Link:
     """Default of a number [SI]: a function of other numbers, or ``factor`` times their product, plus ``gap``.
@@ -56,24 +68,23 @@ class Link:
     def number(self, present: Callable[[str], Any], computed: dict[Any, Any] | None = None) -> Any:
         """Return the default, with sources read by ``present``.
 
-        ``computed`` keeps the groups of each combination of numbers, which are common to several links.
+        ``computed`` keeps the groups, which are common to several links whose sources have the same numbers.
         """
-        if self.function is None:
-            found = prod((present(path) for path in self.direct), start=self.factor)
+        function, direct = self.function, map(present, self.direct)
+        if function is None:
+            found = prod(direct, start=self.factor)
+        elif self.parts is None:
+            found = over_runs(function, *direct)
         else:
-            kept = {} if computed is None else computed
-            if self.parts is not None:
-                self.parts.note_reads(self.groups, present, kept)
-            paths = self.sources
+            results, combination_of_run = self.parts.combinations(
+                self.groups, present, {} if computed is None else computed
+            )
             found = over_runs(
-                lambda *values: self._of_run(dict(zip(paths, values, strict=True)), kept), *map(present, paths)
+                lambda combination, *others: float(function(*results[int(combination)], *others)),
+                0 if combination_of_run is None else combination_of_run.astype(np.float64),
+                *direct,
             )
         return found + self.gap if self.gap else found
-
-    def _of_run(self, numbers: Mapping[str, float], computed: dict[Any, Any]) -> float:
-        assert self.function is not None, "a product takes arrays"
-        groups = () if self.parts is None else [self.parts.group(name, numbers, computed) for name in self.groups]
-        return float(self.function(*groups, *(numbers[path] for path in self.direct)))
 
 
 class GroupsOf(Protocol):
@@ -86,11 +97,13 @@ class GroupsOf(Protocol):
     def functions(self, groups: Collection[str], present: Callable[[str], Any]) -> list[PlainFunction]:
         """Return the functions that compute some groups, in order of calling."""
 
-    def note_reads(self, groups: Collection[str], present: Callable[[str], Any], computed: dict[Any, Any]) -> None:
-        """Find the paths of the numbers that decide some groups."""
+    def combinations(
+        self, groups: tuple[str, ...], present: Callable[[str], Any], computed: dict[Any, Any]
+    ) -> tuple[list[Any], Any]:
+        """Return groups for each combination of numbers, and the index of the combination of each run.
 
-    def group(self, name: str, numbers: Mapping[str, float], computed: dict[Any, Any]) -> Any:
-        """Return a group from numbers of one run; ``computed`` keeps it for the same numbers."""
+        ``computed`` keeps them; the index is None if no number is an array (runs,).
+        """
 
 
 def follows(source: str, gap: float = 0.0, when_set: bool = False) -> Link:

@@ -10,13 +10,12 @@ from ppafo.control.torque_loop import TorqueLoop
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.ports import load_torque
 from ppafo.parameters.effects import effects_of
-from ppafo.parameters.graph import acting
+from ppafo.parameters.graph import Asked, acting
 from ppafo.parameters.overrides import other_forms
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS, loop_parts
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
-from ppafo.simulation.torque_loop import Asked
 from ppafo.units.shown import in_units, shown_text, written_text
 from ppafo.wording import override_text, subject_text
 

@@ -10,11 +10,8 @@ from ppafo.model.actuators.kind import Chambers, Range
 from ppafo.model.actuators.vane import VaneSettings
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import PlainFunction
-from ppafo.parameters.device import VANE, Actuator, Device
-from ppafo.parameters.plant import plant_parameters
-from ppafo.parameters.reach import static_torque
+from ppafo.parameters.device import VANE, Actuator
 
 RIGHT_ANGLE = 1.5707963267948966
 INSIDE = 0.2
@@ -142,31 +139,3 @@ def chambers_of(actuator: Actuator) -> PlainFunction:
     if actuator.table is not None:
         shape = made_of(measured_shape_of, f"shape_of_{name}", _MeasuredParts(model.prepare, actuator.table))
     return made_of(shaped_at, f"chambers_at_of_{name}", _ShapedParts(shape, model.chambers, model.torque))
-
-
-def quicker_at(device: Device, angle: float, controlled: str) -> float:
-    """Ratio of torque or pressure rates [-]: at an angle [rad], to the angle used for the gains.
-
-    Rates are per volume flow at full opening of the valve [N m/m^3 or Pa/m^3], for the faster chamber.
-    """
-    actuator, supply = device.actuator, device.supply
-    plant, torque, model = plant_parameters(device), static_torque(device), ACTUATORS[actuator.kind].model
-    room = float(supply.atmospheric_pressure)
-    full_1, full_2 = float(supply.pressure), float(supply.dorsiflexion_pressure)
-    gauge_1, gauge_2 = gauge_of(full_1, room), gauge_of(full_2, room)
-    half_1, half_2 = room + 0.5 * gauge_1, room + 0.5 * gauge_2
-    rates = []
-    for place in (angle, usual_place(float(actuator.angle_min), float(actuator.angle_max))):
-        filled = model.chambers(plant, place, half_1, half_2)
-        volume_1 = float(filled.volume_1 + half_1 * filled.compliance_1)
-        volume_2 = float(filled.volume_2 + half_2 * filled.compliance_2)
-        if controlled in (TORQUE, ANGLE):
-            vented = torque(place, room, room)
-            by_1 = abs((torque(place, room + gauge_1, room) - vented) / gauge_1)
-            by_2 = abs((torque(place, room, room + gauge_2) - vented) / gauge_2)
-        else:
-            by_1, by_2 = float(controlled != "pressure_2"), float(controlled != "pressure_1")
-        # What fills a chamber of a suction device is the room.
-        rates.append(max(by_1 * max(full_1, room) / volume_1, by_2 * max(full_2, room) / volume_2))
-    here, there = rates
-    return here / there if there > 0.0 else 1.0

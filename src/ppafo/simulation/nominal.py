@@ -1,14 +1,12 @@
 """Nominal device of a model-based controller, from the numbers of the actual device."""
 
-from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.kind import nominal_term
 from ppafo.model.actuators.kind import Range
-from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant
-from ppafo.model.orifice import area_conductance, sonic_conductance_mass
+from ppafo.model.gas import critical_pressure_ratio
 from ppafo.parameters.device import VANE, Orifice, SonicOrifice
 from ppafo.parameters.graph import Link, follows
 from ppafo.simulation.mean_chambers import MeanChambers
-from ppafo.simulation.torque_loop import LoopParts
+from ppafo.simulation.torque_loop import LoopParts, conductance_of_area, conductance_of_sonic, product_of
 
 _GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 _GAS_PRODUCT_PATHS = ("gas.molar_mass", "gas.temperature")
@@ -25,28 +23,6 @@ USUAL_RANGE = 1.0e6
 """Range of the usual pressure transducers for supplies up to 7 bar [Pa absolute]."""
 COMPRESSED = 1.25
 """Smallest converter range divided by the supply pressure [-]; a full-scale reading means a broken wire."""
-
-
-def product_of(molar_mass: float, temperature: float) -> float:
-    """Specific gas constant times temperature, R T / M [J/kg], from molar mass [kg/mol] and temperature [K]."""
-    return specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature
-
-
-def conductance_of_area(molar_mass: float, ratio: float, temperature: float, area: float, discharge: float) -> float:
-    """Mass-flow conductance [kg/(s Pa)] of an orifice area [m^2], from molar mass [kg/mol], k [-], temperature [K].
-
-    Equation (6).
-    """
-    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
-    return area_conductance(area, discharge, ratio, constant, temperature)
-
-
-def conductance_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
-    """Mass-flow conductance [kg/(s Pa)] of a sonic conductance [m^3/(s Pa)] of ISO 6358-1.
-
-    Takes molar mass [kg/mol] and temperature [K].
-    """
-    return sonic_conductance_mass(sonic, specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass), temperature)
 
 
 def converter_range(supply: float, dorsiflexion: float) -> float:

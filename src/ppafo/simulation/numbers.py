@@ -22,7 +22,7 @@ from ppafo.parameters.declaration import (
 )
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.effects import number_under, part_of
-from ppafo.parameters.graph import Graph, Link, holding, left, resolved
+from ppafo.parameters.graph import Asked, Graph, Link, holding, left, resolved
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.default_gains import default_links
@@ -196,25 +196,18 @@ def _moved(scenario: Scenario, replaced: Mapping[str, Any]) -> tuple[dict[str, A
         anew = default_links(changed, [declared[path] for path in scenario.links if path in declared])
         for (link,) in anew.values():
             # This finds the sources in the other form.
-            link.number(_ScenarioNumbers(changed).__getitem__)
-    return resolved(scenario.graph, replaced, _ScenarioNumbers(scenario), anew), changed, anew
+            link.number(_present(changed).__getitem__)
+    return resolved(scenario.graph, replaced, _present(scenario), anew), changed, anew
 
 
 def links_that_hold(scenario: Scenario) -> Graph:
     """Return the links of a scenario that still apply: without numbers changed since it was loaded."""
-    return holding(scenario.graph, _ScenarioNumbers(scenario))
+    return holding(scenario.graph, _present(scenario))
 
 
-class _ScenarioNumbers(dict[str, Any]):
-    """Numbers of a scenario by path, read on demand."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        super().__init__()
-        self.scenario = scenario
-
-    def __missing__(self, path: str) -> Any:
-        self[path] = number_under(self.scenario, _attributes(path, self.scenario))
-        return self[path]
+def _present(scenario: Scenario) -> Asked:
+    """Return the numbers of a scenario by path, read on demand; floats or arrays (runs,)."""
+    return Asked(lambda path: number_under(scenario, _attributes(path, scenario)))
 
 
 def number_at(scenario: Scenario, path: str) -> float:

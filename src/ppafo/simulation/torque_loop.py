@@ -7,8 +7,10 @@ library has them in C, concatenated into one function.
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY, UNIVERSAL_GAS_CONSTANT
 from ppafo.control import angle_loop
@@ -18,44 +20,38 @@ from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
 from ppafo.engine.rows import rebuilt, section_row
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import ACTUATORS, VALVES
-from ppafo.model.columns import first
+from ppafo.model.columns import first, over_combinations
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.graph import Asked
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of, usual_place
 from ppafo.simulation.motion_kind import LawSignals
 
 _TABLES = ("tabulated", "smooth")
-LEADING = ("constant", "ramp_hold", "sine", *_TABLES)
+_LEADING = ("constant", "ramp_hold", "sine", *_TABLES)
 """Kinds of profiles whose extreme angles are known."""
-_CHOSEN = {"pressure_1": (1.0, 0.0), "pressure_2": (0.0, 1.0), "pressure_difference": (1.0, 1.0)}
+_OF_PAIR = {"opening_delay", "closing_delay", "switching_interval"}
+"""Settings of a pair of on/off valves."""
+_OF_PRESSURE = {"pressure_1": (1.0, 0.0), "pressure_2": (0.0, 1.0), "pressure_difference": (1.0, 1.0)}
 """Derivatives of a controlled pressure with respect to the pressure of each chamber [-]."""
-
-
-class Asked(dict[str, Any]):
-    """Numbers by path, read by ``present`` when they are asked for; the keys are the paths asked for, in order."""
-
-    def __init__(self, present: Callable[[str], Any]) -> None:
-        super().__init__()
-        self.present = present
-
-    def __missing__(self, path: str) -> Any:
-        self[path] = self.present(path)
-        return self[path]
 
 
 class _Groups:
     """Groups of one run by name, as the functions ``set_NAME`` see them: computed when they are first read."""
 
+    __slots__ = ("__dict__", "compute")
+
     def __init__(self, compute: Callable[[str], Any]) -> None:
         self.compute = compute
 
     def __getattr__(self, name: str) -> Any:
-        return self.compute(name)
+        found = vars(self)[name] = self.compute(name)
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,91 +69,72 @@ class LoopParts:
     reads: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
-    def actuator_settings(self) -> Any:
-        """Class of the actuator's settings."""
-        return ACTUATORS[self.device.actuator.kind].settings
-
-    @property
     def chambers_at(self) -> PlainFunction:
         """Function for the chambers of the actuator at an angle."""
         return chambers_of(self.device.actuator)
-
-    @property
-    def valve_settings(self) -> Any:
-        """Class of the valve's settings."""
-        return VALVES[self.device.valve.kind].settings
-
-    @property
-    def is_pair(self) -> bool:
-        """True for a pair of on/off valves."""
-        return {"opening_delay", "closing_delay", "switching_interval"}.issubset(self.valve_settings._fields)
-
-    @property
-    def follow_time(self) -> PlainFunction:
-        """Function for the time [s] that the spool of a proportional valve takes to follow a command."""
-        kind = VALVES[self.device.valve.kind]
-        return kind.lag or kind.choose(valve_settings(self.device.valve)).command_delay
 
     @property
     def is_sonic(self) -> bool:
         """True for a valve given by its sonic conductance."""
         return isinstance(self.device.valve.orifice, SonicOrifice)
 
-    @property
-    def of_pressure(self) -> tuple[float, float] | None:
-        """Derivatives of a controlled pressure with respect to both chambers' pressures; None for a torque or angle."""
-        return _CHOSEN.get(self.controlled)
-
-    @property
-    def is_slow(self) -> bool:
-        """True for a controller that opens the valve in proportion to the error of an angle."""
-        return self.controls_torque and self.controlled == ANGLE
-
-    def group(self, name: str, numbers: Mapping[str, float], computed: dict[Any, Any]) -> Any:
-        """Return a group from numbers of one run; ``computed`` keeps it for the same numbers."""
-        if name in self.reads:
-            key = (id(self), name, *(numbers[path] for path in self.reads[name]))
-            if key in computed:
-                return computed[key]
-        settings = Asked(numbers.__getitem__)
-        lane = _Groups(lambda other: self.group(other, settings, computed))
-        GROUPS[name](self, lane, settings)
-        self.reads[name] = tuple(settings)
-        return computed.setdefault((id(self), name, *settings.values()), vars(lane)[name])
+    def group(self, name: str, settings: Mapping[str, float], kept: dict[str, Any]) -> Any:
+        """Return a group from numbers of one run; ``kept`` has the groups of this run that were computed before."""
+        if name not in kept:
+            asked = settings if name in self.reads else Asked(settings.__getitem__)
+            lane = _Groups(lambda other: self.group(other, asked, kept))
+            GROUPS[name](self, lane, asked)
+            # Those that it read are there already.
+            kept.update(vars(lane))
+            if name not in self.reads:
+                self.reads.update((each, tuple(asked)) for each in vars(lane) if each not in self.reads)
+        elif isinstance(settings, Asked):
+            # Whoever asks for a group depends on its numbers.
+            for path in self.reads[name]:
+                settings[path]
+        return kept[name]
 
     def functions(self, groups: Collection[str], present: Callable[[str], Any]) -> list[PlainFunction]:
         """Return the functions that compute some groups, in order of calling."""
-        alone = replace(self, reads={})
-        alone.note_reads(groups, present, {})
-        return [GROUPS[name] for name in alone.reads]
-
-    def note_reads(self, groups: Collection[str], present: Callable[[str], Any], computed: dict[Any, Any]) -> None:
-        """Find the paths of the numbers that decide some groups, which those of the first run tell."""
+        kept = dict[str, Any]()
         for name in groups:
-            if name not in self.reads:
-                self.group(name, Asked(lambda path: first(present(path))), computed)
+            self.group(name, Asked(present), kept)
+        return list(dict.fromkeys(GROUPS[name] for name in kept))
+
+    def combinations(
+        self, groups: tuple[str, ...], present: Callable[[str], Any], computed: dict[Any, Any]
+    ) -> tuple[list[Any], Any]:
+        """Return groups for each combination of numbers, and the index of the combination of each run.
+
+        ``computed`` keeps them; the index is None if no number is an array (runs,).
+        """
+        # Sources precede their followers: a number that groups were computed from does not change after it.
+        if (self, groups) not in computed:
+            for name in groups:
+                if name not in self.reads:
+                    self.group(name, Asked(lambda path: first(present(path))), {})
+            settings = {path: first(present(path)) for name in groups for path in self.reads[name]}
+            kept = dict[str, Any]()
+            alone = [self.group(name, settings, kept) for name in groups]
+            varied = [path for path in settings if np.ndim(present(path))]
+            same = {name: group for name, group in kept.items() if not set(varied).intersection(self.reads[name])}
+
+            def of_run(*numbers: float) -> list[Any]:
+                own, of_own = {**settings, **dict(zip(varied, numbers, strict=True))}, dict(same)
+                return [self.group(name, own, of_own) for name in groups]
+
+            computed[self, groups] = over_combinations(of_run, *map(present, varied)) if varied else ([alone], None)
+        found: tuple[list[Any], Any] = computed[self, groups]
+        return found
 
 
-def set_actuator(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
-    """Set the settings of the actuator."""
-    lane.actuator = section_row(parts.actuator_settings, settings, "actuator")
-
-
-def set_stops(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
-    """Set stops and dead volumes."""
+def set_device(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the settings of the actuator, its stops and dead volumes, and the pressures around the device."""
+    lane.actuator = section_row(ACTUATORS[parts.device.actuator.kind].settings, settings, "actuator")
     lane.stops = section_row(Range, settings, "actuator")
-
-
-def set_around(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
-    """Set the pressures around the device."""
     lane.around = Surroundings(
         settings["supply.pressure"], settings["supply.dorsiflexion_pressure"], settings["supply.atmospheric_pressure"]
     )
-
-
-def set_valve(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
-    """Set the settings of the valve."""
-    lane.valve = section_row(parts.valve_settings, settings, "valve")
 
 
 def set_usual(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
@@ -177,6 +154,12 @@ def between(stops: Range, angle: float) -> float:
     return float(min(max(angle, stops.angle_min), stops.angle_max))
 
 
+def set_bounds(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the lowest and highest value of a table [rad]; curves exceed the knots slightly."""
+    paths = [f"{parts.seen.section}.{quantity.name}" for quantity in TABLE.quantities]
+    lane.bounds = table_bounds(rebuilt(TabulatedProfile, (settings[path] for path in paths)))
+
+
 def set_places(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
     """Set the two extreme angles of the joint [rad]: where it is locked or its profile leads, else the usual angle."""
     kind = parts.seen.profile
@@ -192,11 +175,7 @@ def set_places(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> No
         amplitude = settings[of_profile + "amplitude"]
         lane.places = within(lane.stops, level - amplitude, level + amplitude)
     elif kind in _TABLES:
-        # Curves exceed the knots slightly.
-        bounds = table_bounds(
-            rebuilt(TabulatedProfile, (settings[of_profile + quantity.name] for quantity in TABLE.quantities))
-        )
-        lane.places = within(lane.stops, bounds[0], bounds[1])
+        lane.places = within(lane.stops, lane.bounds[0], lane.bounds[1])
     else:
         place = usual_place(lane.stops.angle_min, lane.stops.angle_max)
         lane.places = (place, place)
@@ -218,60 +197,64 @@ def set_late(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None
         lane.late = settings["sensors.delay"] + lag
 
 
-def flow_of_area(molar_mass: float, ratio: float, temperature: float, area: float, discharge: float) -> float:
-    """Flow coefficient of an orifice area: R T times its conductance [m^3/s]. Equation (6)."""
-    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
-    return constant * temperature * area_conductance(area, discharge, ratio, constant, temperature)
+def product_of(molar_mass: float, temperature: float) -> float:
+    """Specific gas constant times temperature, R T / M [J/kg], from molar mass [kg/mol] and temperature [K]."""
+    return specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature
 
 
-def flow_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
-    """Flow coefficient of a sonic orifice: R T times its conductance [m^3/s]. ISO 6358-1."""
+def conductance_of_area(molar_mass: float, ratio: float, temperature: float, area: float, discharge: float) -> float:
+    """Mass-flow conductance [kg/(s Pa)] of an orifice area [m^2], from molar mass [kg/mol], k [-], temperature [K].
+
+    Equation (6).
+    """
     constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
-    return constant * temperature * sonic_conductance_mass(sonic, constant, temperature)
+    return area_conductance(area, discharge, ratio, constant, temperature)
+
+
+def conductance_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
+    """Mass-flow conductance [kg/(s Pa)] of a sonic conductance [m^3/(s Pa)] of ISO 6358-1.
+
+    Takes molar mass [kg/mol] and temperature [K].
+    """
+    return sonic_conductance_mass(sonic, specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass), temperature)
 
 
 def set_flow(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
-    """Set the flow coefficient of the valve [m^3/s]."""
+    """Set the flow coefficient of the valve [m^3/s]: R T times its conductance."""
+    mass = settings["gas.molar_mass"]
+    temperature = settings["gas.temperature"]
     if parts.is_sonic:
-        lane.flow = flow_of_sonic(
-            settings["gas.molar_mass"], settings["gas.temperature"], settings["valve.sonic_conductance"]
-        )
+        conductance = conductance_of_sonic(mass, temperature, settings["valve.sonic_conductance"])
     else:
-        lane.flow = flow_of_area(
-            settings["gas.molar_mass"],
-            settings["gas.heat_capacity_ratio"],
-            settings["gas.temperature"],
-            settings["valve.area"],
-            settings["valve.discharge_coefficient"],
-        )
+        ratio = settings["gas.heat_capacity_ratio"]
+        discharge = settings["valve.discharge_coefficient"]
+        conductance = conductance_of_area(mass, ratio, temperature, settings["valve.area"], discharge)
+    lane.flow = product_of(mass, temperature) * conductance
 
 
 def set_valve_time(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
     """Set the delay [s] from a sample to the flow: switching delay and wait of a pair; spool, and sample delay."""
+    kind = VALVES[parts.device.valve.kind]
+    valve = section_row(kind.settings, settings, "valve")
     sampled = SAMPLES_LATE * settings["controller.period"]
-    if parts.is_pair:
-        lane.valve_time = max(lane.valve.opening_delay, lane.valve.closing_delay) + max(
-            sampled, lane.valve.switching_interval
-        )
+    if _OF_PAIR.issubset(quantity.name for quantity in kind.quantities):
+        lane.valve_time = max(valve.opening_delay, valve.closing_delay) + max(sampled, valve.switching_interval)
     else:
-        lane.valve_time = parts.follow_time(lane.valve) + sampled
+        follow_time = kind.lag or kind.choose(valve_settings(parts.device.valve)).command_delay
+        lane.valve_time = follow_time(valve) + sampled
 
 
-class _PerPressure(NamedTuple):
-    """Derivatives of the controlled quantity with respect to the pressure of each chamber, both positive."""
-
-    one: float
-    other: float
-
-
-def per_flow(mean: MeanChambers, by: _PerPressure, source_1: float, source_2: float) -> float:
-    """Larger rate of the controlled quantity for a volume flow from the sources [Pa]: K P / V."""
-    return max(by.one * source_1 / mean.volume_1, by.other * source_2 / mean.volume_2)
+def per_flow(mean: MeanChambers, around: Surroundings, by_1: float, by_2: float) -> float:
+    """Rate of the controlled quantity per volume flow, max(K P / V), with K its derivatives by both pressures."""
+    # A chamber at a vacuum is filled from the room, quicker than it is emptied.
+    source_1 = max(around.supply_pressure, around.atmospheric_pressure)
+    source_2 = max(around.dorsiflexion_pressure, around.atmospheric_pressure)
+    return max(by_1 * source_1 / mean.volume_1, by_2 * source_2 / mean.volume_2)
 
 
-def by_torque(mean: MeanChambers) -> _PerPressure:
-    """Derivatives of the torque with respect to the pressure of each chamber [m^3]."""
-    return _PerPressure(mean.torque_per_pressure_1, mean.torque_per_pressure_2)
+def torque_per_flow(mean: MeanChambers, around: Surroundings) -> float:
+    """Rate of the torque per volume flow [N m/m^3]."""
+    return per_flow(mean, around, mean.torque_per_pressure_1, mean.torque_per_pressure_2)
 
 
 def set_torque_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
@@ -279,30 +262,26 @@ def set_torque_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float]) 
 
     R is the larger value of the two extreme joint angles, at which the loop is fastest; theta is the dead time.
     """
-    # A chamber at a vacuum is filled from the room, quicker than it is emptied.
-    source_1 = max(lane.around.supply_pressure, lane.around.atmospheric_pressure)
-    source_2 = max(lane.around.dorsiflexion_pressure, lane.around.atmospheric_pressure)
+    by = _OF_PRESSURE.get(parts.controlled)
     here = parts.chambers_at(lane.actuator, lane.stops, lane.around, lane.places[0])
     there = parts.chambers_at(lane.actuator, lane.stops, lane.around, lane.places[1])
-    if parts.of_pressure is None:
-        quickest = max(
-            per_flow(here, by_torque(here), source_1, source_2), per_flow(there, by_torque(there), source_1, source_2)
-        )
+    if by is None:
+        quickest = max(torque_per_flow(here, lane.around), torque_per_flow(there, lane.around))
     else:
-        by = _PerPressure(parts.of_pressure[0], parts.of_pressure[1])
-        quickest = max(per_flow(here, by, source_1, source_2), per_flow(there, by, source_1, source_2))
+        quickest = max(per_flow(here, lane.around, by[0], by[1]), per_flow(there, lane.around, by[0], by[1]))
     lane.torque_loop = TorqueLoop(lane.flow * quickest, lane.valve_time + lane.late)
 
 
 def set_reach(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
     """Set the largest change of torque [N m] or pressure [Pa] from one supply while the other chamber is vented."""
+    by = _OF_PRESSURE.get(parts.controlled)
     gauge_1 = abs(lane.around.supply_pressure - lane.around.atmospheric_pressure)
     gauge_2 = abs(lane.around.dorsiflexion_pressure - lane.around.atmospheric_pressure)
-    if parts.of_pressure is None:
+    if by is None:
         mean = parts.chambers_at(lane.actuator, lane.stops, lane.around, lane.places[0])
         lane.reach = max(mean.torque_per_pressure_1 * gauge_1, mean.torque_per_pressure_2 * gauge_2, 0.0)
     else:
-        lane.reach = max(parts.of_pressure[0] * gauge_1, parts.of_pressure[1] * gauge_2, 0.0)
+        lane.reach = max(by[0] * gauge_1, by[1] * gauge_2, 0.0)
 
 
 def set_joint(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
@@ -330,16 +309,15 @@ def set_joint(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> Non
 
 
 def set_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
-    """Set the loop that the controller closes."""
-    lane.loop = angle_loop.slow_loop(lane.torque_loop, lane.joint) if parts.is_slow else lane.torque_loop
+    """Set the loop that the controller closes: of an angle that of a law that opens the valve by its error."""
+    is_slow = parts.controls_torque and parts.controlled == ANGLE
+    lane.loop = angle_loop.slow_loop(lane.torque_loop, lane.joint) if is_slow else lane.torque_loop
 
 
 GROUPS: Mapping[str, PlainFunction] = {
-    "actuator": set_actuator,
-    "stops": set_stops,
-    "around": set_around,
-    "valve": set_valve,
+    **dict.fromkeys(("actuator", "stops", "around"), set_device),
     "usual": set_usual,
+    "bounds": set_bounds,
     "places": set_places,
     "late": set_late,
     "flow": set_flow,
@@ -349,4 +327,18 @@ GROUPS: Mapping[str, PlainFunction] = {
     "joint": set_joint,
     "loop": set_loop,
 }
-"""Function of each group by the name of the group, which it sets."""
+"""Function that sets each group, by the name of the group."""
+
+
+def quicker_at(parts: LoopParts, numbers: Mapping[str, float], angle: float) -> float:
+    """Ratio of the rates of the controlled quantity [-]: at an angle [rad], to the angle for which gains are computed.
+
+    It is 1 where the extreme angles are known, because gains are then computed for these.
+    """
+    if parts.seen.is_locked or parts.seen.profile in _LEADING:
+        return 1.0
+    kept, by = dict[Any, Any](), _OF_PRESSURE.get(parts.controlled)
+    actuator, stops, around = (parts.group(name, numbers, kept) for name in ("actuator", "stops", "around"))
+    places = parts.chambers_at(actuator, stops, around, angle), parts.group("usual", numbers, kept)
+    rates = [torque_per_flow(mean, around) if by is None else per_flow(mean, around, *by) for mean in places]
+    return rates[0] / rates[1] if rates[1] > 0.0 else 1.0

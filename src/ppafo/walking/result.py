@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
+from ppafo.parameters.graph import Asked
 from ppafo.signals import Recording
 from ppafo.simulation import at_hand
 from ppafo.simulation.default_gains import loop_parts
 from ppafo.simulation.numbers import changes_in, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
-from ppafo.simulation.torque_loop import Asked
 from ppafo.simulation.tracking import Tracking, tracking_in
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.simulation.tracking.remedies import level_text

@@ -1,6 +1,7 @@
 """Causes of a task that does not follow its reference, most certain first, each with numbers and remedies."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -10,11 +11,11 @@ from ppafo.metrics.metric import followed
 from ppafo.metrics.settled import LARGEST_SHARE
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, error_functions
+from ppafo.parameters.graph import Asked
 from ppafo.simulation.declaration import law_settings
-from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.torque_loop import LEADING
+from ppafo.simulation.torque_loop import LoopParts, quicker_at
 from ppafo.simulation.tracking.case import Case, TrackingCause, only_opens_fully
 from ppafo.simulation.tracking.load_causes import (
     flung_at_start,
@@ -229,14 +230,9 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
 
 
 def _loop_rate(scenario: Scenario, angle: float) -> float:
-    """Loop rate at an angle [rad], divided by the rate for which gains are computed [-].
-
-    It is 1 where the wanted angle is known, because gains are then computed for that angle.
-    """
-    seen = scenario.motion.motion_kind.sees(scenario)
-    if seen.is_locked or seen.profile in LEADING:
-        return 1.0
-    return quicker_at(scenario.device, angle, scenario.controlled)
+    """Loop rate at an angle [rad], divided by the rate for which gains are computed [-]."""
+    parts = LoopParts(scenario.device, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
+    return quicker_at(parts, Asked(partial(number_at, scenario)), angle)
 
 
 def _static_friction(case: Case) -> TrackingCause | None:
