@@ -152,7 +152,7 @@ class Function(NamedTuple):
 
 
 KINDS: Mapping[str, str] = {
-    "object": "parameter_set parent recording result scenario study tuning",
+    "object": "executor parameter_set parent recording result scenario study tuning",
     "overrides": "overrides",
     "name": (
         "baseline bottle columns configuration folder gait method motion path problem profile such_that valve vary"
@@ -199,14 +199,14 @@ ARGUMENTS: Mapping[str, str] = {
     "reproduce": "study:name overrides progress?",
     "scenario_from_dict": "content overrides",
     "sensitivity": (
-        "overrides seed? threads? progress? confidence maximum_failed study method? metrics samples? "
+        "overrides seed? threads? executor? progress? confidence maximum_failed study method? metrics samples? "
         "configuration independent"
     ),
     "simulate": "scenario overrides",
     "simulate_many": "scenarios threads?",
     "start": "scenario overrides",
-    "sweep": "overrides seed? threads? progress? study draws? out? agreed",
-    "tune": "overrides seed? threads? progress? tuning",
+    "sweep": "overrides seed? threads? executor? progress? study draws? out? agreed",
+    "tune": "overrides seed? threads? executor? progress? tuning",
     "validate": (
         "parameter_set:name recordings valve? overrides motion volume? initial thresholds longest_delay "
         "columns? progress?"

@@ -6,11 +6,12 @@ import json
 import os
 import platform
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ppafo.arguments import Count, Overrides, Seed, Threads, Word, checked
+from ppafo.arguments import Count, Executor, Overrides, Seed, Threads, Word, checked
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.wording import said_of_configuration
@@ -37,6 +38,7 @@ def sweep(
     draws: Count | None = None,
     seed: Seed | None = None,
     threads: Threads | None = None,
+    executor: Executor | None = None,
     out: Folder | None = None,
     agreed: Agreed = False,
     plugins: Plugins = (),
@@ -52,7 +54,9 @@ def sweep(
         overrides: values to change, texts or a dictionary as of ``simulate``; of one configuration: 'NAME:PATH=VALUE'
         draws: number of draws in place of the file's
         seed: random seed in place of the file's
-        threads: threads of this process; default: all cores
+        threads: threads of each process; default: all cores
+        executor: an Executor of concurrent.futures, such as a cluster's, or the MODULE:OBJECT of one; default: this
+            process
         out: a folder, where an interrupted study resumes; default: a temporary folder that exists as long as the
             returned object
         agreed: consent to a folder that takes much of the disk
@@ -80,10 +84,12 @@ def sweep(
     from ppafo.storage.files import temporary_folder
     from ppafo.studies.draws import study_of
     from ppafo.studies.study import check_can_be_swept
+    from ppafo.study.executing import computed_by, executor_of
     from ppafo.study.runs import RunCounter
     from ppafo.study.store import claim, compute_chunk, read_manifest, study_folder
     from ppafo.version import __version__
 
+    workers = executor_of(executor)
     chosen = study_of(study, overrides, draws, seed)
     check_can_be_swept(chosen)
     kept = temporary_folder("ppafo-study") if out is None else None
@@ -103,10 +109,15 @@ def sweep(
     # Rows change below: an old summary would pass for a finished study meanwhile.
     if missing:
         (folder.path / SUMMARY).unlink(missing_ok=True)
-    for chunk in missing:
-        failed, content = compute_chunk(chosen, chunk, threads, counter.count_ended)
-        folder.write_chunk(chunk.number, failed, content)
-        counter.add(chunk.runs, failed)
+    work = partial(compute_chunk, chosen, threads=threads)
+    computed: Iterable[tuple[int, tuple[int, bytes]]]
+    if workers is None:
+        computed = enumerate(work(chunk, count=counter.count_ended) for chunk in missing)
+    else:
+        computed = computed_by(workers, work, missing)
+    for number, (failed, content) in computed:
+        folder.write_chunk(missing[number].number, failed, content)
+        counter.add(missing[number].runs, failed)
     line = {
         "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "machine": platform.platform(),
@@ -133,6 +144,7 @@ def sweep_into_folder(
     draws: Count | None = None,
     seed: Seed | None = None,
     threads: Threads | None = None,
+    executor: Executor | None = None,
     agreed: Agreed = False,
     progress: Report | None = None,
 ) -> Finding[StudyResults]:
@@ -161,7 +173,9 @@ def sweep_into_folder(
     # A text stays a text: in a Path, a URL is no longer recognised as one.
     folder = study_folder(out or Path("out") / chosen.name)
     try:
-        swept = sweep(chosen, threads=threads, out=out or folder.path, agreed=agreed, progress=progress)
+        swept = sweep(
+            chosen, threads=threads, executor=executor, out=out or folder.path, agreed=agreed, progress=progress
+        )
         # No file contains the path of the folder, so the same study gives the same bytes anywhere.
         for name, content in {**page_files(swept), "summary.txt": f"{text_of(swept)}\n".encode()}.items():
             folder.write(name, content)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ppafo.arguments import Overrides, Seed, Threads, Word, checked
+from ppafo.arguments import Executor, Overrides, Seed, Threads, Word, checked
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 
@@ -24,6 +24,7 @@ def tune(
     overrides: Overrides = (),
     seed: Seed | None = None,
     threads: Threads | None = None,
+    executor: Executor | None = None,
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Tuned]:
@@ -36,6 +37,8 @@ def tune(
         overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
         seed: random seed; default: the file's
         threads: number of threads; default: all cores
+        executor: an Executor of concurrent.futures, such as a cluster's, or the MODULE:OBJECT of one; default: this
+            process
         plugins: modules of your own, files or names, whose objects files may name
         progress: called with every count of a long computation
 
@@ -54,6 +57,7 @@ def tune(
     from ppafo.analyses.tuning import Problem, load_tuning, solve_tuning
     from ppafo.errors import StudyError
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
+    from ppafo.study.executing import executor_of
 
     if isinstance(tuning, Problem) and overrides:
         raise StudyError("overrides: not allowed with a loaded Problem; give them to load_tuning")
@@ -61,4 +65,4 @@ def tune(
     if seed is not None:
         problem = problem.with_seed(seed)
     warn_of_coarse_pairs([problem.scenario], problem.before)
-    return solve_tuning(problem, threads, progress)
+    return solve_tuning(problem, threads, progress, executor_of(executor))

@@ -7,6 +7,7 @@ violation is better; a candidate with a failed run is worse than all others (Deb
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import resources
@@ -509,7 +510,9 @@ def _uncertain(parsed: TuningFile, folder: Path, searched: Sequence[str], scenar
     }
 
 
-def solve_tuning(problem: Problem, threads: int | None, progress: Report | None) -> Finding[Tuned]:
+def solve_tuning(
+    problem: Problem, threads: int | None, progress: Report | None, executor: Executor | None = None
+) -> Finding[Tuned]:
     """Solve a tuning problem: search for gains, and evaluation of the gains before and after."""
     report, effort, uncertainty = progress or report_nothing, problem.effort, problem.uncertainty
     # As many as are made if no start converges early: the first candidates are a generation of their own, the gains
@@ -518,7 +521,7 @@ def solve_tuning(problem: Problem, threads: int | None, progress: Report | None)
     most = problem.draws * (effort.starts * of_start + 3) + (0 if uncertainty is None else 2 * FRESH_DRAWS)
     counter = RunCounter(most, lambda now: report(replace(now, activity="tuning", is_bound=True)))
     metrics = with_companions([*problem.is_worse_high], problem.scenario)
-    runs = scenario_runs(problem.scenario, metrics, counter, problem.gauge, threads)
+    runs = scenario_runs(problem.scenario, metrics, counter, problem.gauge, threads, executor)
     draws = {} if uncertainty is None else uncertainty.random_columns(0, problem.draws, problem.seed)
     tried = _tried(runs, problem, {path: [value] for path, value in problem.before.items()}, draws)
     scales = {goal.metric: _scale(problem, goal, tried) for goal in problem.goals}

@@ -6,6 +6,7 @@ parameter is its line in the docstring.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent import futures
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -95,6 +96,10 @@ Overrides = Annotated[
     ),
 ]
 Seed = Annotated[int, whole_word(0, "random seed; default: the file's")]
+Executor = Annotated[
+    futures.Executor | str,
+    Word("MODULE:OBJECT", help="workers of concurrent.futures, such as a cluster's; default: this process"),
+]
 Threads = Annotated[int, whole_word(1, "number of threads; default: all cores")]
 Confidence = Annotated[float, fraction_word("confidence of all intervals; default 95%")]
 MaximumFailed = Annotated[

@@ -1,17 +1,21 @@
 """Ensemble runs of a scenario or model over columns of values, with metrics accumulated in one table."""
 
+import math
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from functools import partial
 from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.lanes import Count
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.metrics import metric_kind
 from ppafo.metrics.settled import SUSTAINED, VERDICT_METRICS
 from ppafo.metrics.tracking import ONE_INSTANT
-from ppafo.progress import Progress, Report
+from ppafo.progress import Progress, Report, report_nothing
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
@@ -24,11 +28,14 @@ from ppafo.simulation.tracking.settled import smallest_change
 from ppafo.studies.distributions import Floats
 from ppafo.studies.limits import check_metrics
 from ppafo.study.blocks import runs_at_once
+from ppafo.study.executing import computed_by
 
 Rows = dict[str, NDArray[Any]]
 """Columns of one length: metrics by name [SI], nan if a run lacks the metric; and ``failed``, True for a failed run."""
 Evaluation = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
 """Function from columns of varied values to rows of metrics, and the reason why the first run failed ("" if none)."""
+_BLOCKS, _FEWEST_OF_BLOCK = 64, 256
+"""Number of blocks in which runs are submitted to an executor, and smallest number of runs of a block."""
 FAILED = "failed"
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
 """Largest number of runs between two progress reports: in general, and with a Python controller."""
@@ -74,37 +81,56 @@ class RunCounter:
 class Runs:
     """Runs of one scenario or model: ``run(columns)`` returns their rows.
 
-    ``evaluate`` computes the rows of at most ``at_once`` runs. ``count`` is the number of finished runs, ``failures``
-    the number of runs that diverged or were refused; ``reason`` says why the first of these failed.
+    ``evaluate`` computes the rows of at most ``at_once`` runs, here or on the workers of an ``executor``. ``count`` is
+    the number of finished runs, ``failures`` the number of runs that diverged or were refused; ``reason`` says why the
+    first of these failed.
     """
 
-    def __init__(self, evaluate: Evaluation, metrics: Sequence[str], counter: RunCounter, at_once: int) -> None:
+    def __init__(
+        self,
+        evaluate: Evaluation,
+        metrics: Sequence[str],
+        counter: RunCounter,
+        at_once: int,
+        executor: Executor | None = None,
+    ) -> None:
         self.metrics = tuple(metrics)
         self.count, self.failures, self.reason = 0, 0, ""
-        self._evaluate, self._counter, self._at_once = evaluate, counter, at_once
+        self._evaluate, self._counter, self._at_once, self._executor = evaluate, counter, at_once, executor
 
     def run(self, columns: Mapping[str, Floats]) -> Rows:
         """Run the model with values [SI] by path, each column (runs,), and return the rows of metrics."""
-        runs = len(next(iter(columns.values())))
-        parts = []
         if not self._counter.done:
             # A model may be compiled before the first run ends.
             self._counter.add(0, 0)
-        first, size = 0, min(self._at_once, _FIRST_AT_ONCE)
-        while first < runs:
-            started = time.monotonic()
-            part = {path: values[first : first + size] for path, values in columns.items()}
-            rows, reason = self._evaluate(part)
-            # Numbers that follow the varied ones may take longer than the runs, which no estimate knows.
-            first, rate = first + size, size / max(time.monotonic() - started, 1.0e-6)
-            size = max(1, min(self._at_once, int(_BETWEEN_REPORTS * rate)))
-            parts.append(rows)
-            self.reason = self.reason or reason
-            count, failures = rows[FAILED].size, int(rows[FAILED].sum())
+        runs, parts = len(next(iter(columns.values()))), dict[int, tuple[Rows, str]]()
+        for number, part in self._parts(columns, runs):
+            parts[number] = part
+            count, failures = part[0][FAILED].size, int(part[0][FAILED].sum())
             self.count += count
             self.failures += failures
             self._counter.add(count, failures)
-        return joined(parts)
+        found = [parts[number] for number in sorted(parts)]
+        self.reason = self.reason or next((reason for _, reason in found if reason), "")
+        return joined([rows for rows, _ in found])
+
+    def _parts(self, columns: Mapping[str, Floats], runs: int) -> Iterator[tuple[int, tuple[Rows, str]]]:
+        """Yield the results of parts of the runs, each with a number by which they are in order."""
+        if self._executor is not None:
+            size = min(self._at_once, max(_FEWEST_OF_BLOCK, math.ceil(runs / _BLOCKS)))
+            blocks = [
+                {path: values[first : first + size] for path, values in columns.items()}
+                for first in range(0, runs, size)
+            ]
+            yield from computed_by(self._executor, self._evaluate, blocks)
+            return
+        first, size = 0, min(self._at_once, _FIRST_AT_ONCE)
+        while first < runs:
+            started = time.monotonic()
+            yield first, self._evaluate({path: values[first : first + size] for path, values in columns.items()})
+            # Numbers that follow the varied ones may take longer than the runs, which no estimate knows.
+            first, rate = first + size, size / max(time.monotonic() - started, 1.0e-6)
+            size = max(1, min(self._at_once, int(_BETWEEN_REPORTS * rate)))
 
     def check(self, rows: Rows, maximum_failed: float, subject: str, metrics: Sequence[str] = ()) -> None:
         """Raise StudyError if more than the fraction ``maximum_failed`` of the rows failed or lacks one of the metrics.
@@ -129,6 +155,7 @@ def scenario_runs(
     counter: RunCounter,
     gauge: Collection[str] = (),
     threads: int | None = None,
+    executor: Executor | None = None,
 ) -> Runs:
     """Return the runs of a scenario; StudyError for a metric that does not exist or that the scenario cannot have.
 
@@ -136,18 +163,31 @@ def scenario_runs(
     """
     check_metrics([name for name in metrics if name not in VERDICT_METRICS], scenario)
 
-    def evaluate(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
-        try:
-            result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge, count=counter.count_ended)
-        except ScenarioError as error:  # its message names the scenario
-            raise StudyError(str(error)) from error
-        unknown = np.full(result.status.size, np.nan)
-        values: Rows = {name: result.metrics.get(name, unknown) for name in metrics}
-        reason = result.reasons[min(result.reasons)] if result.reasons else ""
-        return {**values, FAILED: result.status != COMPLETED}, reason
-
+    evaluate = partial(_rows_of, scenario, tuple(metrics), frozenset(gauge), threads)
+    if executor is None:
+        evaluate = partial(evaluate, count=counter.count_ended)
     is_slow = scenario.controller.custom is not None
-    return Runs(evaluate, metrics, counter, _SLOW_AT_ONCE if is_slow else runs_at_once(scenario, _AT_ONCE))
+    at_once = _SLOW_AT_ONCE if is_slow else runs_at_once(scenario, _AT_ONCE)
+    return Runs(evaluate, metrics, counter, at_once, executor)
+
+
+def _rows_of(
+    scenario: Scenario,
+    metrics: Sequence[str],
+    gauge: Collection[str],
+    threads: int | None,
+    columns: Mapping[str, Floats],
+    count: Count = report_nothing,
+) -> tuple[Rows, str]:
+    """Return the rows of runs of a scenario, and the reason why the first run failed."""
+    try:
+        result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge, count=count)
+    except ScenarioError as error:  # its message names the scenario
+        raise StudyError(str(error)) from error
+    unknown = np.full(result.status.size, np.nan)
+    values: Rows = {name: result.metrics.get(name, unknown) for name in metrics}
+    reason = result.reasons[min(result.reasons)] if result.reasons else ""
+    return {**values, FAILED: result.status != COMPLETED}, reason
 
 
 def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:

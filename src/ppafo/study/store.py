@@ -300,7 +300,9 @@ def _check_room(study: Study, folder: StudyFolder, agreed: bool) -> None:
         raise StudyError(f"{size}; give {argument_text('agreed', option='--yes')} to start the study")
 
 
-def compute_chunk(study: Study, part: Chunk, threads: int | None, count: Count = report_nothing) -> tuple[int, bytes]:
+def compute_chunk(
+    study: Study, part: Chunk, threads: int | None = None, count: Count = report_nothing
+) -> tuple[int, bytes]:
     """Compute a chunk; returns the number of its failed runs and its file: a row per run in SI, nan for missing."""
     configuration, outputs = study.configurations[part.configuration], study.outputs
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))

@@ -20,7 +20,7 @@ from ppafo.studies.distributions import (
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import cholesky_factor, permute, uniform_numbers
 from ppafo.studies.study import SamplingPlan
-from ppafo.study.blocks import chunks_of, drawn_values
+from ppafo.study.blocks import drawn_values
 
 SHARES = np.linspace(1e-6, 1.0 - 1e-6, 201)
 METHODS = ("random", "latin_hypercube", "sobol")
@@ -172,14 +172,6 @@ def test_correlations_are_those_of_the_normal_scores(small: Any, method: str) ->
     scores = stats.norm.ppf(np.clip(uniform, 1e-6, 1.0 - 1e-6)), np.log(values["actuator.leak.area"][:20_000])
     assert np.corrcoef(*scores)[0, 1] == pytest.approx(-0.6, abs=0.02)
     assert stats.kstest(uniform, "uniform").pvalue > 1e-4
-
-
-def test_chunks_hold_every_run_once_and_never_two_configurations(small: Any) -> None:
-    study = load_study(small)
-    parts = chunks_of(study)
-    runs = [(part.configuration, run) for part in parts for run in range(part.first, part.first + part.runs)]
-    assert runs == [(configuration, run) for configuration in range(2) for run in range(16)]
-    assert [part.runs for part in parts] == [5, 5, 5, 1, 5, 5, 5, 1]
 
 
 def test_scores_that_follow_from_others_but_for_rounding_have_no_factor() -> None:

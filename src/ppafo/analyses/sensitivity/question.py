@@ -15,7 +15,19 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ppafo.arguments import Confidence, MaximumFailed, Metrics, Name, Overrides, Seed, Threads, Whole, Word, checked
+from ppafo.arguments import (
+    Confidence,
+    Executor,
+    MaximumFailed,
+    Metrics,
+    Name,
+    Overrides,
+    Seed,
+    Threads,
+    Whole,
+    Word,
+    checked,
+)
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.plugins import Plugins, name_plugins
@@ -136,6 +148,7 @@ def sensitivity(
     confidence: Confidence = 0.95,
     maximum_failed: MaximumFailed = 0.02,
     threads: Threads | None = None,
+    executor: Executor | None = None,
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Influences]:
@@ -155,6 +168,8 @@ def sensitivity(
         confidence: confidence of all intervals; default 95%
         maximum_failed: fraction of the runs that may fail before the study is refused; default 2%
         threads: number of threads; default: all cores
+        executor: an Executor of concurrent.futures, such as a cluster's, or the MODULE:OBJECT of one; default: this
+            process
         plugins: modules of your own, files or names, whose objects files may name
         progress: called with every count of a long computation
 
@@ -174,6 +189,7 @@ def sensitivity(
     from ppafo.analyses.sensitivity.methods import METHODS
     from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.draws import drawn_in
+    from ppafo.study.executing import executor_of
     from ppafo.study.runs import RunCounter, scenario_runs, with_companions
 
     if method is not None and method not in METHODS:
@@ -187,7 +203,8 @@ def sensitivity(
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
     tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)
     warn_of_coarse_pairs([base.scenario])
-    runs = scenario_runs(base.scenario, with_companions(requested, base.scenario), tally, used.gauge, threads)
+    companions = with_companions(requested, base.scenario)
+    runs = scenario_runs(base.scenario, companions, tally, used.gauge, threads, executor_of(executor))
     with shown_in(chosen.shown_for(base.scenario)):
         found = analyse(
             runs,

@@ -35,10 +35,6 @@ def test_statistics_are_those_of_numpy(name: str) -> None:
         assert said["quantiles"][f"{share:g}"] == pytest.approx(np.quantile(values, share), rel=1e-9)
 
 
-def test_nothing_has_a_count_only() -> None:
-    assert describe(np.array([]), SHARES) == {"count": 0}
-
-
 def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: StudyResults) -> None:
     whole = small_results.by_configuration("rms_error")
     for most, step in ((1000, 1), (11, 3), (7, 5)):

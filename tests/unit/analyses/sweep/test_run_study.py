@@ -76,12 +76,6 @@ def test_a_row_has_the_estimated_error_of_each_metric_where_the_study_keeps_it(v
     assert all(table["largest_pressure_error"] < 10.0)
 
 
-def test_both_configurations_get_the_same_draws(small_results: StudyResults) -> None:
-    for path in small_results.varied:
-        one, other = small_results.by_configuration(path).values()
-        np.testing.assert_array_equal(one, other)
-
-
 def test_the_folder_opens_as_it_is_with_units_in_the_columns(small_results: StudyResults) -> None:
     import pyarrow.dataset
 
@@ -217,21 +211,6 @@ def test_damaged_chunks_are_found_and_computed_again(
     assert len(done) == 3, "the count at the start, one chunk, and the summary"
     assert done[-1] == 32
     assert contents(out) == contents(small_results.folder.path)
-
-
-def test_a_chunk_in_the_place_of_another_is_found(small_results: StudyResults, small: Any, tmp_path: Path) -> None:
-    out = copied(small_results, tmp_path)
-    (out / "runs" / "chunk-0000002.parquet").write_bytes((out / "runs" / "chunk-0000001.parquet").read_bytes())
-    sweep(small, out=out)
-    assert contents(out) == contents(small_results.folder.path)
-
-
-def test_damage_is_named_where_results_are_read(small_results: StudyResults, tmp_path: Path) -> None:
-    out = copied(small_results, tmp_path)
-    path = out / "runs" / "chunk-0000003.parquet"
-    path.write_bytes(cut(path.read_bytes()))
-    with pytest.raises(DataError, match=r"chunk-0000003\.parquet: is missing or damaged; run the study again"):
-        load_study_results(out).found.table()
 
 
 def copied(results: StudyResults, tmp_path: Path) -> Path:

@@ -84,7 +84,7 @@ def test_json_has_the_summary(study: Path, tmp_path: Path, capsys: pytest.Captur
 def test_an_interruption_says_that_the_command_goes_on(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(*words: object) -> None:
+    def interrupted(*words: object, **more: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(store, "compute_chunk", interrupted)

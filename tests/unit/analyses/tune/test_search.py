@@ -164,12 +164,3 @@ def test_logarithmic_bounds_and_what_lies_at_them() -> None:
         None,
         "maximum",
     )
-
-
-def test_the_gains_that_are_run_are_those_that_are_written() -> None:
-    scenario = load_scenario("torque-task-proportional")
-    place = varied_path("controller.proportional_gain", scenario)
-    trial = problem(searched=(SearchedParameter("controller.proportional_gain", 0.01, 1.0, True, 0.095, place),))
-    gains = trial.gains([0.123456789])
-    line = trial.lines(gains)[0]
-    assert load_scenario("torque-task-proportional", [line]).controller.proportional_gain == gains[place.path]
