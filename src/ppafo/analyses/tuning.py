@@ -40,7 +40,7 @@ from ppafo.simulation.numbers import NOISE_SEED, changes_in, with_numbers
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.simulation.simulate import Result, simulate
 from ppafo.simulation.tracking.shortfall import shortfall
-from ppafo.studies.distributions import Floats, LogUniformBetween, UniformBetween
+from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of
 from ppafo.studies.loading import list_studies, load_study, read_source
@@ -189,8 +189,8 @@ class SearchedParameter:
 
     def value(self, fraction: Floats) -> Floats:
         """Return values of the parameter [SI] at fractions of its range from minimum to maximum."""
-        between = LogUniformBetween if self.is_logarithmic else UniformBetween
-        return between(self.minimum, self.maximum).values(fraction)
+        kind = "log_uniform" if self.is_logarithmic else "uniform"
+        return Distribution(kind, (self.minimum, self.maximum)).values(fraction)
 
     def fraction(self, value: float) -> float:
         """Return the position of a value [SI] in the range, from 0 to 1; below 0 or above 1 beyond the bounds."""

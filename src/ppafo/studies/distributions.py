@@ -1,11 +1,9 @@
-"""Distributions as quantile functions, from probabilities in (0, 1) to values in SI units.
-
-Each class has ``values(uniform)``, which takes and returns an array of any shape.
-"""
+"""Distributions as quantile functions, from probabilities in (0, 1) to values in SI units."""
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,139 +11,69 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-class Distribution(Protocol):
-    """Distribution given by its quantile function."""
-
-    def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
-class UniformBetween:
-    """Uniform distribution between two bounds [SI]."""
+class Distribution:
+    """Distribution of a kind of ``[[vary]]``: the numbers of its quantile function [SI], less a constant ``zero``.
 
-    minimum: float
-    maximum: float
+    A ``zero`` is, for example, the atmospheric pressure of an absolute pressure that is wanted as a gauge pressure.
+    """
 
-    def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability."""
-        return self.minimum + (self.maximum - self.minimum) * uniform
-
-
-@dataclass(frozen=True, slots=True)
-class LogUniformBetween:
-    """Distribution whose logarithm is uniform between two bounds above 0."""
-
-    minimum: float
-    maximum: float
+    kind: str
+    numbers: tuple[Any, ...]
+    zero: float = 0.0
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability."""
-        return self.minimum * np.exp(math.log(self.maximum / self.minimum) * uniform)
+        """Return the quantile [SI] at each probability, an array of any shape."""
+        return np.asarray(_QUANTILES[self.kind](uniform, *self.numbers) - self.zero)
 
 
-@dataclass(frozen=True, slots=True)
-class NormalAround:
-    """Normal distribution with mean and standard deviation [SI]."""
+def _normal(uniform: Floats, mean: float, deviation: float) -> Any:
+    from scipy.special import ndtri
 
-    mean: float
-    standard_deviation: float
-
-    def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability."""
-        from scipy.special import ndtri
-
-        return np.asarray(self.mean + self.standard_deviation * ndtri(uniform))
+    return mean + deviation * ndtri(uniform)
 
 
-@dataclass(frozen=True, slots=True)
-class NormalBetween:
-    """Normal distribution truncated to two bounds [SI]; mean and standard deviation are values before truncation."""
-
-    mean: float
-    standard_deviation: float
-    minimum: float
-    maximum: float
-
-    def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability, computed in the tail with the smaller rounding error."""
-        from scipy.special import ndtr, ndtri
-
-        # Above the mean, 1 - ndtr would cancel: the upper tail is the lower tail of the mirrored distribution.
-        low = (self.minimum - self.mean) / self.standard_deviation
-        high = (self.maximum - self.mean) / self.standard_deviation
-        if low > 0.0:
-            score = -ndtri(ndtr(-low) + (ndtr(-high) - ndtr(-low)) * uniform)
-        else:
-            score = ndtri(ndtr(low) + (ndtr(high) - ndtr(low)) * uniform)
-        return np.asarray(np.clip(self.mean + self.standard_deviation * score, self.minimum, self.maximum))
+def _log_normal(uniform: Floats, median: float, factor: float) -> Any:
+    """Return quantiles around a median with a geometric standard deviation."""
+    return median * np.exp(_normal(uniform, 0.0, math.log(factor)))
 
 
-@dataclass(frozen=True, slots=True)
-class LogNormalAround:
-    """Log-normal distribution given by its median [SI] and its geometric standard deviation."""
+def _truncated_normal(uniform: Floats, mean: float, deviation: float, minimum: float, maximum: float) -> Any:
+    """Return quantiles between two bounds, computed in the tail with the smaller rounding error."""
+    from scipy.special import ndtr, ndtri
 
-    median: float
-    factor: float
-
-    def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability."""
-        from scipy.special import ndtri
-
-        return np.asarray(self.median * np.exp(math.log(self.factor) * ndtri(uniform)))
-
-
-@dataclass(frozen=True, slots=True)
-class ShiftedDistribution:
-    """Another distribution minus a constant ``zero``, such as an absolute pressure minus the atmospheric pressure."""
-
-    other: Distribution
-    zero: float
-
-    def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability."""
-        return self.other.values(uniform) - self.zero
+    # Above the mean, 1 - ndtr would cancel: the upper tail is the lower tail of the mirrored distribution.
+    low, high = (minimum - mean) / deviation, (maximum - mean) / deviation
+    if low > 0.0:
+        score = -ndtri(ndtr(-low) + (ndtr(-high) - ndtr(-low)) * uniform)
+    else:
+        score = ndtri(ndtr(low) + (ndtr(high) - ndtr(low)) * uniform)
+    return np.clip(mean + deviation * score, minimum, maximum)
 
 
-@dataclass(frozen=True, slots=True)
-class TriangularBetween:
-    """Triangular distribution: its density rises linearly to the mode and falls linearly from there."""
-
-    minimum: float
-    mode: float
-    maximum: float
-
-    def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability."""
-        width = self.maximum - self.minimum
-        left = (self.mode - self.minimum) / width
-        rising = self.minimum + np.sqrt(uniform * width * (self.mode - self.minimum))
-        falling = self.maximum - np.sqrt((1.0 - uniform) * width * (self.maximum - self.mode))
-        return np.where(uniform < left, rising, falling)
+def _triangular(uniform: Floats, minimum: float, mode: float, maximum: float) -> Any:
+    width = maximum - minimum
+    left = (mode - minimum) / width
+    rising = minimum + np.sqrt(uniform * width * (mode - minimum))
+    falling = maximum - np.sqrt((1.0 - uniform) * width * (maximum - mode))
+    return np.where(uniform < left, rising, falling)
 
 
-@dataclass(frozen=True, slots=True)
-class OneOf:
-    """Discrete distribution over ``choices`` [SI]; ``cumulated`` are the cumulative weights, ending at 1."""
-
-    choices: tuple[float, ...]
-    cumulated: tuple[float, ...]
-
-    def values(self, uniform: Floats) -> Floats:
-        """Return the quantile [SI] at each probability."""
-        # Without the last weight: rounding may leave the sum just below 1, and a draw above it would have no value.
-        number = np.searchsorted(np.asarray(self.cumulated[:-1]), uniform, side="right")
-        return np.asarray(self.choices)[number]
+def _choice(uniform: Floats, choices: tuple[float, ...], cumulated: tuple[float, ...]) -> Any:
+    """Return one of the choices; ``cumulated`` are the cumulative weights, ending at 1."""
+    # Without the last weight: rounding may leave the sum just below 1, and a draw above it would have no value.
+    return np.asarray(choices)[np.searchsorted(np.asarray(cumulated[:-1]), uniform, side="right")]
 
 
-@dataclass(frozen=True, slots=True)
-class WholeNumbersBetween:
-    """Discrete uniform distribution of integers, ends included."""
-
-    minimum: float
-    maximum: float
-
-    def values(self, uniform: Floats) -> Floats:
-        """Return the quantile, an integer, at each probability."""
-        return np.minimum(np.floor(self.minimum + (self.maximum - self.minimum + 1.0) * uniform), self.maximum)
+_QUANTILES: Mapping[str, Callable[..., Any]] = {
+    "uniform": lambda uniform, low, high: low + (high - low) * uniform,
+    "log_uniform": lambda uniform, low, high: low * np.exp(math.log(high / low) * uniform),
+    "normal": _normal,
+    "truncated_normal": _truncated_normal,
+    "log_normal": _log_normal,
+    "triangular": _triangular,
+    "choice": _choice,
+    # Whole numbers, both ends included.
+    "whole_numbers": lambda uniform, low, high: np.minimum(np.floor(low + (high - low + 1.0) * uniform), high),
+}
+"""Quantile function of each kind, of its probabilities and numbers."""

@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,6 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import changes_in, chosen_path
 from ppafo.studies import declaration as declared
-from ppafo.studies.distributions import ShiftedDistribution
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
 from ppafo.studies.study import (
     NO_SAMPLE,
@@ -308,9 +307,7 @@ def _axis_or_drawn(
                 "give its values"
             )
         stated = distributions.pop()
-        return RandomValue(
-            entry.path, ShiftedDistribution(stated, varied_path.atmosphere) if varied_path.is_gauge else stated
-        )
+        return RandomValue(entry.path, replace(stated, zero=varied_path.atmosphere) if varied_path.is_gauge else stated)
 
 
 def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, VariedPath]) -> dict[str, str]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ppafo.simulation.numbers import NOISE_SEED
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
-from ppafo.studies.distributions import Floats, WholeNumbersBetween
+from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.study import RandomValue, SamplingPlan
 
 Words = NDArray[np.uint64]
@@ -153,7 +153,7 @@ def with_noise(
         is_noisy = is_noisy or bool(np.any(np.asarray(level) > 0.0))
     if NOISE_SEED in paths or not is_noisy:
         return drawn, scores
-    noise = RandomValue(NOISE_SEED, WholeNumbersBetween(0.0, float(LARGEST_SEED)))
+    noise = RandomValue(NOISE_SEED, Distribution("whole_numbers", (0.0, float(LARGEST_SEED))))
     if scores is None:
         return (*drawn, noise), None
     alone = (*(0.0,) * len(drawn), 1.0)

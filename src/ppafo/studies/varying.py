@@ -1,7 +1,7 @@
 """Varied values of a study: paths with units and limits; conversion of ``[[vary]]`` tables to SI."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,18 +18,7 @@ from ppafo.simulation.hardware import parameter_set_of
 from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
-from ppafo.studies.distributions import (
-    Distribution,
-    LogNormalAround,
-    LogUniformBetween,
-    NormalAround,
-    NormalBetween,
-    OneOf,
-    ShiftedDistribution,
-    TriangularBetween,
-    UniformBetween,
-    WholeNumbersBetween,
-)
+from ppafo.studies.distributions import Distribution
 from ppafo.studies.study import Axis, RandomValue
 from ppafo.units import parse_quantity, split_pressure_kind, split_quantity
 from ppafo.units.shown import shown_unit, shown_value
@@ -168,8 +157,9 @@ def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | R
         levels = tuple(_level("values", value, varied) for value in entry.values)
         return Axis(entry.path, _all_whole(entry.path, levels))
     if not isinstance(entry, declared.Grid):
-        return RandomValue(entry.path, _DISTRIBUTIONS[entry.kind](entry, varied))
-    first, last = _key(entry, "first", varied), _key(entry, "last", varied)
+        is_choice = isinstance(entry, declared.Choice)
+        return RandomValue(entry.path, _choice(entry, varied) if is_choice else _distribution(entry, varied))
+    first, last = (_level(key, getattr(entry, key), varied) for key in ("first", "last"))
     if first == last:
         raise UnitError(f"first and last are both {entry.first!r}; they must differ")
     is_logarithmic = entry.spacing == "logarithmic"
@@ -186,47 +176,38 @@ def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: VariedPath) -> Distribution:
-    """Return a log-uniform or log-normal distribution; UnitError if its lower bound or median is not above 0."""
+def _distribution(entry: Any, varied: VariedPath) -> Distribution:
+    """Return the distribution of a ``[[vary]]`` table; UnitError for numbers that do not make one."""
+    is_logarithmic = entry.kind in ("log_uniform", "log_normal")
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
-    absolute = replace(varied, is_gauge=False)
-    distribution: Distribution
-    if isinstance(entry, declared.LogUniform):
-        minimum, maximum = _bounds(entry, absolute)
-        if minimum <= 0.0:
-            raise UnitError(f"minimum = {entry.minimum!r}: must be above 0 for a log-uniform distribution")
-        distribution = LogUniformBetween(minimum, maximum)
-    else:
-        median = _key(entry, "median", absolute)
-        if median <= 0.0:
-            raise UnitError(f"median = {entry.median!r} must be above 0")
-        distribution = LogNormalAround(median, entry.factor)
-    return ShiftedDistribution(distribution, varied.atmosphere) if varied.is_gauge else distribution
+    place = replace(varied, is_gauge=False) if is_logarithmic else varied
+    keys = [key for key in ("mean", "median", "minimum", "mode", "maximum") if hasattr(entry, key)]
+    levels = {key: _level(key, getattr(entry, key), place) for key in keys}
+    said = {key: f"{key} = {getattr(entry, key)!r}" for key in keys}
+    if "minimum" in levels and levels["minimum"] >= levels["maximum"]:
+        raise UnitError(f"{said['minimum']} must be less than {said['maximum']}")
+    if "mode" in levels and not levels["minimum"] <= levels["mode"] <= levels["maximum"]:
+        raise UnitError(f"{said['mode']} must lie between {said['minimum']} and {said['maximum']}")
+    if is_logarithmic and levels[keys[0]] <= 0.0:
+        raise UnitError(f"{said[keys[0]]} must be above 0")
+    numbers = list(levels.values())
+    if "mean" in levels:
+        numbers.insert(1, _deviation(entry, varied))
+    if entry.kind == "log_normal":
+        numbers.append(entry.factor)
+    return Distribution(entry.kind, tuple(numbers), varied.atmosphere if is_logarithmic and varied.is_gauge else 0.0)
 
 
-def _normal(entry: declared.Normal | declared.TruncatedNormal, varied: VariedPath) -> Distribution:
-    """Return a normal distribution, truncated or not."""
-    bounds = _bounds(entry, varied) if isinstance(entry, declared.TruncatedNormal) else None
-    mean, said = _key(entry, "mean", varied), f"standard_deviation = {entry.standard_deviation!r}"
+def _deviation(entry: declared.Normal | declared.TruncatedNormal, varied: VariedPath) -> float:
+    said = f"standard_deviation = {entry.standard_deviation!r}"
     with refused_as(UnitError, said, UnitError):
         deviation = varied.distance(entry.standard_deviation)
     if deviation <= 0.0:
         raise UnitError(f"{said} must be above 0")
-    return NormalAround(mean, deviation) if bounds is None else NormalBetween(mean, deviation, *bounds)
+    return deviation
 
 
-def _triangular(entry: declared.Triangular, varied: VariedPath) -> Distribution:
-    """Return a triangular distribution; UnitError if the mode is not between the bounds."""
-    minimum, maximum = _bounds(entry, varied)
-    mode = _key(entry, "mode", varied)
-    if not minimum <= mode <= maximum:
-        raise UnitError(
-            f"mode = {entry.mode!r} must lie between minimum {entry.minimum!r} and maximum {entry.maximum!r}"
-        )
-    return TriangularBetween(minimum, mode, maximum)
-
-
-def _choice(entry: declared.Choice, varied: VariedPath) -> Distribution:
+def _choice(entry: Any, varied: VariedPath) -> Distribution:
     """Return a discrete distribution; UnitError if the number of weights does not fit the values."""
     values = _all_whole(entry.path, tuple(_level("values", value, varied) for value in entry.values))
     weights = entry.weights or (1.0,) * len(values)
@@ -237,31 +218,7 @@ def _choice(entry: declared.Choice, varied: VariedPath) -> Distribution:
     if min(weights) < 0.0 or math.fsum(weights) <= 0.0:
         raise UnitError(f"weights = {list(weights)} must be at least 0, and not all of them 0")
     fractions = np.cumsum(weights) / np.sum(weights)
-    return OneOf(values, tuple(fractions.tolist()))
-
-
-_DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
-    "uniform": lambda entry, varied: UniformBetween(*_bounds(entry, varied)),
-    "log_uniform": _logarithmic,
-    "normal": _normal,
-    "truncated_normal": _normal,
-    "log_normal": _logarithmic,
-    "triangular": _triangular,
-    "choice": _choice,
-    "whole_numbers": lambda entry, varied: WholeNumbersBetween(*_bounds(entry, varied)),
-}
-"""Builders of distributions by kind; a new kind needs a table in ``declaration`` and a class in ``distributions``."""
-
-
-def _bounds(entry: Any, varied: VariedPath) -> tuple[float, float]:
-    minimum, maximum = _key(entry, "minimum", varied), _key(entry, "maximum", varied)
-    if minimum >= maximum:
-        raise UnitError(f"minimum = {entry.minimum!r} must be less than maximum = {entry.maximum!r}")
-    return minimum, maximum
-
-
-def _key(entry: Any, key: str, varied: VariedPath) -> float:
-    return _level(key, getattr(entry, key), varied)
+    return Distribution(entry.kind, (values, tuple(fractions.tolist())))
 
 
 def _level(key: str, value: str | float, varied: VariedPath) -> float:
@@ -269,7 +226,7 @@ def _level(key: str, value: str | float, varied: VariedPath) -> float:
         return varied.level(value)
 
 
-def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:
+def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[Distribution, str]:
     """Return the stated distribution of a path and its unit in the parameter set; UnitError without an uncertainty."""
     origin, path = scenario.origin, varied.path
     # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
@@ -286,4 +243,4 @@ def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[NormalAround,
         unit = f"{unit[:-2]}_d"
     half_width = varied.distance(f"{entry.uncertainty!r} {unit}".strip())
     mean = entry_in_si(entry, parameters.declarations()[inside], atmospheric_pressure(parameters))
-    return NormalAround(mean, half_width / DEVIATIONS_IN_HALF_WIDTH), entry.unit
+    return Distribution("normal", (mean, half_width / DEVIATIONS_IN_HALF_WIDTH)), entry.unit

@@ -7,16 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.studies.distributions import (
-    Distribution,
-    LogNormalAround,
-    LogUniformBetween,
-    NormalAround,
-    NormalBetween,
-    OneOf,
-    TriangularBetween,
-    UniformBetween,
-)
+from ppafo.studies.distributions import Distribution
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import cholesky_factor, permute, uniform_numbers
 from ppafo.studies.study import SamplingPlan
@@ -29,15 +20,18 @@ METHODS = ("random", "latin_hypercube", "sobol")
 @pytest.mark.parametrize(
     ("distribution", "expected"),
     [
-        (UniformBetween(2.0, 5.0), lambda stats: stats.uniform(2.0, 3.0)),
-        (LogUniformBetween(0.1, 7.0), lambda stats: stats.loguniform(0.1, 7.0)),
-        (NormalAround(-3.0, 0.5), lambda stats: stats.norm(-3.0, 0.5)),
-        (NormalBetween(1.0, 2.0, -0.5, 4.0), lambda stats: stats.truncnorm(-0.75, 1.5, 1.0, 2.0)),
-        (NormalBetween(1.0, 2.0, 15.0, 17.0), lambda stats: stats.truncnorm(7.0, 8.0, 1.0, 2.0)),
-        (NormalBetween(1.0, 2.0, -15.0, -13.0), lambda stats: stats.truncnorm(-8.0, -7.0, 1.0, 2.0)),
-        (LogNormalAround(3.0, 1.3), lambda stats: stats.lognorm(np.log(1.3), scale=3.0)),
-        (TriangularBetween(1.0, 2.0, 5.0), lambda stats: stats.triang(0.25, 1.0, 4.0)),
-        (TriangularBetween(1.0, 5.0, 5.0), lambda stats: stats.triang(1.0, 1.0, 4.0)),
+        (Distribution("uniform", (2.0, 5.0)), lambda stats: stats.uniform(2.0, 3.0)),
+        (Distribution("log_uniform", (0.1, 7.0)), lambda stats: stats.loguniform(0.1, 7.0)),
+        (Distribution("normal", (-3.0, 0.5)), lambda stats: stats.norm(-3.0, 0.5)),
+        (Distribution("truncated_normal", (1.0, 2.0, -0.5, 4.0)), lambda stats: stats.truncnorm(-0.75, 1.5, 1.0, 2.0)),
+        (Distribution("truncated_normal", (1.0, 2.0, 15.0, 17.0)), lambda stats: stats.truncnorm(7.0, 8.0, 1.0, 2.0)),
+        (
+            Distribution("truncated_normal", (1.0, 2.0, -15.0, -13.0)),
+            lambda stats: stats.truncnorm(-8.0, -7.0, 1.0, 2.0),
+        ),
+        (Distribution("log_normal", (3.0, 1.3)), lambda stats: stats.lognorm(np.log(1.3), scale=3.0)),
+        (Distribution("triangular", (1.0, 2.0, 5.0)), lambda stats: stats.triang(0.25, 1.0, 4.0)),
+        (Distribution("triangular", (1.0, 5.0, 5.0)), lambda stats: stats.triang(1.0, 1.0, 4.0)),
     ],
 )
 def test_distributions_are_the_inverses_of_those_of_scipy(
@@ -49,7 +43,7 @@ def test_distributions_are_the_inverses_of_those_of_scipy(
 
 
 def test_a_choice_gives_every_value_its_share() -> None:
-    values = OneOf((7.0, 8.0, 9.0), (0.2, 0.2, 1.0)).values((np.arange(1000) + 0.5) / 1000)
+    values = Distribution("choice", ((7.0, 8.0, 9.0), (0.2, 0.2, 1.0))).values((np.arange(1000) + 0.5) / 1000)
     assert [int(np.count_nonzero(values == item)) for item in (7.0, 8.0, 9.0)] == [200, 0, 800]
 
 

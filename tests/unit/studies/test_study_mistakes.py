@@ -16,7 +16,7 @@ CONTRADICTIONS = [
     ({"kind": "uniform", "minimum": "12 mm^2", "maximum": "10 mm^2"}, "minimum = '12 mm^2' must be less than maximum"),
     (
         {"kind": "log_uniform", "minimum": "0 mm^2", "maximum": "10 mm^2"},
-        "must be above 0 for a log-uniform distribution",
+        "must be above 0",
     ),
     (
         {"kind": "uniform", "minimum": "-1 mm^2", "maximum": "1 mm^2"},

@@ -11,7 +11,7 @@ import pytest
 import ppafo
 from ppafo.analyses.compare import best_probabilities, compare, compare_pairs, pareto_front
 from ppafo.errors import StudyError
-from ppafo.studies.distributions import NormalAround
+from ppafo.studies.distributions import Distribution
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.study import RandomValue
 
@@ -42,7 +42,7 @@ def test_more_is_better_where_the_metric_says_so() -> None:
 
 
 def test_configurations_that_are_equally_good_are_called_different_no_more_often_than_is_said() -> None:
-    normals = Uncertainty(tuple(RandomValue(f"x{number}", NormalAround(0.0, 1.0)) for number in range(6)))
+    normals = Uncertainty(tuple(RandomValue(f"x{number}", Distribution("normal", (0.0, 1.0))) for number in range(6)))
     differs, is_better = [], []
     for seed in range(300):
         drawn = normals.replicated_columns(256, seed)

@@ -11,7 +11,7 @@ import pytest
 from ppafo.analyses.sensitivity.methods import METHODS
 from ppafo.analyses.sensitivity.question import Influences, analyse, sensitivity
 from ppafo.errors import StudyError
-from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
+from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.study import RandomValue
 from tests.model_runs import model_runs
@@ -19,7 +19,9 @@ from tests.model_runs import model_runs
 METRIC = "rms_error"
 A, B = 7.0, 0.1
 Model = Callable[[Mapping[str, Floats]], Mapping[str, Floats]]
-ANGLES = Uncertainty(tuple(RandomValue(name, UniformBetween(-math.pi, math.pi)) for name in ("x1", "x2", "x3")))
+ANGLES = Uncertainty(
+    tuple(RandomValue(name, Distribution("uniform", (-math.pi, math.pi))) for name in ("x1", "x2", "x3"))
+)
 
 
 def analysed(model: Model, uncertainty: Uncertainty, method: str, samples: int, **more: Any) -> Influences:
@@ -128,10 +130,10 @@ def test_the_change_of_ishigami_is_the_known_one_and_its_band_holds(method: str)
 def test_the_change_of_a_linear_function_is_slope_times_distance_of_the_ends_whatever_the_distribution() -> None:
     mixed = Uncertainty(
         (
-            RandomValue("x1", NormalAround(0.0, 2.0)),
-            RandomValue("x2", OneOf((3.0, 4.0), (0.5, 1.0))),
-            RandomValue("x3", OneOf((0.0, 1.0), (0.97, 1.0))),
-            RandomValue("x4", LogNormalAround(1.0, 2.0)),
+            RandomValue("x1", Distribution("normal", (0.0, 2.0))),
+            RandomValue("x2", Distribution("choice", ((3.0, 4.0), (0.5, 1.0)))),
+            RandomValue("x3", Distribution("choice", ((0.0, 1.0), (0.97, 1.0)))),
+            RandomValue("x4", Distribution("log_normal", (1.0, 2.0))),
         )
     )
     model = linear_in({"x1": 1.0, "x2": -5.0, "x3": 2.0, "x4": 1.0})
@@ -144,7 +146,10 @@ def test_the_change_of_a_linear_function_is_slope_times_distance_of_the_ends_wha
 
 def test_a_correlated_value_goes_along_in_the_change() -> None:
     # x2 does nothing by itself; where it is high, x1 is.
-    drawn = (RandomValue("x1", NormalAround(0.0, 1.0)), RandomValue("x2", NormalAround(5.0, 3.0)))
+    drawn = (
+        RandomValue("x1", Distribution("normal", (0.0, 1.0))),
+        RandomValue("x2", Distribution("normal", (5.0, 3.0))),
+    )
     together = Uncertainty(drawn, ((1.0, 0.0), (-0.8, 0.6)))
     found = analysed(linear_in({"x1": 2.0}), together, "shapley", 4096).metrics[0]
     whole = 2.0 * 2.0 * 1.6448536269514722
@@ -174,7 +179,9 @@ def test_shapley_effects_of_correlated_values_are_the_known_ones_and_their_bands
     truth = shapley_of_linear(slopes, correlation * np.outer(sizes, sizes))
     factor = tuple(tuple(row) for row in np.linalg.cholesky(correlation).tolist())
     names = ("x1", "x2", "x3")
-    drawn = tuple(RandomValue(name, NormalAround(3.0, size)) for name, size in zip(names, sizes.tolist(), strict=True))
+    drawn = tuple(
+        RandomValue(name, Distribution("normal", (3.0, size))) for name, size in zip(names, sizes.tolist(), strict=True)
+    )
     model = linear_in(dict(zip(names, slopes.tolist(), strict=True)))
     held = []
     for seed in range(1, 41):

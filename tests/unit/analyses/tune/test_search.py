@@ -18,7 +18,7 @@ from ppafo.analyses.tuning import (
     search,
 )
 from ppafo.simulation.loading import load_scenario
-from ppafo.studies.distributions import Floats, NormalAround
+from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.limits import MetricLimit
 from ppafo.studies.study import RandomValue
@@ -142,7 +142,7 @@ def test_a_run_without_the_metric_counts_as_failed() -> None:
 
 @pytest.mark.parametrize(("share", "deviations"), [(None, 2.0), (0.75, 0.0)])
 def test_candidates_are_judged_by_their_bad_end(share: float | None, deviations: float) -> None:
-    drawn = Uncertainty((RandomValue("x", NormalAround(0.0, 1.0)),))
+    drawn = Uncertainty((RandomValue("x", Distribution("normal", (0.0, 1.0))),))
     given = problem(uncertainty=drawn, draws=5, deviations=deviations, fraction=share)
     values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     goals = (ObjectiveTerm("rms_error", 1.0, None), ObjectiveTerm("gas_supplied", -1.0, None))
