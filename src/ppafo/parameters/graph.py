@@ -7,7 +7,7 @@ here, so that a setting has the same meaning in all of them.
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from math import prod
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -39,10 +39,9 @@ class Asked(dict[str, Any]):
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """Default of a number [SI]: a function of other numbers, or ``factor`` times their product, plus ``gap``.
+    """Default of a number [SI]: a function of the numbers at ``direct``, or ``factor`` times their product, plus gap.
 
     With ``when`` the link acts only if the number at that path is given directly, not if it follows another number.
-    ``groups`` are the first arguments of the function, which ``parts`` computes; ``direct`` are paths of the others.
     Numbers are floats or arrays (runs,).
     """
 
@@ -51,14 +50,11 @@ class Link:
     gap: float = 0.0
     when: str = ""
     factor: float = 1.0
-    groups: tuple[str, ...] = ()
-    parts: "GroupsOf | None" = None
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Paths of all numbers that decide the default; known of groups that were computed before."""
-        reads = () if self.parts is None else (path for name in self.groups for path in self.parts.reads[name])
-        return tuple(dict.fromkeys((*self.direct, *reads)))
+        """Paths of all numbers that decide the default."""
+        return self.direct
 
     @property
     def is_same(self) -> bool:
@@ -66,44 +62,17 @@ class Link:
         return self.function is None and len(self.direct) == 1 and not self.gap and self.factor == 1.0
 
     def number(self, present: Callable[[str], Any], computed: dict[Any, Any] | None = None) -> Any:
-        """Return the default, with sources read by ``present``.
+        """Return the default, with sources read by ``present``; ``computed`` keeps what several links have in common.
 
-        ``computed`` keeps the groups, which are common to several links whose sources have the same numbers.
+        Such links must see the same numbers: a source does not change after its first follower was computed.
         """
-        function, direct = self.function, map(present, self.direct)
-        if function is None:
-            found = prod(direct, start=self.factor)
-        elif self.parts is None:
-            found = over_runs(function, *direct)
-        else:
-            results, combination_of_run = self.parts.combinations(
-                self.groups, present, {} if computed is None else computed
-            )
-            found = over_runs(
-                lambda combination, *others: float(function(*results[int(combination)], *others)),
-                0 if combination_of_run is None else combination_of_run.astype(np.float64),
-                *direct,
-            )
+        found = self.without_gap(present, {} if computed is None else computed)
         return found + self.gap if self.gap else found
 
-
-class GroupsOf(Protocol):
-    """Functions that compute groups of numbers from which several defaults follow, such as the loop of a device."""
-
-    @property
-    def reads(self) -> Mapping[str, tuple[str, ...]]:
-        """Paths of the numbers that decide each group that was computed before."""
-
-    def functions(self, groups: Collection[str], present: Callable[[str], Any]) -> list[PlainFunction]:
-        """Return the functions that compute some groups, in order of calling."""
-
-    def combinations(
-        self, groups: tuple[str, ...], present: Callable[[str], Any], computed: dict[Any, Any]
-    ) -> tuple[list[Any], Any]:
-        """Return groups for each combination of numbers, and the index of the combination of each run.
-
-        ``computed`` keeps them; the index is None if no number is an array (runs,).
-        """
+    def without_gap(self, present: Callable[[str], Any], computed: dict[Any, Any]) -> Any:  # noqa: ARG002
+        """Return the default without its gap."""
+        numbers = map(present, self.direct)
+        return prod(numbers, start=self.factor) if self.function is None else over_runs(self.function, *numbers)
 
 
 def follows(source: str, gap: float = 0.0, when_set: bool = False) -> Link:

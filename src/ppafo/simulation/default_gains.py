@@ -13,7 +13,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import Link
 from ppafo.simulation.nominal import nominal_links
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.torque_loop import LoopParts
+from ppafo.simulation.torque_loop import LoopLink, LoopParts
 
 _OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
     torque_loop.PROPORTIONAL_GAIN: torque_loop.proportional_gain,
@@ -60,7 +60,7 @@ def gain_links(parts: LoopParts, law: ControllerKind) -> dict[str, Link]:
     """Return the links of default gains, by the names of ``control.torque_loop`` and ``angle_loop``."""
 
     def of_groups(rule: Callable[..., float], *groups: str, direct: tuple[str, ...] = ()) -> Link:
-        return Link(direct, rule, groups=groups, parts=parts)
+        return LoopLink(direct, rule, groups=groups, parts=parts)
 
     links = {name: of_groups(rule, "loop") for name, rule in _OF_LOOP.items()}
     if not parts.controls_torque:

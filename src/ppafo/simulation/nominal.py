@@ -6,7 +6,7 @@ from ppafo.model.gas import critical_pressure_ratio
 from ppafo.parameters.device import VANE, Orifice, SonicOrifice
 from ppafo.parameters.graph import Link, follows
 from ppafo.simulation.mean_chambers import MeanChambers
-from ppafo.simulation.torque_loop import LoopParts, conductance_of_area, conductance_of_sonic, product_of
+from ppafo.simulation.torque_loop import LoopLink, LoopParts, conductance_of_area, conductance_of_sonic, product_of
 
 _GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 _GAS_PRODUCT_PATHS = ("gas.molar_mass", "gas.temperature")
@@ -53,7 +53,7 @@ def rest_of(volume: float, growth: float, stops: Range) -> float:
 def nominal_links(parts: LoopParts) -> dict[str, Link]:
     """Return the links of each ``nominal_`` setting, by the names of ``nominal_term``."""
     device = parts.device
-    links = {name: follows(path) for name, path in _SAME_NUMBERS.items()}
+    links: dict[str, Link] = {name: follows(path) for name, path in _SAME_NUMBERS.items()}
     links |= {
         "gas_product": Link(_GAS_PRODUCT_PATHS, product_of),
         "valve_conductance": _conductance("valve", device.valve.orifice),
@@ -72,10 +72,10 @@ def nominal_links(parts: LoopParts) -> dict[str, Link]:
         links |= {name: follows(f"actuator.{name}") for name in names}
     else:
         # By virtual work a chamber grows with the angle as its torque does with the pressure.
-        torque = Link((), torque_per_pressure, groups=("usual",), parts=parts)
+        torque = LoopLink((), torque_per_pressure, groups=("usual",), parts=parts)
         links |= {"torque_constant": torque, "displacement_per_radian": torque}
         links |= {
-            volume.__name__: Link((), volume, groups=("usual", "stops"), parts=parts)
+            volume.__name__: LoopLink((), volume, groups=("usual", "stops"), parts=parts)
             for volume in (dead_volume_1, dead_volume_2)
         }
     return {nominal_term(name): link for name, link in links.items()}

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY, UNIVERSAL_GAS_CONSTANT
 from ppafo.control import angle_loop
@@ -20,13 +21,13 @@ from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
 from ppafo.engine.rows import rebuilt, section_row
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import ACTUATORS, VALVES
-from ppafo.model.columns import first, over_combinations
+from ppafo.model.columns import first, over_combinations, over_runs
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.parameters.device import Device, SonicOrifice
-from ppafo.parameters.graph import Asked
+from ppafo.parameters.graph import Asked, Link
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of, usual_place
@@ -102,30 +103,52 @@ class LoopParts:
         return list(dict.fromkeys(GROUPS[name] for name in kept))
 
     def combinations(
-        self, groups: tuple[str, ...], present: Callable[[str], Any], computed: dict[Any, Any]
-    ) -> tuple[list[Any], Any]:
+        self, groups: tuple[str, ...], present: Callable[[str], Any]
+    ) -> tuple[list[list[Any]], NDArray[np.intp] | None]:
         """Return groups for each combination of numbers, and the index of the combination of each run.
 
-        ``computed`` keeps them; the index is None if no number is an array (runs,).
+        The index is None if no number is an array (runs,).
         """
-        # Sources precede their followers: a number that groups were computed from does not change after it.
-        if (self, groups) not in computed:
-            for name in groups:
-                if name not in self.reads:
-                    self.group(name, Asked(lambda path: first(present(path))), {})
-            settings = {path: first(present(path)) for name in groups for path in self.reads[name]}
-            kept = dict[str, Any]()
-            alone = [self.group(name, settings, kept) for name in groups]
-            varied = [path for path in settings if np.ndim(present(path))]
-            same = {name: group for name, group in kept.items() if not set(varied).intersection(self.reads[name])}
+        for name in groups:
+            if name not in self.reads:
+                self.group(name, Asked(lambda path: first(present(path))), {})
+        settings = {path: first(present(path)) for name in groups for path in self.reads[name]}
+        kept = dict[str, Any]()
+        alone = [self.group(name, settings, kept) for name in groups]
+        varied = [path for path in settings if np.ndim(present(path))]
+        same = {name: group for name, group in kept.items() if not set(varied).intersection(self.reads[name])}
 
-            def of_run(*numbers: float) -> list[Any]:
-                own, of_own = {**settings, **dict(zip(varied, numbers, strict=True))}, dict(same)
-                return [self.group(name, own, of_own) for name in groups]
+        def of_run(*numbers: float) -> list[Any]:
+            own, of_own = {**settings, **dict(zip(varied, numbers, strict=True))}, dict(same)
+            return [self.group(name, own, of_own) for name in groups]
 
-            computed[self, groups] = over_combinations(of_run, *map(present, varied)) if varied else ([alone], None)
-        found: tuple[list[Any], Any] = computed[self, groups]
-        return found
+        return over_combinations(of_run, *map(present, varied)) if varied else ([alone], None)
+
+
+@dataclass(frozen=True, slots=True)
+class LoopLink(Link):
+    """Link to a function whose first arguments are ``groups`` of ``parts``."""
+
+    groups: tuple[str, ...] = ()
+    parts: LoopParts = field(kw_only=True)
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Paths of all numbers that decide the default, known once it was computed."""
+        return tuple(dict.fromkeys((*self.direct, *(path for name in self.groups for path in self.parts.reads[name]))))
+
+    def without_gap(self, present: Callable[[str], Any], computed: dict[Any, Any]) -> Any:
+        """Return the default without its gap; ``computed`` keeps groups for all links to them."""
+        key, function = (self.parts, self.groups), self.function
+        assert function is not None, "groups are arguments of a function"
+        if key not in computed:
+            computed[key] = self.parts.combinations(self.groups, present)
+        results, combination_of_run = computed[key]
+        return over_runs(
+            lambda combination, *others: float(function(*results[int(combination)], *others)),
+            0 if combination_of_run is None else combination_of_run.astype(np.float64),
+            *map(present, self.direct),
+        )
 
 
 def set_device(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:

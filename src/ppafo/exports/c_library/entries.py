@@ -21,6 +21,7 @@ from ppafo.model.declaration import PlainFunction
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Link
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.torque_loop import LoopLink
 
 
 def prepare_entry(
@@ -117,14 +118,14 @@ def follow_entry(
     """
     scenario, values = preparation.scenario, {setting.path: setting.value for setting in settings}
     cells, lines = cells_of(scenario, settings), list[str]()
-    groups = [name for follows in links.values() for link in follows for name in link.groups]
+    of_loop = [link for follows in links.values() for link in follows if isinstance(link, LoopLink)]
     for path, follows in links.items():
-        if follows[0].parts is not None and groups:
+        if of_loop and follows[0] is of_loop[0]:
             # All that defaults of the device have in common, before the first of them.
-            functions = follows[0].parts.functions(groups, partial(number_at, scenario))
-            joined = StepText(preparation.program, collector).joined(functions, follows[0].parts, ["settings"])
+            parts, groups = of_loop[0].parts, [name for link in of_loop for name in link.groups]
+            functions = parts.functions(groups, partial(number_at, scenario))
+            joined = StepText(preparation.program, collector).joined(functions, parts, ["settings"])
             lines += map(_FromSettings(cells).written, joined)
-            groups = []
         name, own = c_identifier(path), cells[path]
         text = own
         # The first link that holds wins, so it is the outermost choice.
@@ -140,7 +141,8 @@ def follow_entry(
 
 def _default(link: Link, cells: Mapping[str, str], collector: SourceCollector) -> str:
     """Return the source of the default that a link gives."""
-    numbers = [*link.groups, *(cells[path] for path in link.direct)]
+    groups = link.groups if isinstance(link, LoopLink) else ()
+    numbers = [*groups, *(cells[path] for path in link.direct)]
     if link.function is None:
         text = " * ".join([*([] if link.factor == 1.0 else [repr(link.factor)]), *numbers])
     else:
