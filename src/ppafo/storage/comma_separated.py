@@ -87,11 +87,7 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
 
 def _column_map_remedy() -> str:
     """Return the remedy, appended to messages, to read columns with other names through a column map."""
-    named = argument_text("columns", "FILE.toml:NAME")
-    return (
-        f"; for other column names use a column map: {named} of validate, or columns = 'NAME' in a problem file of "
-        "identify"
-    )
+    return f"; other names are read through a column map: {argument_text('columns', 'FILE.toml:NAME')}"
 
 
 def is_of_frame(cells: Sequence[str]) -> bool:
@@ -209,9 +205,7 @@ def read_csv(
         text = text_of(content, remedy='; read a Latin-1 file through a column map with encoding = "latin-1"')
         # Whoever writes a table ends its last line: one without an end is a file that was cut off in a number.
         if not text.endswith(("\n", "\r")):
-            raise DataError(
-                "the last line has no line break, so its last number may be cut off; add one if the file is complete"
-            )
+            raise DataError("the last line has no line break, so its last number may be cut off")
         lines = text.splitlines()
         first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
         head = next(islice(lines, first, None), "")
@@ -266,10 +260,7 @@ def recording_of_columns(
     for column, numbers in zip(columns, values, strict=True):
         with noted_in(faults), refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
             if column.si_unit == PLAIN_NUMBER and column.unit.removeprefix("m") in ("V", "A"):
-                raise UnitError(
-                    f"'{column.name}' is dimensionless; give factor in a column map (0.1 if 10 {column.unit} "
-                    "corresponds to 1)"
-                )
+                raise UnitError(f"'{column.name}' is dimensionless; give factor in a column map")
             series.append(in_si(column, numbers, atmosphere))
     raise_noted(faults)
     time = counted_on(series[0])

@@ -17,7 +17,6 @@ from ppafo.storage.clock import clock_seconds, counted_on
 from ppafo.storage.column_map import ColumnMap, MappedChannel, MappedDirection, MappedTable, check_sources, in_map
 from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si
 from ppafo.storage.files import read_bytes
-from ppafo.storage.frames import remedy_for
 from ppafo.storage.mapped_text import read_mapped_text
 from ppafo.storage.matlab import MATLAB_SUFFIX, read_mapped_matlab, read_matlab
 from ppafo.wording import one_line
@@ -65,8 +64,6 @@ def read_trials(
     # Both name the file themselves where it cannot be read.
     content = read_matlab(path) if suffix == MATLAB_SUFFIX else read_bytes(path)
     with refused_as(DataError, path, DataError):
-        if remedy_for(path):
-            raise DataError(f"is not a text table{remedy_for(path)}")
         if suffix == ".nc":
             raise DataError("is a NetCDF file, which names its own channels and units: read it without a column map")
         with in_map(map_name):

@@ -17,44 +17,6 @@ from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, recording_kin
 from ppafo.storage.comma_separated import parse_header, recording_of_columns
 from ppafo.wording import one_line
 
-TABLE_READERS = {
-    **dict.fromkeys((".xlsx", ".xls", ".ods"), "pandas.read_excel({path!r})"),
-    ".json": "pandas.read_json({path!r})",
-    ".feather": "pandas.read_feather({path!r})",
-    # Items come in the order of their names, and a CSV file begins with its time.
-    **dict.fromkeys(
-        (".h5", ".hdf5"),
-        "pandas.DataFrame({{name: column[()] for name, column in "
-        "sorted(h5py.File({path!r})['/'].items(), key=lambda item: 'time' not in item[0])}})",
-    ),
-    ".pkl": "pandas.read_pickle({path!r})",
-    ".npz": "pandas.DataFrame(dict(numpy.load({path!r})))",
-    ".tdms": "nptdms.TdmsFile({path!r}).groups()[0].as_dataframe()",
-}
-"""Call that reads a table into pandas, by file suffix; of an HDF5 file that h5py or a logger wrote."""
-_STORE_OF_PANDAS = b"pandas_type"
-"""Attribute in each HDF5 file that pandas wrote, which reads its own layout alone."""
-
-
-def remedy_for(path: str | Path) -> str:
-    """Return the remedy, appended to messages, to read another format with pandas; empty for unknown suffixes."""
-    advice = written_as_csv(path)
-    # The same advice, behind the one to do without a file.
-    return f"; in Python pass the table itself, {_call_for(path)}, or{advice[1:]}" if advice else ""
-
-
-def written_as_csv(path: str | Path) -> str:
-    """Return the remedy, appended to messages, to convert another format to CSV; empty for unknown suffixes."""
-    table = _call_for(path)
-    return f"; write it as CSV: {table}.to_csv({f'{path}.csv'!r}, index=False)" if table else ""
-
-
-def _call_for(path: str | Path) -> str:
-    call = TABLE_READERS.get(Path(path).suffix.lower(), "")
-    if "h5py" in call and Path(path).is_file() and _STORE_OF_PANDAS in Path(path).read_bytes():
-        call = "pandas.read_hdf({path!r})"
-    return call.format(path=str(path))
-
 
 def recording_of_frame(frame: Any, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
     """Return the recording in a pandas DataFrame or an xarray Dataset, in SI units; its attributes name title and kind.

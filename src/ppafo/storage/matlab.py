@@ -3,7 +3,7 @@
 A field of a structure is named ``a.b``, a field in an array of structures ``a(2).b``, a column of a matrix ``M(:,3)``
 and a row ``M(3,:)``. In a structure with ``data`` and ``colheaders``, as made by ``importdata``, each column is also
 available under its label. The format of objects (timeseries, timetable, table, datetime) is not published; messages
-name them together with the MATLAB code that saves them as plain arrays.
+name them.
 """
 
 import re
@@ -63,23 +63,8 @@ class _MatlabFile:
 
     def advice_on_objects(self) -> str:
         """Return the remedy, appended to messages, to save objects as arrays; empty without objects."""
-        advice = ""
-        for name, kind in self.objects:
-            save = _PLAIN.get(kind, "t = ts.Time; y = ts.Data; save plain.mat t y").format(name=name)
-            title = f"{name}{f' ({kind})' * bool(kind)}"
-            advice += f"; {title} is an object that only MATLAB reads; in MATLAB, save plain arrays, such as {save}"
-        return advice
-
-
-_OF_TABLE = "s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')"
-_PLAIN = {
-    "timeseries": "t = {name}.Time; y = squeeze({name}.Data); save('plain.mat', 't', 'y')",
-    "table": f"T = {{name}}; {_OF_TABLE}",
-    "timetable": f"T = timetable2table({{name}}); T.(1) = seconds(T.(1) - T.(1)(1)); {_OF_TABLE}",
-    "datetime": "t = seconds({name} - {name}(1)); save('plain.mat', 't')",
-    "duration": "t = seconds({name}); save('plain.mat', 't')",
-}
-"""MATLAB code by class of an object, which saves its numbers as plain arrays and its times in seconds."""
+        named = ", ".join(f"{name}{f' ({kind})' * bool(kind)}" for name, kind in self.objects)
+        return f"; only MATLAB reads the objects {named}: save their numbers there as plain arrays" if named else ""
 
 
 def read_matlab(path: str | Path) -> _MatlabFile:

@@ -18,7 +18,7 @@ from ppafo.signals import Channel, Recording, recording_kind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import read_bytes
 from ppafo.storage.netcdf import BETWEEN, PLAIN_NUMBER_IN_NETCDF
-from ppafo.wording import count_of, one_line
+from ppafo.wording import one_line
 
 _DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowError, MemoryError)
 """Exceptions that h5py raises for a truncated or damaged file."""
@@ -112,15 +112,11 @@ def _check_is_whole(name: str, variable: Any) -> None:
     size, chunks = variable.size, variable.chunks
     if chunks is None:
         if variable.id.get_storage_size() < size * variable.dtype.itemsize:
-            raise DataError(
-                f"'{name}' should have {size} values, but the file contains none of them: write the file again"
-            )
+            raise DataError(f"'{name}' should have {size} values, but the file contains none of them")
         return
     chunk_count = variable.id.get_num_chunks()
     if chunk_count < math.ceil(size / chunks[0]):
-        raise DataError(
-            f"'{name}' should have {size} values, but the file contains only some of them: write the file again"
-        )
+        raise DataError(f"'{name}' should have {size} values, but the file contains only some of them")
     allowed_bytes = chunks[0] * variable.dtype.itemsize + _CHECKSUM_BYTES
     for number in range(chunk_count):
         chunk = variable.id.get_chunk_info(number)
@@ -132,9 +128,7 @@ def _check_is_whole(name: str, variable: Any) -> None:
             with contextlib.suppress(zlib.error):
                 content = zlib.decompressobj().decompress(compressed, allowed_bytes + 1)
         if len(content) > allowed_bytes or chunk.size > 2 * allowed_bytes:
-            raise DataError(
-                f"'{name}' decompresses to more than its stated size: the file is damaged; write the file again"
-            )
+            raise DataError(f"'{name}' decompresses to more than its stated size: the file is damaged")
 
 
 def _channel(name: str, variable: Any) -> Channel:
@@ -145,25 +139,18 @@ def _channel(name: str, variable: Any) -> Channel:
     values = np.asarray(variable[:], dtype=np.float64)
     for key in _GAPS:
         if key in variable.attrs and np.isin(values, np.asarray(variable.attrs[key], dtype=np.float64)).any():
-            raise DataError(
-                f"'{name}' has missing values (attribute '{key}'); fill the gaps, or write only samples without gaps"
-            )
+            raise DataError(f"'{name}' has missing values (attribute '{key}')")
     for key, wanted in _LIMITS.items():
         if key in variable.attrs:
             limits = np.atleast_1d(np.asarray(variable.attrs[key], dtype=np.float64))
             if limits.size != wanted:
-                raise DataError(
-                    f"'{name}': attribute '{key}' must have {count_of(wanted, 'number')}, not {limits.size}"
-                )
+                raise DataError(f"'{name}': attribute '{key}' must have {wanted} numbers, not {limits.size}")
             is_below = (values < limits[0]) & (key != "valid_max")
             is_above = (values > limits[-1]) & (key != "valid_min")
             rows = np.flatnonzero(is_below | is_above)
             if rows.size:
                 first = int(rows[0])
-                raise DataError(
-                    f"'{name}' has {count_of(rows.size, 'value')} outside its '{key}', the first {values[first]:g} at "
-                    f"row {first + 1}; correct the numbers, cut the file there, or correct the attribute"
-                )
+                raise DataError(f"'{name}' is {values[first]:g} at row {first + 1}, outside its '{key}'")
     # The channel itself refuses a word that it does not know.
     between: Any = _attribute(variable, BETWEEN) or None
     unit = _attribute(variable, "units")

@@ -97,11 +97,8 @@ def read_recording(
         )
     if not file.exists():
         raise DataError(f"{file}: no such file or folder")
-    from ppafo.storage.frames import remedy_for
-
-    named = argument_text("columns", "FILE.toml:NAME")
-    other = f"; read a text table with another suffix through a column map, {named}"
     raise DataError(
-        f"{file}: must be a result folder or a .nc, .parquet, {', '.join(TEXT_SUFFIXES[:-1])} or "
-        f"{TEXT_SUFFIXES[-1]} file{remedy_for(file) or other}"
+        f"{file}: must be a result folder or a .nc, .parquet, {', '.join(TEXT_SUFFIXES)} or (through a column map, "
+        f"{argument_text('columns', 'FILE.toml:NAME')}) other text file; another table is read as a pandas DataFrame, "
+        "or written as CSV"
     )

@@ -116,11 +116,7 @@ def read_stored(folder: str | Path) -> StoredResult:
     if not folder_path.is_dir():
         raise DataError(f"{folder}: is not a folder")
     if not (folder_path / RUN_FILE).is_file() and (folder_path / MARK).is_file():
-        command = marking_command(folder_path)
-        raise DataError(
-            f"{folder}: is a result of 'ppafo {command}', not of a run; use its JSON file for numbers, read_recording "
-            "for a recording in it, and 'ppafo export figure' for its figures"
-        )
+        raise DataError(f"{folder}: is a result of 'ppafo {marking_command(folder_path)}', not of a run")
     if not (folder_path / RUN_FILE).is_file() and (folder_path / MANIFEST).is_file():
         raise DataError(f"{folder}: contains the results of a study, not of a run; read them by load_study_results")
     document = read_document(folder_path)
@@ -140,15 +136,9 @@ def read_document(folder: str | Path) -> dict[str, Any]:
         raise DataError(f"{path}: does not belong to a ppafo result ('format' is not '{FORMAT}')")
     if document.get("schema_version") is True or document.get("schema_version") != SCHEMA_VERSION:
         version = document.get("schema_version")
-        raise DataError(
-            f"{path}: has schema_version {version!r}, this version of ppafo reads {SCHEMA_VERSION}; run the command "
-            "that wrote this result again"
-        )
+        raise DataError(f"{path}: has schema_version {version!r}, this version of ppafo reads {SCHEMA_VERSION}")
     if not isinstance(document.get("recording"), dict) or not isinstance(document.get("files"), list):
-        raise DataError(
-            f"{path}: 'recording' must be a JSON object and 'files' a JSON list; run the command that wrote this "
-            "result again"
-        )
+        raise DataError(f"{path}: 'recording' must be a JSON object and 'files' a JSON list")
     return document
 
 
@@ -167,10 +157,7 @@ def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
                 or not isinstance(stated, list)
                 or not all(type(name) is str for name in stated)
             ):
-                raise DataError(
-                    f"{folder / name}: 'files' must be a JSON list of names and '{HASHES}' a JSON object; run the "
-                    "command that wrote this result again"
-                )
+                raise DataError(f"{folder / name}: 'files' must be a JSON list of names, '{HASHES}' a JSON object")
             document[HASHES] = dict(sorted({**hashes, **hashes_of(contents)}.items()))
             document["files"] = sorted({*stated, *contents})
             marks[name] = f"{json_text(document)}\n".encode()

@@ -95,7 +95,7 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
             "line 3 is blank, and rows follow; remove the line, or add its 2 values",
         ),
         ("angle [rad],time [s]\n0,1\n", "the first column must be 'time \\[s\\]', not 'angle'"),
-        ("Zeit [s],angle [rad]\n0,1\n", "not 'Zeit'; for other column names use a column map"),
+        ("Zeit [s],angle [rad]\n0,1\n", "not 'Zeit'; other names are read through a column map"),
         ("time [s],angle [rad],angle [deg]\n0,1,1\n", "the column 'angle' occurs twice"),
         ("time [s],angle [m]\n0,1\n", "column 'angle \\[m\\]': unit 'm' does not fit: an angle is needed"),
         ("time [s],pressure_1 [psi]\n0,1\n", "column 'pressure_1 \\[psi\\]': 'psi' needs the kind of pressure"),

@@ -1,6 +1,5 @@
 """Recordings in tables of other libraries: DataFrame, Dataset, Parquet, and how other formats are answered."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -68,34 +67,6 @@ def test_what_a_result_gives_pandas_and_xarray_comes_back_to_the_bit(tmp_path: P
 def test_a_table_that_is_no_recording_is_refused_in_one_line(table: object, message: str) -> None:
     with pytest.raises(DataError, match=message):
         read_recording(table())  # type: ignore[operator]
-
-
-def _with_h5py(path: str) -> None:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
-        for name, values in frame().items():
-            file[name] = values.to_numpy()
-
-
-WRITERS = {
-    ".json": lambda path: frame().to_json(path),
-    ".feather": lambda path: frame().to_feather(path),
-    ".npz": lambda path: np.savez(path, **{name: values.to_numpy() for name, values in frame().items()}),
-    ".h5": _with_h5py,
-    ".pkl": lambda path: frame().to_pickle(path),
-}
-
-
-@pytest.mark.parametrize("suffix", WRITERS)
-def test_the_line_that_a_refusal_gives_writes_the_file_as_csv(suffix: str, tmp_path: Path) -> None:
-    path = str(tmp_path / f"decay{suffix}")
-    WRITERS[suffix](path)
-    with pytest.raises(DataError, match="write it as CSV") as refused:
-        read_recording(path)
-    line = str(refused.value).split("write it as CSV: ")[1]
-    modules = {name: sys.modules.get(name) for name in ("pandas", "numpy", "h5py")}
-    exec(line, modules)  # the line that a person is told to run
-    assert read_recording(f"{path}.csv")["pressure_1"] == pytest.approx(101_325.0 + 1.0e5 * FALL)
 
 
 def a_recording() -> Recording:

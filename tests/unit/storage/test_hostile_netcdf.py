@@ -217,7 +217,7 @@ def test_values_outside_the_valid_ones_of_the_file_are_refused(
         file["angle"] = np.arange(3.0)
         file["angle"].attrs["units"] = "rad"
         file["angle"].attrs[key] = limits
-    message = rf"'angle' has 1 value outside its '{key}', the first {first:g} at row {first + 1:g}; "
+    message = rf"'angle' is {first:g} at row {first + 1:g}, outside its '{key}'"
     with pytest.raises(DataError, match=message):
         read_netcdf(tmp_path / "bench.nc")
     with h5py.File(tmp_path / "bench.nc", "a") as file:

@@ -158,7 +158,7 @@ def test_a_recording_that_changed_on_disk_is_refused_before_it_is_opened(tmp_pat
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.xlsx").write_bytes(b"")
-    with pytest.raises(DataError, match=r"must be a result folder or a \.nc, \.parquet, \.csv, .* or \.asc file"):
+    with pytest.raises(DataError, match=r"must be a result folder or a \.nc, \.parquet, \.csv, "):
         read_recording(tmp_path / "a.xlsx")
     with pytest.raises(DataError, match=r"nothing: no such file or folder"):
         read_recording(tmp_path / "nothing")

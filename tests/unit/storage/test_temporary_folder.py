@@ -10,14 +10,14 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.exports.fmu import platforms
-from ppafo.page import module
+from ppafo.page import workbench
 from ppafo.processor.simulated import try_firmware
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage.files import temporary_folder
 
 BUILDERS: dict[str, Callable[[], object]] = {
     "unit": lambda: platforms.build("linux64", {"unit.c": b"int"}, "unit.c"),
-    "page": lambda: module.built({"module.c": b"int"}),
+    "page": lambda: workbench.built({"module.c": b"int"}),
     "firmware": lambda: try_firmware(load_scenario("torque-task-solenoid"), 1),
     "study": lambda: temporary_folder("ppafo-study", {"a/b": b"x"}),
 }

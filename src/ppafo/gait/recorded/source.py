@@ -30,7 +30,6 @@ from ppafo.gait.recorded.table import (
 from ppafo.gait.recorded.walk import walk_signals
 from ppafo.kinds import Kinds
 from ppafo.plugins import nearest_kind
-from ppafo.storage.frames import written_as_csv
 from ppafo.units import format_quantity
 from ppafo.wording import one_line
 
@@ -75,7 +74,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
         if suffix in form.suffixes and form.recognises(path):
             return form
     *others, last = dict.fromkeys(suffix for form in FORMS.loaded().values() for suffix in form.suffixes)
-    raise DataError(f"{path}: is not a {', '.join(others)} or {last} file{written_as_csv(path)}")
+    raise DataError(f"{path}: is not a {', '.join(others)} or {last} file")
 
 
 def read_table(

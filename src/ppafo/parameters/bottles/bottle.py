@@ -22,7 +22,7 @@ from ppafo.model.source import (
     pressure_reserve,
 )
 from ppafo.parameters.bottles.declaration import FILLS, PATHS, REQUIRED, WARMING, declared
-from ppafo.parameters.bottles.fluid import Fluid, check_temperature, filled_mass, filling_text, load_fluid
+from ppafo.parameters.bottles.fluid import Fluid, check_temperature, filled_mass, load_fluid
 from ppafo.parameters.declared import check_keys, value_at
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.parameters.parameter_set import SOURCE, Entry, allowed_number, number_entry
@@ -93,9 +93,9 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     changes = override_set(read_overrides(overrides), forms=FILLS)
     for path, override in changes.items():
         if path not in PATHS:
-            is_gas = "gas" in path.split(".")
-            of_file = "; choose the gas by the name or file of the bottle" if is_gas else nearest_name(path, PATHS)
-            raise ParameterError(f"override '{override}': a bottle has no parameter '{path}'{of_file}")
+            raise ParameterError(
+                f"override '{override}': a bottle has no parameter '{path}'{nearest_name(path, PATHS)}"
+            )
         with refused_as(ParameterError, f"override '{override}'", UnitError):
             value, unit = split_quantity(override.text)
         # A new form of the filling replaces the old one: two forms would contradict each other.
@@ -132,11 +132,7 @@ def _build(parsed: Mapping[str, Any], entries: Mapping[str, Entry], file: str) -
             values[path] = allowed_number(assignment, entry, PATHS[path])
     missing = [path for path in REQUIRED if path not in entries]
     if missing:
-        has_mass_alone = "bottle.volume" in missing and "bottle.gas_mass" in values
-        filling = filling_text(fluid, values["bottle.gas_mass"]) if has_mass_alone else ""
-        source = " --from co2-16g" if fluid.name == "CO2" else ""
-        remedy = f"'ppafo new bottle NAME{source}' writes a file with all of them"
-        wrong.append(ParameterError(f"{file}: {said_missing(missing)}{filling}; {remedy}"))
+        wrong.append(ParameterError(f"{file}: {said_missing(missing)}"))
     raise_noted(wrong)
     bottle = Bottle(
         name=parsed["name"],
@@ -171,12 +167,10 @@ def _check_content(bottle: Bottle, file: str) -> None:
     largest_mass = bottle.volume * (liquid_density if is_wet else densest_gas)(fluid.table, temperature)
     if bottle.mass >= largest_mass:
         volume = bottle.entries["bottle.volume"]
-        fill = "bottle.gas_mass" if "bottle.gas_mass" in bottle.entries else "bottle.fill_pressure"
-        limit = "liquid fills the bottle at" if is_wet else "the property table ends at"
         raise ParameterError(
-            f"{file}: {GRAMS_PER_KILOGRAM * bottle.mass:.4g} g of {fluid.name} do not fit into "
-            f"{format_quantity(volume.value, volume.unit)} at {temperature:g} K: {limit} "
-            f"{GRAMS_PER_KILOGRAM * largest_mass:.4g} g; set {fill} or room.temperature lower, or bottle.volume higher"
+            f"{file}: {GRAMS_PER_KILOGRAM * bottle.mass:.4g} g of {fluid.name} do not fit into bottle.volume = "
+            f"{format_quantity(volume.value, volume.unit)} at {temperature:g} K, but "
+            f"{GRAMS_PER_KILOGRAM * largest_mass:.4g} g"
         )
     content = bottle_content(fluid.table, bottle.mass, bottle.volume, temperature)
     if pressure_reserve(bottle.regulator, content.pressure, 0.0) <= 0.0:

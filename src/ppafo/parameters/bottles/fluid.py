@@ -19,8 +19,6 @@ from ppafo.wording import known_names, said_missing
 
 _TABLES = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"
-_LARGEST_FILLING = {"CO2": 680.0}
-"""Largest filling density of a liquefied gas [kg/m^3] by transport rules (49 CFR 173.304a, 68 % of the water mass)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,17 +65,6 @@ def check_temperature(path: str, temperature: float, fluid: Fluid, file: str) ->
         )
 
 
-def filling_text(fluid: Fluid, mass: float | None = None, volume: float = 0.0) -> str:
-    """Format, for a message, the largest gas mass in a volume [m^3], or the smallest volume for a mass [kg]."""
-    density = _LARGEST_FILLING.get(fluid.name)
-    if density is None:
-        return ""
-    found = "bottle.gas_mass", f"{1.0e3 * density * volume:.3g} g"
-    if mass is not None:
-        found = "bottle.volume", f"{1.0e6 * mass / density:.3g} cm^3"
-    return f"; at the largest filling with {fluid.name}, {density:g} g/L (49 CFR 173.304a), {found[0]} is {found[1]}"
-
-
 def filled_mass(values: Mapping[str, float], entries: Mapping[str, Entry], fluid: Fluid, file: str) -> float:
     """Return the mass of gas in a full bottle [kg], stated directly or by pressure and temperature.
 
@@ -88,8 +75,7 @@ def filled_mass(values: Mapping[str, float], entries: Mapping[str, Entry], fluid
     given = [path for path in by_pressure if path in values]
     # Exactly one form: by mass, or by pressure and temperature.
     if ("bottle.gas_mass" in values) == bool(given):
-        filling = "" if given else filling_text(fluid, volume=values["bottle.volume"])
-        raise ParameterError(f"{file}: give either bottle.gas_mass or {' and '.join(by_pressure)}{filling}")
+        raise ParameterError(f"{file}: give either bottle.gas_mass or {' and '.join(by_pressure)}")
     if not given:
         return values["bottle.gas_mass"]
     missing = [path for path in by_pressure if path not in values]

@@ -53,9 +53,8 @@ def test_a_value_is_replaced_and_a_pressure_replaces_a_mass() -> None:
         ("bottle.volume=0 L", "must be at least"),
         (
             "bottle.volume=300 cm^3",
-            "255 g of CO2 do not fit into 300 cm^3 at 298 K: liquid fills the bottle at 213.8 g",
+            "255 g of CO2 do not fit into bottle.volume = 300 cm^3 at 298 K, but 213.8 g",
         ),
-        ("bottle.volume=0.3 L", "g; set bottle.gas_mass or room.temperature lower, or bottle.volume higher"),
         ("room.temperature=40 degC", "must be above 216.592 K and at most 303.9 K"),
         ("regulator.set_pressure=70 bar_g", "the regulator needs 7"),
         ("regulator.set_pressure=50 psi", "needs the kind of pressure"),
