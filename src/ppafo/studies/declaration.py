@@ -27,8 +27,6 @@ DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
 _Values = Annotated[tuple[_Value, ...], Field(strict=False, min_length=1)]
-_Path = Annotated[Text, Field(description="what is varied: a path as for --set, such as 'supply.pressure'")]
-_Only = Annotated[Texts, Field(description="names of the configurations in which it varies; default: all")]
 
 
 class ConfigurationSection(StrictTable):
@@ -39,125 +37,103 @@ class ConfigurationSection(StrictTable):
     overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
 
 
-class Grid(StrictTable):
+class _Varying(StrictTable):
+    path: Annotated[Text, Field(description="what is varied: a path as for --set, such as 'supply.pressure'")]
+    only: Annotated[Texts, Field(description="names of the configurations in which it varies; default: all")] = ()
+
+
+class _Bounded(_Varying):
+    minimum: _Value
+    maximum: _Value
+
+
+class Grid(_Varying):
     """Grid of values of a path, equally spaced on a linear or logarithmic scale, ends included."""
 
-    path: _Path
     kind: Literal["grid"]
     first: _Value
     last: _Value
     count: Annotated[int, Field(ge=2, le=MAXIMUM_GRID_VALUES, description="number of values")]
     spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
-    only: _Only = ()
 
 
-class Listed(StrictTable):
+class Listed(_Varying):
     """Explicit list of values of a path; combined with every value of all other lists and grids."""
 
-    path: _Path
     kind: Literal["list"]
     values: _Values
-    only: _Only = ()
 
 
-class Uniform(StrictTable):
+class Uniform(_Bounded):
     """Uniform distribution of a varied path between two bounds."""
 
-    path: _Path
     kind: Literal["uniform"]
-    minimum: _Value
-    maximum: _Value
-    only: _Only = ()
 
 
-class LogUniform(StrictTable):
+class LogUniform(_Bounded):
     """Distribution whose logarithm is uniform between the logarithms of two bounds above 0."""
 
-    path: _Path
     kind: Literal["log_uniform"]
-    minimum: _Value
-    maximum: _Value
-    only: _Only = ()
 
 
-class Normal(StrictTable):
+class Normal(_Varying):
     """Normal distribution of a varied path, given by mean and standard deviation."""
 
-    path: _Path
     kind: Literal["normal"]
     mean: _Value
     standard_deviation: _Value
-    only: _Only = ()
 
 
-class TruncatedNormal(StrictTable):
+class TruncatedNormal(_Bounded):
     """Normal distribution truncated to two bounds; mean and standard deviation are the values before truncation."""
 
-    path: _Path
     kind: Literal["truncated_normal"]
     mean: _Value
     standard_deviation: _Value
-    minimum: _Value
-    maximum: _Value
-    only: _Only = ()
 
 
-class LogNormal(StrictTable):
+class LogNormal(_Varying):
     """Log-normal distribution given by its median and its geometric standard deviation."""
 
-    path: _Path
     kind: Literal["log_normal"]
     median: _Value
     factor: Annotated[float, Field(gt=1.0, description="geometric standard deviation, above 1")]
-    only: _Only = ()
 
 
-class Triangular(StrictTable):
+class Triangular(_Bounded):
     """Triangular distribution: its density rises linearly to the mode and falls linearly from there."""
 
-    path: _Path
     kind: Literal["triangular"]
-    minimum: _Value
     mode: _Value
-    maximum: _Value
-    only: _Only = ()
 
 
-class Choice(StrictTable):
+class Choice(_Varying):
     """Discrete distribution: values with weights, equal by default."""
 
-    path: _Path
     kind: Literal["choice"]
     values: _Values
     weights: Annotated[tuple[float, ...], Field(strict=False, description="one weight for each value")] = ()
-    only: _Only = ()
 
 
-class WholeNumbers(StrictTable):
+class WholeNumbers(_Varying):
     """Discrete uniform distribution of integers, bounds included; used for random seeds of sensor noise."""
 
-    path: _Path
     kind: Literal["whole_numbers"]
     minimum: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
     maximum: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = LARGEST_SEED
-    only: _Only = ()
 
 
-class Stated(StrictTable):
+class Stated(_Varying):
     """Normal distribution from the parameter set's uncertainty; a 95 % half width is 1.96 standard deviations."""
 
-    path: _Path
     kind: Literal["stated"]
-    only: _Only = ()
 
 
-class SameAs(StrictTable):
+class SameAs(_Varying):
     """Varied path that takes the value of another varied path in every run."""
 
-    path: _Path
     kind: Annotated[Literal["same_as"], Field(description="optional")] = "same_as"
     same_as: Annotated[Text, Field(description="a path that varies in this study")]
-    only: _Only = ()
 
 
 class Correlation(StrictTable):

@@ -42,7 +42,7 @@ from ppafo.studies.varying import (
     varied_path,
 )
 from ppafo.units.shown import shown_unit
-from ppafo.wording import first_twice, nearest_name
+from ppafo.wording import first_twice, known_names
 
 _CLOSEST = 1.0 - 1.0e-11
 """Largest coefficient of a correlation matrix that is still positive definite; scores then differ by 5e-6."""
@@ -171,15 +171,19 @@ def _load(
 def _build(
     parsed: declared.StudyFile, document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]
 ) -> Study:
-    """Build the study of a parsed study file in SI units; StudyError for a study that cannot be run.
-
-    ``document`` is the file as plain data with the caller's ``changes``; the study keeps both.
-    """
+    """Build the study of a parsed study file in SI units; StudyError for a study that cannot be run."""
     if (repeated := first_twice([section.name for section in parsed.configurations])) is not None:
         raise StudyError(f"two configurations are named '{repeated}'; give every configuration a different name")
     configurations = tuple(_configuration(section, source.folder) for section in parsed.configurations)
     scenarios = [configuration.scenario for configuration in configurations]
-    _check_varied(parsed)
+    paths = [entry.path for entry in parsed.vary]
+    if not paths and len(configurations) == 1:
+        raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
+    # Rows of channels over time are lists of one length, and bands are quantiles at one time.
+    if "run.duration" in paths and (parsed.outputs.trajectories or parsed.outputs.bands):
+        raise StudyError("'run.duration' cannot vary with trajectories or bands, which need runs of equal length")
+    if (repeated := first_twice(paths)) is not None:
+        raise StudyError(f"'{repeated}' is varied twice; omit one [[vary]]")
     _check_set_or_varied(parsed, configurations)
     varied_paths = {entry.path: _common_path(entry, configurations, parsed) for entry in parsed.vary}
     independent = [
@@ -219,20 +223,6 @@ def _build(
     )
 
 
-def _check_varied(parsed: declared.StudyFile) -> None:
-    """Raise StudyError for a study that varies nothing, one path twice, or the duration of channels over time."""
-    paths = [entry.path for entry in parsed.vary]
-    if not paths and len(parsed.configurations) == 1:
-        raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
-    # Rows of channels over time are lists of one length, and bands are quantiles at one time.
-    if "run.duration" in paths and (parsed.outputs.trajectories or parsed.outputs.bands):
-        raise StudyError(
-            "'run.duration' cannot vary with trajectories or bands, which need runs of equal length; omit these outputs"
-        )
-    if (repeated := first_twice(paths)) is not None:
-        raise StudyError(f"'{repeated}' is varied twice; omit one [[vary]]")
-
-
 def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration]) -> None:
     """Raise StudyError for a path that is both set and varied in a configuration, in any form (area or conductance)."""
     for section, configuration in zip(parsed.configurations, configurations, strict=True):
@@ -248,9 +238,8 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
             if ignored is None or (entry.kind == "stated" and ignored == path):
                 continue
             raise StudyError(
-                f"configuration '{section.name}': '{set_values[ignored]}' is set and '{entry.path}' is varied, so the "
-                "set value would be ignored; omit one of them (a nominal value may stand in the scenario file), or "
-                "restrict the [[vary]] to the other configurations with 'only'"
+                f"configuration '{section.name}': '{set_values[ignored]}' is set and '{entry.path}' is varied: omit "
+                "one of them, or restrict the [[vary]] to other configurations with 'only'"
             )
 
 
@@ -268,14 +257,12 @@ def _common_path(
     scenarios = [each.scenario for each in configurations if not entry.only or each.name in entry.only]
     for name in entry.only:
         if name not in names:
-            hint = nearest_name(name, names)
-            raise StudyError(f"vary '{entry.path}': only: there is no configuration '{name}'{hint}")
+            raise StudyError(f"vary '{entry.path}': only: there is no configuration '{name}'{known_names(name, names)}")
     with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError):
         varied, *others = (varied_path(entry.path, scenario) for scenario in scenarios)
     if any(other != varied for other in others):
         raise StudyError(
-            f"vary '{entry.path}': has different units, limits or atmospheres in different "
-            f"configurations; restrict the [[vary]] with 'only'"
+            f"vary '{entry.path}': differs in unit, limits or atmosphere between configurations; use 'only'"
         )
     varied = given_in(varied, texts_of(entry))
     # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
@@ -302,12 +289,9 @@ def _axis_or_drawn(
             if not entry.only or each.name in entry.only
         }
         if len(distributions) > 1:
-            raise UnitError(
-                "the parameter sets of the configurations state different values; limit this [[vary]] with 'only', or "
-                "give its values"
-            )
-        stated = distributions.pop()
-        return RandomValue(entry.path, replace(stated, zero=varied_path.atmosphere) if varied_path.is_gauge else stated)
+            raise UnitError("the parameter sets of the configurations state different values; use 'only'")
+        zero = varied_path.atmosphere if varied_path.is_gauge else 0.0
+        return RandomValue(entry.path, replace(distributions.pop(), zero=zero))
 
 
 def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, VariedPath]) -> dict[str, str]:
@@ -318,10 +302,9 @@ def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, Varie
         if not isinstance(entry, declared.SameAs):
             continue
         if entry.same_as not in independent:
-            hint = nearest_name(entry.same_as, independent) or f"; available: {', '.join(independent) or 'none'}"
             raise StudyError(
                 f"vary '{entry.path}': same_as = '{entry.same_as}' must be the path of another [[vary]] without "
-                f"same_as{hint}"
+                f"same_as{known_names(entry.same_as, independent)}"
             )
         unit, other = varied_paths[entry.path].quantity.unit, varied_paths[entry.same_as].quantity.unit
         if unit != other:
@@ -343,9 +326,7 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Factor 
         first, other = pair.between
         for path in pair.between:
             if path not in paths:
-                raise StudyError(
-                    f"correlations: '{path}' has no distribution{nearest_name(path, paths)}; available: {paths}"
-                )
+                raise StudyError(f"correlations: '{path}' has no distribution{known_names(path, paths)}")
         if first == other or (first, other) in coefficients or (other, first) in coefficients:
             raise StudyError(
                 f"correlations: between = ['{first}', '{other}'] must name two different paths, and each pair only once"

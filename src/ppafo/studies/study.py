@@ -3,7 +3,7 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -20,7 +20,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
 from ppafo.units import parse_quantity
-from ppafo.wording import first_twice, known_names, override_text
+from ppafo.wording import first_twice, known_names
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,26 +48,31 @@ class Outputs:
 def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario]) -> Outputs:
     """Check the outputs of a study and convert them to SI; StudyError for an unknown metric or channel."""
     metrics = tuple(METRICS) if outputs.metrics == "all" else tuple(outputs.metrics)
-    _check_names(
-        "metrics", metrics, METRICS, dict.fromkeys(name for scenario in scenarios for name in offered(scenario))
+    apply = dict.fromkeys(name for scenario in scenarios for name in offered(scenario))
+    requests = (
+        ("metrics", "metric", metrics, METRICS, apply),
+        ("trajectories", "channel", outputs.trajectories, TRACED, TRACED),
+        ("bands", "channel", outputs.bands, TRACED, TRACED),
     )
-    _check_names("trajectories", outputs.trajectories, tuple(TRACED))
-    _check_names("bands", outputs.bands, tuple(TRACED))
+    for key, noun, names, known, shown in requests:
+        for name in names:
+            if name not in known:
+                raise StudyError(f"outputs.{key}: there is no {noun} '{name}'{known_names(name, shown or known)}")
+        if (repeated := first_twice(names)) is not None:
+            raise StudyError(f"outputs.{key}: '{repeated}' is named twice; name it once")
     channels = (*outputs.trajectories, *outputs.bands)
-    references = {kind.reference: name for name, kind in CONTROLLED.items()}
-    for channel in channels:
-        if channel in references and all(scenario.controller.is_open_loop for scenario in scenarios):
-            raise StudyError(f"outputs: '{channel}' needs a reference, but no controller of the study has a reference")
-        if channel in references and all(scenario.controlled != references[channel] for scenario in scenarios):
+    controlled = {each.controlled for each in scenarios if not each.controller.is_open_loop}
+    for name, kind in CONTROLLED.items():
+        if kind.reference in channels and name not in controlled:
             raise StudyError(
-                f"outputs: '{channel}' needs reference.of = '{references[channel]}', which no scenario has"
+                f"outputs: '{kind.reference}' needs a controller with reference.of = '{name}'; none has one"
             )
     # A metric that one configuration has is kept, empty for the others; 'all' takes those that any has.
     has = {name: [lacking(scenario, METRICS[name]) for scenario in scenarios] for name in metrics}
     missing = {name: reasons[0] for name, reasons in has.items() if all(reasons)}
-    for name, reason in missing.items() if outputs.metrics != "all" else ():
+    if missing and outputs.metrics != "all":
+        name, reason = next(iter(missing.items()))
         raise StudyError(f"outputs: no scenario has '{name}': {reason}")
-    metrics = tuple(name for name in metrics if name not in missing)
     with refused_as(StudyError, f"outputs.every = {outputs.every!r}", UnitError):
         every = parse_quantity(outputs.every, "s")
     shortest = min(scenario.run.duration for scenario in scenarios)
@@ -76,23 +81,13 @@ def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario
             f"outputs.every = {outputs.every!r} must be above 0 s and at most run.duration = {shortest:g} s"
         )
     return Outputs(
-        metrics=metrics,
+        metrics=tuple(name for name in metrics if name not in missing),
         trajectories=outputs.trajectories,
         bands=outputs.bands,
         every=every,
         quantiles=tuple(sorted(set(outputs.quantiles))),
         errors=outputs.errors,
     )
-
-
-def _check_names(key: str, requested: Sequence[str], known: Collection[str], shown: Collection[str] = ()) -> None:
-    """Raise an error for an unknown or repeated name; ``shown`` are the applicable names, by default all known ones."""
-    for name in requested:
-        if name not in known:
-            what, apply = "metric" if key == "metrics" else "channel", shown or known
-            raise StudyError(f"outputs.{key}: there is no {what} '{name}'{known_names(name, apply)}")
-    if (repeated := first_twice(requested)) is not None:
-        raise StudyError(f"outputs.{key}: '{repeated}' is named twice; name it once")
 
 
 SamplingMethod = Literal["random", "latin_hypercube", "sobol"]
@@ -223,8 +218,7 @@ def choose_configurations(
         if study is not None and study.only:
             path, varying = next(iter(study.only.items()))
             raise StudyError(
-                f"study '{study.name}': '{path}' varies only in {', '.join(varying)}, so the study cannot be used for "
-                "other scenarios; omit the scenarios to compare the configurations of the study"
+                f"study '{study.name}': '{path}' varies only in {', '.join(varying)}; omit the other scenarios"
             )
         named = configurations.values() if isinstance(configurations, Mapping) else configurations
         with at_fault("configurations"):
@@ -254,18 +248,12 @@ def configurations_with(configurations: Sequence[Configuration], overrides: Iter
             raise StudyError(f"override '{text}': there is no configuration '{name}'{known_names(name, names)}")
         for addressed in [name] if colon else names:
             own[addressed].append(f"{path}{equals}{value}" if colon else text)
-    changed, refused = [], []
+    changed = []
     for configuration in configurations:
-        try:
-            scenario = with_overrides(configuration.scenario, own[configuration.name])
-            changed.append(replace(configuration, scenario=scenario))
-        except PpafoError as error:
-            refused.append(f"configuration '{configuration.name}': {error}")
-    if refused:
-        name = changed[0].name if changed else ""
-        raise StudyError(
-            refused[0] + (f"; to change only '{name}', give {override_text([f'{name}:PATH=VALUE'])}" if name else "")
-        )
+        with refused_as(StudyError, f"configuration '{configuration.name}'", PpafoError):
+            changed.append(
+                replace(configuration, scenario=with_overrides(configuration.scenario, own[configuration.name]))
+            )
     return tuple(changed)
 
 
@@ -295,14 +283,12 @@ def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
     of_object = [text for text in changes if scenario.controller.custom is not None and _SETTING.match(text)]
     if of_object:
         raise StudyError(
-            f"override '{of_object[0]}': scenario '{scenario.name}' has a Python controller; set the "
-            "value in the Python object"
+            f"override '{of_object[0]}': scenario '{scenario.name}' has a Python controller; set the value in it"
         )
     # Overrides begin at what the file said, so what was replaced in Python would silently come back.
     if reloaded(scenario, ()) != scenario:
         raise StudyError(
-            f"scenario '{scenario.name}' was changed in Python; overrides would undo this change, so load the "
-            "scenario with the overrides"
+            f"scenario '{scenario.name}' was changed in Python, which overrides would undo; load it with the overrides"
         )
     return reloaded(scenario, changes)
 
