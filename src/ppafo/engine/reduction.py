@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from ppafo.engine.composer import ModuleText, is_step_function
 from ppafo.engine.plain_python import parse_module, refusal
-from ppafo.engine.rows import is_number, is_row, members, rebuilt, section_row
+from ppafo.engine.rows import component_row, is_number, is_row, members, rebuilt, section_row
 from ppafo.errors import ProgramError
 from ppafo.model.binding import made_of
 
@@ -366,8 +366,11 @@ class Reduction:
         if called is getattr:
             name = self.value_of(node.args[1])
             return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
-        if called is section_row:
+        if called in (section_row, component_row):
             kind, section = self.outside_value(node.args[0]), self.text_of(node.args[2])
+            if called is component_row:
+                paths = (f"{section}.{quantity.name}" for quantity in kind.quantities)
+                return self.row_of(kind.parameters, (ast.Attribute(node.args[1], path, ast.Load()) for path in paths))
             further = [part for argument in node.args[3:] for part in self.arguments(argument)]
             names = kind._fields[: len(kind._fields) - len(further)]
             numbers = [ast.Attribute(node.args[1], f"{section}.{name}", ast.Load()) for name in names]

@@ -29,6 +29,11 @@ def section_row(row: Any, settings: Mapping[str, Any], section: str, *further: A
     return row(*(settings[f"{section}.{name}"] for name in row._fields[: len(row._fields) - len(further)]), *further)
 
 
+def component_row(kind: Any, settings: Mapping[str, Any], section: str) -> Any:
+    """Return the parameters of a component, such as a controller or a profile, filled as ``section_row`` does."""
+    return rebuilt(kind.parameters, [settings[f"{section}.{quantity.name}"] for quantity in kind.quantities])
+
+
 def is_row(candidate: object) -> bool:
     """Return whether an object is a NamedTuple class."""
     return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")

@@ -51,13 +51,13 @@ _NUMBERS: dict[str, tuple[str, Quantity]] = {
         "stride_time",
         Number("s", "time from heel strike to heel strike of the same foot", None, 0.3, 5.0),
     ),
-    "stride.time_deviation": (
-        "stride_time_deviation",
-        Number("s", "its standard deviation between strides", 0.0, 0.0, 2.0),
-    ),
     "stride.stance_share": (
         "stance_share",
         Number("", "fraction of the stride until toe-off, such as '62 percent'", None, 0.2, 0.95),
+    ),
+    "stride.time_deviation": (
+        "stride_time_deviation",
+        Number("s", "its standard deviation between strides", 0.0, 0.0, 2.0),
     ),
     "stride.stance_share_deviation": (
         "stance_share_deviation",
@@ -186,15 +186,15 @@ def gait_toml(gait: Gait) -> str:
     lines = ["schema_version = 1"]
     texts = {"name": gait.name, "title": gait.title, "origin": gait.origin, "source": gait.source, "notes": gait.notes}
     lines += [f"{key} = {value_text(value)}" for key, value in texts.items() if value]
-    lines += ["", "[subject]", f'body_mass = "{gait.body_mass!r} kg"']
-    known = {"stature": "m", "walking_speed": "m/s", "recorded_speed": "m/s"}
-    lines += [f'{key} = "{value!r} {unit}"' for key, unit in known.items() if (value := getattr(gait, key)) is not None]
-    lines += ["", "[stride]", f'time = "{gait.stride_time!r} s"', f'stance_share = "{gait.stance_share!r}"']
-    if gait.stride_time_deviation:
-        lines.append(f'time_deviation = "{gait.stride_time_deviation!r} s"')
-    if gait.stance_share_deviation:
-        lines.append(f'stance_share_deviation = "{gait.stance_share_deviation!r}"')
-    lines.append(f"count = {gait.strides}")
+    section = ""
+    for path, (name, quantity) in _NUMBERS.items():
+        table, _, key = path.partition(".")
+        lines += [] if table == section else ["", f"[{table}]"]
+        section, value = table, getattr(gait, name)
+        if quantity.whole:
+            lines.append(f"{key} = {value}")
+        elif value is not None and value != quantity.default:
+            lines.append(f'{key} = "{f"{value!r} {quantity.unit}".rstrip()}"')
     for name, curve in gait.curves.items():
         si_unit = CURVES[name]
         lines += ["", f"[{name}]", f"unit = {value_text(WRITTEN_UNITS.get(si_unit, si_unit))}"]

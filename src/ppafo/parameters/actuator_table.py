@@ -127,9 +127,8 @@ def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float],
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
     if not lines:
         raise ParameterError(f"{file}: is empty; its first line must be 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
-    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
-        if separator in lines[0][1] and "," not in lines[0][1]:
-            raise ParameterError(f"{file}: columns must be separated by commas, not {name}")
+    if "," not in lines[0][1] and any(mark in lines[0][1] for mark in ";\t"):
+        raise ParameterError(f"{file}: columns must be separated by commas")
     (_, header), *below = ((number, [cell.strip().strip('"') for cell in line.split(",")]) for number, line in lines)
     units = _units(header, file)
     rows = [_numbers(cells, tuple(units), f"{file}, line {number}") for number, cells in below]

@@ -45,9 +45,9 @@ from ppafo.parameters.plant import shape_and_growth
 from ppafo.units.shown import counted_from, shown_in, shown_text
 from ppafo.wording import known_names, one_line
 
-_SAME = 1.0e-9
+SAME_STOP = 1.0e-9
 """Angle difference [rad] below which two angles count as the same."""
-_COVERED = 1.01
+COVERED_PRESSURE = 1.01
 """Largest ratio of supply pressure to the highest pressure of a volume table [-]."""
 _BESIDE_ANOTHER = "; both supplies must be on the same side of atmospheric pressure"
 _UNUSED_VOLUME = 1.0e-6
@@ -197,7 +197,7 @@ def actuator_problem(actuator: Actuator) -> str:
     problem = "" if kind.problem is None else kind.problem(actuator, stops)
     if problem or table is None:
         return problem
-    if table.first_angle <= stops.angle_min + _SAME and stops.angle_max <= table.last_angle + _SAME:
+    if table.first_angle <= stops.angle_min + SAME_STOP and stops.angle_max <= table.last_angle + SAME_STOP:
         return ""
     measured, wanted = (
         f"{math.degrees(low):.4g} to {math.degrees(high):.4g} deg"
@@ -217,10 +217,10 @@ def beyond_pressures(device: Device) -> Problem:
         lowest, highest = measured_pressures(table)
     if supply.is_vacuum:
         gauge = smaller(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
-        is_beyond, way, end = gauge < _COVERED * lowest, "down", lowest
+        is_beyond, way, end = gauge < COVERED_PRESSURE * lowest, "down", lowest
     else:
         gauge = larger(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
-        is_beyond, way, end = gauge > _COVERED * highest, "up", highest
+        is_beyond, way, end = gauge > COVERED_PRESSURE * highest, "up", highest
 
     def line(run: int) -> str:
         atmosphere = at(supply.atmospheric_pressure, run)

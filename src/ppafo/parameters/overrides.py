@@ -267,12 +267,7 @@ def _nearest_value(override: Override, allowed: Sequence[str]) -> str:
     if "gas" in override.typed.split(".") and override.text in SPECIES:
         return f", did you mean '{SPECIES_PATH}={override.text}'?"
     if section == SECTION and name not in EFFECTS.loaded():
-        return (
-            f": no effect '{name}'{known_names(name, EFFECTS.loaded())}; your own needs an entry point 'ppafo.effects' "
-            "of an installed package, not of the current folder"
-        )
-    if section in ("valve", "valves") and override.typed.endswith(".kind"):
-        return "; a set has the kinds of its valves: choose another valve of the set, or change a copy of its file"
+        return f": no effect '{name}'{known_names(name, EFFECTS.loaded())}"
     section = f"{section}.{name}" if section == SECTION else section
     # Compared without their section, which all values in it have in common and which makes strangers look alike.
     near = [known.removeprefix(f"{section}.") for known in allowed if known.startswith(f"{section}.")]

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from ppafo.constants import STANDARD_GRAVITY, UNIVERSAL_GAS_CONSTANT
 from ppafo.control import angle_loop
 from ppafo.control.angle_loop import Joint
-from ppafo.control.profiles import TABLE, TabulatedProfile, table_bounds
+from ppafo.control.profiles import TABLE, table_bounds
 from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
-from ppafo.engine.rows import rebuilt, section_row
+from ppafo.engine.rows import component_row, section_row
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import first, over_combinations, over_runs
@@ -179,8 +179,7 @@ def between(stops: Range, angle: float) -> float:
 
 def set_bounds(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
     """Set the lowest and highest value of a table [rad]; curves exceed the knots slightly."""
-    paths = [f"{parts.seen.section}.{quantity.name}" for quantity in TABLE.quantities]
-    lane.bounds = table_bounds(rebuilt(TabulatedProfile, (settings[path] for path in paths)))
+    lane.bounds = table_bounds(component_row(TABLE, settings, parts.seen.section))
 
 
 def set_places(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:

@@ -229,10 +229,7 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
         low, high = STATURES
         line += f"; {wearer.stature:.4g} m tall, segments scaled by mass and stature"
         if not low <= wearer.stature <= high:
-            line += (
-                f" in the proportions of adults of {low:g} to {high:g} m, extrapolated here: give the measured "
-                "segments in [wearer]"
-            )
+            line += f" in the proportions of adults of {low:g} to {high:g} m, extrapolated here"
         line += "; the curves of the gait are not scaled by stature"
     elif wearer.shank_mass == _PAPER.shank_mass and abs(wearer.body_mass / _PAPER.body_mass - 1.0) > _SAME:
         line += f", with the leg of the paper's subject, {_PAPER.body_mass:g} kg; wearer.stature scales the leg"
@@ -246,6 +243,5 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     )
     low, high = (fraction * gait.body_mass for fraction in SCALED_MASS)
     if not low <= wearer.body_mass <= high:
-        better = "better import a gait recorded of such a person with 'ppafo gait import'"
-        line += f", extrapolated outside {low:.0f} to {high:.0f} kg; {better}"
+        line += f", extrapolated outside {low:.0f} to {high:.0f} kg"
     return line

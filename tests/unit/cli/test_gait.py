@@ -55,7 +55,7 @@ def test_an_imported_gait_is_written_whole_and_can_be_used_by_its_file(
             ["import", "WALK", "--body-mass", "62 kg", "--stature", "180"],
             "--stature 180: a number without a unit does not fit: a unit like 'm' is needed",
         ),
-        (["import", "WALK", "--body-mass", "62 kg", "--stature", "180 m"], "a stature of 180 m is not plausible"),
+        (["import", "WALK", "--body-mass", "62 kg", "--stature", "180 m"], "stature 180 m is not plausible"),
         (
             ["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "-"],
             "--minimum-strides -: must be a whole",

@@ -184,21 +184,34 @@ def test_a_walk_of_every_feature_is_clean_under_the_sanitizers_and_the_same_in_c
         assert (again[0], again[1].tobytes()) == (first[0], first[1].tobytes())
 
 
-def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_other_functions(tmp_path: Path) -> None:
-    library = built("proportional", (), tmp_path)
-    names = [item.name for item in exported("proportional")[0].settings]
+@pytest.mark.parametrize(
+    ("overrides", "refused"),
+    [
+        (
+            (),
+            {
+                "wearer_body_mass": 1.0,
+                "controller_unload_threshold": 70.0,
+                "controller_peak_time": 0.39,
+                "sensors_force_noise": 5.0,
+            },
+        ),
+        (OF_ANOTHER_KIND[0], {"actuator_rod_diameter": 0.5}),
+        (OF_ANOTHER_KIND[1], {"actuator_angle_max": 2.5, "supply_pressure": 2.0e5}),
+    ],
+)
+def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_other_functions(
+    overrides: tuple[str, ...], refused: dict[str, float], tmp_path: Path
+) -> None:
+    library = built("proportional", overrides, tmp_path)
+    names = [item.name for item in exported("proportional", overrides)[0].settings]
     settings = (ctypes.c_double * len(names))()
     library.proportional_defaults(settings)
     library.proportional_bad_setting.restype = ctypes.c_char_p
     library.proportional_size.restype = ctypes.c_size_t
     assert library.proportional_size(settings) > 0
-    for name, value, said in (
-        ("wearer_body_mass", 1.0, b"wearer_body_mass"),
-        ("controller_unload_threshold", 70.0, b"controller_unload_threshold"),
-        ("controller_peak_time", 0.39, b"controller_peak_time"),
-        ("sensors_force_noise", 5.0, b"sensors_force_noise"),
-    ):
+    for name, value in refused.items():
         changed = (ctypes.c_double * len(names))(*settings)
         changed[names.index(name)] = value
-        assert library.proportional_bad_setting(changed) == said
+        assert library.proportional_bad_setting(changed) == name.encode()
         assert library.proportional_size(changed) == 0

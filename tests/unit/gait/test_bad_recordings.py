@@ -256,11 +256,11 @@ def test_files_of_different_forms_need_a_map(
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        (ImportSettings(62000.0), "a body mass of 62000 kg is not plausible"),
-        (ImportSettings(float("nan")), "a body mass of nan kg is not plausible"),
-        (ImportSettings(62.0, walking_speed=50.0), "a walking speed of 50 m/s is not plausible"),
-        (ImportSettings(62.0, stature=175.0), "a stature of 175 m is not plausible; give it in m, such as '1.75 m'"),
-        (ImportSettings(62.0, low_pass=0.1), "a low pass at 0.1 Hz would remove the gait itself"),
+        (ImportSettings(62000.0), "body mass 62000 kg is not plausible"),
+        (ImportSettings(float("nan")), "body mass nan kg is not plausible"),
+        (ImportSettings(62.0, walking_speed=50.0), "walking speed 50 m/s is not plausible"),
+        (ImportSettings(62.0, stature=175.0), "stature 175 m is not plausible; allowed is 0.5 to 2.5 m"),
+        (ImportSettings(62.0, low_pass=0.1), "low pass 0.1 Hz is not plausible"),
         (ImportSettings(62.0, low_pass=500.0), "has 200.3 samples per second; choose a cut-off frequency below"),
         (ImportSettings(62.0, least_strides=0), "the minimum number of strides must be 1 or more, not 0"),
         (ImportSettings(62.0, name="My gait"), "name 'My gait' must consist of lower-case letters"),

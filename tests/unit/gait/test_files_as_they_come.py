@@ -158,7 +158,7 @@ def test_gaps_are_filled_up_to_the_length_that_is_stated_and_named(tmp_path: Pat
     assert "walk.trc: column 'RKNE.x': 6 samples from 1.2 to 1.25 s filled" in found.remarks
     with pytest.raises(DataError, match=r"the longest gap is 0.41 s"):
         import_gait([walked(tmp_path, (120, 160))], ImportSettings(MASS, longest_gap=0.25))
-    with pytest.raises(DataError, match=r"gaps of 0.4 s cannot be filled; allowed is 0 to 0.25 s"):
+    with pytest.raises(DataError, match=r"longest gap 0.4 s is not plausible; allowed is 0 to 0.25 s"):
         import_gait([path], ImportSettings(MASS, longest_gap=0.4))
 
 

@@ -100,7 +100,7 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
             (HEADER, *(line.replace(",0,", ",10,") for line in GOOD)),
             "has no volumes of the vented actuator; add lines at 0 kPa_g",
         ),
-        ((HEADER.replace(",", ";"), *GOOD), "columns must be separated by commas, not semicolons"),
+        ((HEADER.replace(",", ";"), *GOOD), "columns must be separated by commas"),
         ((HEADER, *GOOD[:2]), "has one angle only"),
         (
             (HEADER, *(line.replace(",0,", ",-1,") for line in GOOD)),

@@ -10,16 +10,18 @@ from ppafo.errors import ProgramError
 from ppafo.exports.c_library.conditions import RULES_OF_TIMES, choosing, other_samples, other_supply
 from ppafo.exports.c_library.entries import check_entry, follow_entry, prepare_entry
 from ppafo.exports.c_library.expected import expected_csv
-from ppafo.exports.c_library.exported import exported
+from ppafo.exports.c_library.exported import ExportedProgram, exported
 from ppafo.exports.c_library.files import library_files
-from ppafo.exports.c_library.library import Library, Switch, c_identifier
+from ppafo.exports.c_library.library import ExportParameter, Library, Switch, c_identifier
 from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation
-from ppafo.exports.c_library.profile_rules import has_rules
+from ppafo.exports.c_library.profile_rules import PROFILE_RULES, WALK_RULES, has_rules
 from ppafo.exports.c_library.readme import words_of, words_of_walk
-from ppafo.exports.c_library.settings import links_of, relations_of, relations_of_vane, settings_of
+from ppafo.exports.c_library.settings import links_of, relations_of, relations_of_vane, rules_of_table, settings_of
 from ppafo.model.catalog import ordered_effects
+from ppafo.model.declaration import PlainFunction
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of
+from ppafo.parameters.graph import Graph
 from ppafo.simulation.clock import links_of_times, time_texts
 from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.plan import plan_run
@@ -64,27 +66,15 @@ def scenario_library(scenario: Scenario) -> Library:
             if effect.section == "sensors"
         ),
     ]
-    preparation = Preparation(
-        scenario, program.program, {setting.path: float(place) for place, setting in enumerate(settings, 1)}
-    )
-    return Library(
-        title=scenario.name,
-        description=" ".join(scenario.description.split()),
-        program=program,
-        settings=settings,
+    library = _library(scenario, program, settings, links, (VANE_PREPARATION, PROFILE_RULES))
+    return replace(
+        library,
         relations=relations_of(scenario, settings, relations_of_vane(scenario)),
         switches=_switches(scenario.device, of_sensors),
-        other_program=(
-            *other_samples(settings, program.program.samples_inside),
-            other_supply(scenario.device),
-        ),
+        other_program=(*other_samples(settings, program.program.samples_inside), *library.other_program),
         words=words_of(scenario, links),
-        further=partial(prepare_entry, preparation, VANE_PREPARATION, settings),
-        following=partial(follow_entry, preparation, settings, links) if links else None,
-        checking=partial(check_entry, preparation, settings) if has_rules(preparation) else None,
         defaults=frozenset(setting.name for setting in settings if setting.path in links and setting.quantity.follows),
-        links=links,
-        rules=RULES_OF_TIMES,
+        rules=(*library.rules, *RULES_OF_TIMES),
     )
 
 
@@ -105,22 +95,41 @@ def walk_library(configuration: Scenario) -> Library:
     program = exported(batch_of(plan_walk(configuration)).program)
     settings = settings_of(configuration, record_interval(configuration.run.duration))
     links = links_of(configuration, settings, LINKS_OF_WALK)
-    preparation = Preparation(configuration, program.program)
     of_readings = [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]
-    return Library(
-        title=configuration.name,
-        description=" ".join(configuration.description.split()),
-        program=program,
-        settings=settings,
+    library = _library(configuration, program, settings, links, (WALK_PREPARATION, WALK_RULES))
+    return replace(
+        library,
         relations=relations_of(configuration, settings, RELATIONS_OF_WALK),
         switches=_switches(configuration.device, of_readings),
-        other_program=(other_supply(configuration.device),),
         words=words_of_walk(configuration, links),
-        further=partial(prepare_entry, preparation, WALK_PREPARATION, settings),
-        following=partial(follow_entry, preparation, settings, links) if links else None,
-        links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
-        rules=rules_of_walk(configuration, settings),
+        rules=(*library.rules, *rules_of_walk(configuration, settings)),
+    )
+
+
+def _library(
+    scenario: Scenario,
+    program: ExportedProgram,
+    settings: tuple[ExportParameter, ...],
+    links: Graph,
+    functions: tuple[Sequence[PlainFunction], Sequence[PlainFunction]],
+) -> Library:
+    """Return what libraries of scenarios and walks have in common; ``functions`` prepare a run and check settings."""
+    places = {setting.path: float(place) for place, setting in enumerate(settings, 1)}
+    preparation, (preparing, rules) = Preparation(scenario, program.program, places), functions
+    return Library(
+        title=scenario.name,
+        description=" ".join(scenario.description.split()),
+        program=program,
+        settings=settings,
+        other_program=(other_supply(scenario.device),),
+        further=partial(prepare_entry, preparation, preparing, settings),
+        following=partial(follow_entry, preparation, settings, links) if links else None,
+        checking=partial(check_entry, preparation, rules, settings) if has_rules(preparation) else None,
+        links=links,
+        rules=rules_of_table(scenario, settings),
+        joint=scenario.device.joint,
+        actuator=scenario.device.actuator.kind,
     )
 
 
@@ -134,8 +143,7 @@ def library_of(scenario: Scenario) -> Library:
             f"{scenario.name}: a controller that is a Python object cannot be exported; export the plant only "
             f"({argument_text('interface', 'plant')}), or declare the control law as a controller kind of a plugin"
         )
-    library = _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
-    return replace(library, joint=scenario.device.joint, actuator=scenario.device.actuator.kind)
+    return _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
 
 
 def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:

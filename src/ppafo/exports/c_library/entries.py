@@ -14,7 +14,6 @@ from ppafo.errors import ProgramError
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
 from ppafo.exports.c_library.preparation import Preparation
-from ppafo.exports.c_library.profile_rules import PROFILE_RULES
 from ppafo.exports.c_library.settings import numbers_of_second_chamber
 from ppafo.exports.c_library.structs import given
 from ppafo.model.declaration import PlainFunction
@@ -60,9 +59,14 @@ def prepare_entry(
     return "\n".join(["def prepare(settings, parameters, states, counts):", *indent(body)])
 
 
-def check_entry(preparation: Preparation, settings: Sequence[ExportParameter], collector: SourceCollector) -> str:
-    """Return the source of the entry ``check_profiles``, which finds the setting that breaks a rule on profiles."""
-    *lines, place = StepText(preparation.program, collector).joined(PROFILE_RULES, preparation, ["settings"])
+def check_entry(
+    preparation: Preparation,
+    rules: Sequence[PlainFunction],
+    settings: Sequence[ExportParameter],
+    collector: SourceCollector,
+) -> str:
+    """Return the source of the entry ``check_profiles``, which finds the setting that breaks one of the rules."""
+    *lines, place = StepText(preparation.program, collector).joined(rules, preparation, ["settings"])
     assert isinstance(place, ast.Return), "the last function gives the place"
     assert place.value is not None
     written = _FromSettings(cells_of(preparation.scenario, settings)).written

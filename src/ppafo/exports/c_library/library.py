@@ -113,10 +113,10 @@ class Library:
     description: str
     program: ExportedProgram
     settings: tuple[ExportParameter, ...]
-    relations: tuple[Relation, ...]
-    switches: tuple[Switch, ...]
-    other_program: tuple[Condition, ...]
-    words: Mapping[str, str]
+    relations: tuple[Relation, ...] = ()
+    switches: tuple[Switch, ...] = ()
+    other_program: tuple[Condition, ...] = ()
+    words: Mapping[str, str] = field(default_factory=dict)
     further: Further | None = None
     following: Further | None = None
     checking: Further | None = None

@@ -12,7 +12,7 @@ from typing import Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths, numbers, rebuilt, section_row
+from ppafo.engine.rows import component_row, leaf_paths, numbers, rebuilt, section_row
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.scheme.pneumatics import is_slow
@@ -20,24 +20,27 @@ from ppafo.engine.step.lane import Lane, LaneResult, LaneTiming
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import larger, smaller
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import SupplyLines, lines_at_start
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.declaration import members
-from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.device import SonicOrifice
 from ppafo.parameters.effects import SEEN_BY_EFFECTS
 from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
 from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL_GAS
 from ppafo.simulation.leg import foot_load, with_load
 from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.plan import StepCounts, relative_tolerance, state_with_volumes, step_counts, thermal_gas
+from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 
 FOOT_SETTINGS = ("foot_mass", "foot_mass_centre", "foot_inertia", "shank_length")
 """Settings of a foot on a prescribed shank, in the order of ``foot_load``."""
+OF_ORIFICE = {"valve": "valve", "leak": "actuator.leak"}
+"""Sections of the orifices."""
 OF_SHANK = {"shank.start": "motion.shank.start", "shank.toe_lever": "motion.toe_lever"}
 """Paths of the settings of a shank on a gait, by the path of the number in ``ShankSeries``."""
 LINE_PATHS = tuple(
@@ -76,11 +79,6 @@ class Preparation:
     places: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def device(self) -> Device:
-        """Device of the scenario."""
-        return self.scenario.device
-
-    @property
     def leg(self) -> Leg | None:
         """Leg on a prescribed shank, attached to the vane; None for other motions and in a walk."""
         return None if self.program.walks else vane_motion(self.scenario).leg
@@ -98,7 +96,7 @@ class Preparation:
     @property
     def actuator_settings(self) -> Any:
         """Class of the settings of the actuator."""
-        return ACTUATORS[self.device.actuator.kind].settings
+        return ACTUATORS[self.scenario.device.actuator.kind].settings
 
     def row(self, name: str, fields: Iterable[str]) -> Any:
         """Return a NamedTuple class of settings with the given field names."""
@@ -109,11 +107,7 @@ class Preparation:
 
     def class_of_section(self, name: str, *further: str) -> Any:
         """Return a NamedTuple class of a device section as visible to effects, with ``further`` fields."""
-        return self.row(name, [*names_of(members(name, self.device.actuator.kind)), *further])
-
-    def is_sonic(self, section: str) -> bool:
-        """True for an orifice specified by ISO 6358 sonic conductance and critical ratio."""
-        return isinstance(self.device.valve.orifice if section == "valve" else self.device.actuator.leak, SonicOrifice)
+        return self.row(name, [*names_of(members(name, self.scenario.device.actuator.kind)), *further])
 
     def constant(self, row: Any) -> Any:
         """Return a NamedTuple of constants that no setting changes, converted to floats."""
@@ -133,7 +127,7 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     of_vane = f"vane_{plant_without_leg}" if vane_only else plant_without_leg
     constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, settings["gas.molar_mass"])
     # Lines have a check valve of their own, so that the valve may push gas back into them.
-    relieving = float(parts.device.supply.takes_back or parts.scenario.supply_lines is not None)
+    relieving = float(parts.scenario.device.supply.takes_back or parts.scenario.supply_lines is not None)
     lane.gas = section_row(parts.class_of_section("gas", "specific_gas_constant"), settings, "gas", constant)
     actuator = parts.class_of_section("actuator", *vane_only)
     lane["actuator"] = section_row(actuator, settings, "actuator", *(0.0 for _ in vane_only))
@@ -141,13 +135,12 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         lane[section] = section_row(parts.class_of_section(section), settings, section)
     lane["supply"] = section_row(parts.class_of_section("supply", "relieving"), settings, "supply", relieving)
     lane.device = parts.row("Device", SEEN_BY_EFFECTS)(*(lane[section] for section in SEEN_BY_EFFECTS))
-    for section, orifice in (("valve", "valve"), ("leak", "actuator.leak")):
-        if parts.is_sonic(orifice):
-            sonic = section_row(parts.row("SonicOrifice", ("sonic_conductance", "critical_ratio")), settings, orifice)
-            lane[f"{section}_restriction"] = sonic_restriction(sonic, lane.gas, settings["flow.linear_ratio"])
-        else:
-            area = section_row(parts.row("Orifice", ("area", "discharge_coefficient")), settings, orifice)
-            lane[f"{section}_restriction"] = area_restriction(area, lane.gas, settings["flow.linear_ratio"])
+    orifices = (("valve", parts.scenario.device.valve.orifice), ("leak", parts.scenario.device.actuator.leak))
+    for name, orifice in orifices:
+        restriction = sonic_restriction if isinstance(orifice, SonicOrifice) else area_restriction
+        form: type = type(orifice)
+        given = section_row(parts.row(f"{name}_orifice", names_of(quantities_of(form))), settings, OF_ORIFICE[name])
+        lane[f"{name}_restriction"] = restriction(given, lane.gas, settings["flow.linear_ratio"])
     for effect in parts.program.effects:
         if effect.prepare is None:
             lane[effect.name] = section_row(effect.parameters, settings, effect.section)
@@ -161,7 +154,7 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     lane[of_vane] = plant_with(lane.device, lane["valve_restriction"], lane["leak_restriction"], torque)
     if vane_only:
         stops = section_row(Range, settings, "actuator")
-        tables = [] if parts.device.actuator.table is None else [parts.device.actuator.table]
+        tables = [] if parts.scenario.device.actuator.table is None else [parts.scenario.device.actuator.table]
         shape = parts.program.actuator.prepare(
             section_row(parts.actuator_settings, settings, "actuator"),
             stops,
@@ -192,9 +185,7 @@ def set_shank(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         shank = parts.program.shank
         assert shank is not None, "a leg has a shank"
         if parts.leg.curves is None:
-            lane.shank = rebuilt(
-                shank.parameters, (settings[f"motion.shank.{name}"] for name in names_of(shank.quantities))
-            )
+            lane.shank = component_row(shank, settings, "motion.shank")
         else:
             of_gait = dict(zip(leaf_paths(ShankSeries, "shank"), numbers(parts.leg.curves), strict=True))
             lane.shank = rebuilt(
@@ -212,7 +203,7 @@ def count_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 def set_timing(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set valve parameters, delays in steps, and the time grid."""
-    lane["valve_settings"] = section_row(VALVES[parts.device.valve.kind].settings, settings, "valve")
+    lane["valve_settings"] = section_row(VALVES[parts.scenario.device.valve.kind].settings, settings, "valve")
     lane.valve = parts.program.valve.prepare(lane["valve_settings"])
     # The step that the counts found, not the one that was asked for.
     lane.step = lane.counts_of_steps.step
@@ -253,29 +244,16 @@ def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the parameters of the controller, the reference and the prescribed angle."""
     controller, reference, path = parts.program.controller, parts.program.reference, parts.program.angle
     if controller is not None:
-        lane.controller = rebuilt(
-            controller.parameters, (settings[f"controller.{name}"] for name in names_of(controller.quantities))
-        )
-    # Where no reference is followed, the one that stands in its place is written out.
-    lane.reference = rebuilt(
-        reference.parameters,
-        (
-            settings[f"reference.{name}"]
-            if parts.scenario.follows_reference
-            else parts.scenario.reference.settings[name]
-            for name in names_of(reference.quantities)
-        ),
-    )
-    if path is not None:
-        lane.path = rebuilt(
-            path.parameters,
-            (
-                settings[parts.locked_angle]
-                if name == "level" and not parts.moves_on_path
-                else settings[f"motion.profile.{name}"]
-                for name in names_of(path.quantities)
-            ),
-        )
+        lane.controller = component_row(controller, settings, "controller")
+    if parts.scenario.follows_reference:
+        lane.reference = component_row(reference, settings, "reference")
+    else:
+        # The one that stands in its place is written out.
+        lane.reference = parts.constant(profile_parameters(parts.scenario.reference))
+    if parts.moves_on_path:
+        lane.path = component_row(path, settings, "motion.profile")
+    elif path is not None:
+        lane.path = path.parameters(settings[parts.locked_angle])
 
 
 def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:

@@ -44,7 +44,7 @@ def reach_of(parts: Preparation) -> Callable[[Ends], tuple[float, float]] | None
 def has_rules(parts: Preparation) -> bool:
     """Return whether there are rules on the profiles, of knots or of what they may reach, or on the actuator."""
     has_knots = not parts.places.keys().isdisjoint(KNOTS.values())
-    flaw = ACTUATORS[parts.device.actuator.kind].flaw
+    flaw = ACTUATORS[parts.scenario.device.actuator.kind].flaw
     return has_knots or flaw is not None or reach_of(parts) is not None or parts.moves_on_path
 
 
@@ -76,12 +76,12 @@ def check_courses(parts: Preparation, lane: PreparedLane, settings: Any) -> None
 
 def check_actuator(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the fault of an actuator whose numbers are impossible together."""
-    find_flaw = ACTUATORS[parts.device.actuator.kind].flaw
+    find_flaw = ACTUATORS[parts.scenario.device.actuator.kind].flaw
     if find_flaw is not None:
         flaw = find_flaw(
             section_row(parts.actuator_settings, settings, "actuator"), section_row(Range, settings, "actuator")
         )
-        before_first = parts.places[f"actuator.{next(iter(parts.device.actuator.settings))}"] - 1.0
+        before_first = parts.places[f"actuator.{next(iter(parts.scenario.device.actuator.settings))}"] - 1.0
         lane.fault = first_fault(flaw + before_first if flaw > 0.0 else 0.0, lane.fault)
 
 
@@ -92,3 +92,5 @@ def faults(parts: Preparation, lane: PreparedLane, settings: Any) -> float:  # n
 
 PROFILE_RULES = (set_shank, count_steps, set_laws, check_knots, check_courses, check_actuator, faults)
 """Functions that check the profiles of a scenario, in order of calling; the last one returns the fault."""
+WALK_RULES = (check_knots, check_actuator, faults)
+"""The same of a walk, in which a profile has no knots and leads nowhere."""

@@ -3,10 +3,11 @@
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 
-from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
+from ppafo.exports.c_library.library import Condition, ExportParameter, Relation, c_identifier
 from ppafo.model.catalog import device_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.building import SUPPLIES, consistency
+from ppafo.parameters.actuator_table import measured_pressures
+from ppafo.parameters.building import COVERED_PRESSURE, SAME_STOP, SUPPLIES, consistency
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER
 from ppafo.parameters.declared import value_at
 from ppafo.parameters.effects import effects_of
@@ -91,6 +92,24 @@ def relations_of_vane(scenario: Scenario) -> tuple[Relation, ...]:
         *(
             Relation("run.step", "at most", longer, TOLERANCE, is_share=True)
             for longer in ("controller.period", "run.output_interval")
+        ),
+    )
+
+
+def rules_of_table(scenario: Scenario, settings: Iterable[ExportParameter]) -> tuple[Condition, ...]:
+    """Return the rules of a measured volume table, which must cover the stops and the supplies; empty without one."""
+    table, supply = scenario.device.actuator.table, scenario.device.supply
+    if table is None:
+        return ()
+    lowest, highest = (COVERED_PRESSURE * pressure for pressure in measured_pressures(table))
+    within = f">= {lowest!r}" if supply.is_vacuum else f"<= {highest!r}"
+    low, high, known = "actuator_angle_min", "actuator_angle_max", {setting.path for setting in settings}
+    return (
+        (f"{table.first_angle!r} <= settings->{low} + {SAME_STOP!r}", low),
+        (f"settings->{high} <= {table.last_angle + SAME_STOP!r}", high),
+        *(
+            (f"settings->{name} - settings->{c_identifier(ATMOSPHERE_PATH)} {within}", name)
+            for name in map(c_identifier, (path for path in SUPPLIES if path in known))
         ),
     )
 

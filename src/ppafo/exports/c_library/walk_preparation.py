@@ -7,7 +7,7 @@ planning reads as mappings are structs in C; therefore Python runs only the func
 from collections.abc import Iterable
 from typing import Any
 
-from ppafo.engine.rows import rebuilt, section_row
+from ppafo.engine.rows import component_row, section_row
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.library import Condition, ExportParameter, Relation
 from ppafo.exports.c_library.preparation import (
@@ -125,8 +125,7 @@ def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> N
 
 def set_walking_law(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set the controller parameters; a walk has no reference."""
-    law = law_of(parts.scenario)
-    lane.controller = rebuilt(law.parameters, (settings[f"controller.{name}"] for name in names_of(law.quantities)))
+    lane.controller = component_row(law_of(parts.scenario), settings, "controller")
     lane.reference = parts.constant(profile_parameters(NO_REFERENCE))
 
 

@@ -4,7 +4,6 @@ A map is a TOML file; without one, the file format provides a default. A term is
 subtracts the column.
 """
 
-import math
 import re
 from dataclasses import dataclass
 from functools import partial
@@ -287,27 +286,29 @@ def setting_text(name: str, value: float | None = None, shown: str = "") -> str:
     return text if value is None or text.startswith("--") else f"{name}={value:.4g}"
 
 
+_PLAUSIBLE = {
+    "body_mass": (1.0, 500.0, "kg"),
+    "walking_speed": (0.05, 4.0, "m/s"),
+    "stature": (0.5, 2.5, "m"),
+    # Below 1 Hz the gait itself would be removed; usual are 6 Hz.
+    "low_pass": (1.0, 1.0e6, "Hz"),
+    "longest_gap": (0.0, LONGEST_FILLED, "s"),
+    "stride_time": (0.2, 10.0, "s"),
+}
+"""Limits of the settings of an import."""
+
+
 def check_settings(settings: ImportSettings) -> None:
     """Raise DataError for implausible settings; the message lists all of them."""
-    wrong: list[str] = []
-    if settings.body_mass is not None and not 1.0 <= settings.body_mass <= 500.0:
-        wrong.append(f"a body mass of {settings.body_mass:g} kg is not plausible; give it in kg, such as '62 kg'")
-    if settings.walking_speed is not None and not 0.05 <= settings.walking_speed <= 4.0:
-        wrong.append(f"a walking speed of {settings.walking_speed:g} m/s is not plausible; allowed is 0.05 to 4 m/s")
-    if settings.stature is not None and not 0.5 <= settings.stature <= 2.5:
-        wrong.append(f"a stature of {settings.stature:g} m is not plausible; give it in m, such as '1.75 m'")
-    if settings.low_pass is not None and not (math.isfinite(settings.low_pass) and settings.low_pass >= 1.0):
-        wrong.append(
-            f"a low pass at {settings.low_pass:g} Hz would remove the gait itself; give 1 Hz or more (usual: 6 Hz)"
-        )
-    if not 0.0 <= settings.longest_gap <= LONGEST_FILLED:
-        wrong.append(f"gaps of {settings.longest_gap:g} s cannot be filled; allowed is 0 to {LONGEST_FILLED:g} s")
+    wrong = [
+        f"{name.replace('_', ' ')} {value:g} {unit} is not plausible; allowed is {low:g} to {high:g} {unit}"
+        for name, (low, high, unit) in _PLAUSIBLE.items()
+        if (value := getattr(settings, name)) is not None and not low <= value <= high
+    ]
     if settings.start is not None and settings.end is not None and not settings.start < settings.end:
         wrong.append(f"the start, {settings.start:g} s, must be before the end, {settings.end:g} s")
     if re.fullmatch(NAME, settings.name) is None:
         wrong.append(f"name {settings.name!r} must consist of lower-case letters, digits, '-' and '_'")
-    if settings.stride_time is not None and not 0.2 <= settings.stride_time <= 10.0:
-        wrong.append(f"a stride time of {settings.stride_time:g} s is not plausible; allowed is 0.2 to 10 s")
     if settings.least_strides is not None and settings.least_strides < 1:
         wrong.append(f"the minimum number of strides must be 1 or more, not {settings.least_strides}")
     raise_noted([DataError(text) for text in wrong])

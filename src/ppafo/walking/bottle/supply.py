@@ -38,14 +38,6 @@ BOTTLE_OVERRIDES = {path if path.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{path}
 
 BOTTLE_NUMBERS = (FILL, TEMPERATURE, LEAST_TORQUE, COUPLING)
 
-_FOLLOWS = {
-    "content": f"increase {BOTTLE}.gas_mass, or reduce {BOTTLE}.content_heat_transfer",
-    "wall": f"increase {BOTTLE}.wall_heat_capacity",
-    "regulator": f"increase {BOTTLE}.regulator.heat_capacity",
-    "hose": f"increase {BOTTLE}.hose.heat_capacity",
-}
-"""Remedies that slow the response of a part of the supply."""
-
 _OWN = tuple(f"{SUPPLY_LINE}.plantarflexion.{name}" for name in ("droop", "largest_flow"))
 """Settings of the supply line that are replaced by the bottle's regulator."""
 
@@ -198,10 +190,8 @@ def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle
     most = bottle.volume * (liquid_density if has_liquid(table) else densest_gas)(table, numbers["temperature"])
     if mass >= most:
         fits = f"only {GRAMS_PER_KILOGRAM * most:.4g} g fit into the bottle at {numbers['temperature']:g} K"
-        raise ScenarioError(
-            f"{reading.file}: [{BOTTLE}]: {GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}, but {fits}: "
-            f"reduce {BOTTLE}.fill or {BOTTLE}.temperature, or increase {BOTTLE}.volume"
-        )
+        given = f"{GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}"
+        raise ScenarioError(f"{reading.file}: [{BOTTLE}]: {BOTTLE}.fill is {given}, but {fits}")
     return numbers
 
 
@@ -242,7 +232,7 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
         raise reading.refusal(
             BOTTLE_NAME,
             f"the temperature of the {fastest} has a time constant of {1.0e3 / rates[fastest]:.3g} ms, but a walk "
-            f"needs at least {1.0e3 / _FASTEST:g} ms: {_FOLLOWS[fastest]}",
+            f"needs at least {1.0e3 / _FASTEST:g} ms",
         )
     pressure = supply.offers_first().content.pressure
     if pressure < regulator.set_pressure + regulator.pressure_margin:
