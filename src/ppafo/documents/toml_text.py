@@ -29,8 +29,6 @@ LONGEST_VALUE = 60
 """Largest number of characters of a value in a message."""
 _RESULT = "run.json"
 """File of a result folder that describes the run."""
-_MAXIMUM_NAMED = 3
-"""Largest number of files listed in a message."""
 _LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _DEEP_KEY = re.compile(
@@ -83,27 +81,17 @@ class TomlKind:
             raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; {known}give a .toml file{self.made}")
         try:
             return read_regular_file(path, MAXIMUM_BYTES_TYPED)
-        except IsADirectoryError as error:
-            inside = [label(str(file)) for file in sorted(path.glob(f"*{_SUFFIX}"))[:_MAXIMUM_NAMED]]
-            other = self._remedy(name) or f"; give a .toml file{self.made}"
-            remedy = f"; give {' or '.join(inside)}" if inside else other
-            raise self.error(f"{label(name)}: cannot be read: {reason(error)}{remedy}") from error
         except (OSError, ValueError) as error:
-            names = (
-                [file.name for file in path.parent.glob(f"*{_SUFFIX}")] if isinstance(error, FileNotFoundError) else []
-            )
-            hint = nearest_name(path.name, names)
+            others = [each.name for each in path.parent.glob(f"*{_SUFFIX}") if each != path]
+            hint = nearest_name(path.name, others) if isinstance(error, FileNotFoundError) else ""
             raise self.error(f"{label(name)}: cannot be read: {reason(error)}{hint}{self._remedy(name)}") from error
 
     def _remedy(self, file: str) -> str:
         """Return the remedy for a stored result or a file of another kind; empty for a .toml file."""
         # Path.is_file raises an error for a name that is too long.
         if Path(file).name == _RESULT or isfile(Path(file, _RESULT)):  # noqa: PTH113
-            return (
-                "; it is a stored result, which is not run or compared again: give the name or file of what was run; "
-                "its numbers are in ppafo.read_result(folder).metrics"
-            )
-        return "" if Path(file).suffix in ("", _SUFFIX) else f"; give a .toml file{self.made}"
+            return "; it is a stored result: give the name or file of what was run"
+        return "" if Path(file).suffix == _SUFFIX else f"; give a .toml file{self.made}"
 
     def parse(self, content: bytes, file: str) -> dict[str, Any]:
         """Parse the bytes of a file; ``file`` is its label in messages."""
@@ -122,10 +110,7 @@ class TomlKind:
             # A copy, since overrides are written into a document and the parsed one is kept.
             document = copy.deepcopy(_document(text))
         except tomllib.TOMLDecodeError as error:
-            # A path of Windows in double quotation marks.
-            is_escape = any(word in str(error) for word in ("\\", "escape", "hex"))
-            remedy = "; write a path with / or in single quotation marks, 'C:\\data\\run.csv'" * is_escape
-            said = _twice(text, str(error)) or f"is not valid TOML: {one_line(error)}{remedy}{self._remedy(file)}"
+            said = _twice(text, str(error)) or f"is not valid TOML: {one_line(error)}{self._remedy(file)}"
             raise self.error(f"{file}: {said}") from error
         except (RecursionError, ValueError) as error:
             raise self.error(f"{file}: is not usable TOML: it is nested too deeply, or a number is too long") from error

@@ -186,20 +186,11 @@ def reference_problem(scenario: Scenario) -> str:
     if scenario.controlled == TORQUE:
         return ""
     if scenario.controlled == ANGLE and vane_motion(scenario).profile is not None:
-        return (
-            f"reference.of = 'angle': motion.kind = '{scenario.motion.motion_kind.name}' prescribes the angle; "
-            "set motion.kind to 'free' or 'leg'"
-        )
+        return f"reference.of = 'angle': motion.kind = '{scenario.motion.motion_kind.name}' prescribes the angle"
     valve = scenario.device.valve.kind
     if scenario.controlled == ANGLE and VALVES[valve].vents_at_rest:
-        return (
-            f"reference.of = 'angle': a valve of kind '{valve}' vents both chambers at command 0 and cannot hold an "
-            "angle; choose a valve that is closed at command 0, such as device.valve = 'proportional'"
-        )
+        return f"reference.of = 'angle': a valve of kind '{valve}' vents both chambers at command 0 and holds no angle"
     if scenario.device.actuator.has_one_chamber and scenario.controlled in OF_SECOND_CHAMBER:
-        return (
-            f"reference.of = '{scenario.controlled}': {scenario.device.name} has only one chamber; set reference.of to "
-            "'pressure_1'"
-        )
+        return f"reference.of = '{scenario.controlled}': {scenario.device.name} has only one chamber"
     limits, run = limits_of(scenario.device, CONTROLLED[scenario.controlled]), scenario.run
     return profile_problem(limits, scenario.reference, run.duration, run.step, "reference")

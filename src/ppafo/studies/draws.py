@@ -116,14 +116,10 @@ def uncertainty_of(study: Study) -> Uncertainty:
     # A grid has values and no probabilities: a mean over it would be of the grid, not of the device.
     if study.axes:
         raise StudyError(
-            f"study '{study.name}': '{study.axes[0].path}' is varied over a grid or list, which has no "
-            "probabilities; give a distribution, or omit this [[vary]]"
+            f"study '{study.name}': '{study.axes[0].path}' is varied over a grid or list, which has no probabilities"
         )
     if not study.drawn:
-        raise StudyError(
-            f"study '{study.name}': no value has a distribution; give a [[vary]] with a distribution, such as kind = "
-            "'normal'"
-        )
+        raise StudyError(f"study '{study.name}': no value has a distribution")
     return Uncertainty(study.drawn, study.scores, study.same, study.gauge)
 
 
@@ -132,10 +128,7 @@ def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
     whole = uncertainty_of(study)
     kept = [row for row, drawn in enumerate(whole.drawn) if study.varies(drawn.path, configuration.name)]
     if not kept:
-        raise StudyError(
-            f"study '{study.name}': no value has a distribution in configuration '{configuration.name}'; choose "
-            "another configuration, or add a [[vary]] with a distribution"
-        )
+        raise StudyError(f"study '{study.name}': no value has a distribution in configuration '{configuration.name}'")
     same, scores = study.same_in(configuration.name), whole.scores
     if len(kept) == len(whole.drawn):
         return replace(whole, same=same)

@@ -79,7 +79,7 @@ def test_a_profile_has_levels_and_differences() -> None:
         (document("angle", "2 N m", "cascade", **FREE), "reference.level = '2 N m'"),
         (
             document("angle", "90 deg", "cascade", device={"set": "ppafo2011", "valve": "solenoid"}, **FREE),
-            "vents both chambers at command 0 and cannot hold an angle",
+            "vents both chambers at command 0 and holds no angle",
         ),
         (document("angle", "90 deg", "on_off_dead_zone", **FREE), "'controller.dead_zone' is missing"),
         (

@@ -101,10 +101,7 @@ def _why_not(base: Scenario, typed: str, path: str, declared: Mapping[str, Quant
     if path in _TEXTS:
         return f"'{typed}' is a text and cannot vary; run an ensemble for each value"
     if base.controller.is_outside and path.startswith("controller."):
-        return (
-            f"'{typed}' cannot vary: a Python controller object has no declared settings; "
-            "declare them in a module with a KIND (docs/how-to/extend.md)"
-        )
+        return f"'{typed}' cannot vary: a Python controller object has no declared settings"
     if path in OF_SECOND_CHAMBER and base.device.actuator.has_one_chamber:
         return f"'{typed}' cannot vary: {WHY_ONE_CHAMBER}"
     hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
