@@ -6,7 +6,7 @@ from functools import lru_cache
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
+from ppafo.control.kind import DEAD_BAND, OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.channels import REQUEST, TRACED, TRACED_IN_WALKS
 from ppafo.engine.groups import Groups, Role, given, handed, kept, merged, rows_of
@@ -161,6 +161,12 @@ class Program:
     def has_vane(self) -> bool:
         """True if the actuator is a vane, whose volumes do not depend on pressure."""
         return self.actuator == VANE
+
+    @property
+    def inverts_valve(self) -> bool:
+        """True if the law sends the command for the opening that it wants, where it also passes a dead band."""
+        law = self.controller
+        return "sent_command" in self.ports_with_laws and law is not None and DEAD_BAND in law.quantities
 
     @property
     def shank_jumps(self) -> bool:

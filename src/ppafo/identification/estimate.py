@@ -1,7 +1,8 @@
 """Estimate: value of a device parameter with confidence interval, verdict and an explanation in one sentence."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from statistics import NormalDist
 from typing import Literal, get_args
 
@@ -114,7 +115,8 @@ class Estimate:
     sets has a path of its own. An estimate that could not be made has NaN for value and interval. ``explanation`` is
     one sentence: the sources of the uncertainty, the quantities that the value trades off against, or the limits of its
     validity. ``recordings`` names each source with its hash: ``static.csv sha256:0123abcd...``. ``size`` is a typical
-    magnitude [``unit``] of a quantity that may be zero, such as the zero of a sensor.
+    magnitude [``unit``] of a quantity that may be zero, such as the zero of a sensor. ``beside`` are numbers
+    without unit that a set needs with the value, by path, such as the command of a node of a table.
     """
 
     path: str
@@ -127,6 +129,7 @@ class Estimate:
     recordings: tuple[str, ...]
     confidence: float = 0.95
     size: float | None = None
+    beside: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.verdict not in _VERDICTS:

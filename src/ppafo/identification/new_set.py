@@ -94,6 +94,8 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
     # What was fitted as the pressure of both regulators holds for both.
     links = acting(links_of_set(parameter_set), {estimate.path})
     numbers |= dict.fromkeys((estimate.path, *(path for path, link in links.items() if link.when)), entry)
+    note = f"as {estimate.path} was identified"
+    numbers |= {path: Entry(beside, "", "derived", entry.source, note) for path, beside in estimate.beside.items()}
     return replace(parameter_set, numbers=numbers)
 
 

@@ -393,11 +393,17 @@ class ValveMapProblem(FlowProcedure):
 
     kind: Literal["valve-map"]
     valve: _Valve = None
+    nodes: tuple[float, ...] = Field(
+        (),
+        strict=False,
+        description="commands of a table of openings; default: straight beyond a dead band",
+    )
 
     def run(self, sources: tuple[RecordingSource, ...], context: ProcedureContext) -> BenchResult:
         """Identify the flow of the valve over command from recordings."""
         gas = context.gas(self, sources)
-        return valve_map(sources, gas, context.valve_path(self.valve), self.confidence, context.tolerances)
+        path = context.valve_path(self.valve)
+        return valve_map(sources, gas, path, self.confidence, context.tolerances, self.nodes)
 
 
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem

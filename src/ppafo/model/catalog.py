@@ -47,6 +47,7 @@ EFFECTS: Kinds[Effect] = Kinds(
         "joint_load": "ppafo.model.effects.joint_load:EFFECT",
         "seal_friction": "ppafo.model.effects.seal_friction:EFFECT",
         "stribeck": "ppafo.model.effects.stribeck:EFFECT",
+        "opening": "ppafo.model.effects.opening:EFFECT",
         "bandwidth": bandwidth.EFFECT,
     },
 )

@@ -12,6 +12,11 @@ def at_valve(command: float) -> float:
     return command
 
 
+def sent_command(command: float) -> float:
+    """Command [-] that a law sends, given the command to a valve whose opening is its command: -1 to 1, or ``VENT``."""
+    return command
+
+
 def opening_time(time: float, is_coil_a: float) -> float:
     """Time [s] from energising a coil to flow, given a cold coil's; 1 for coil A (chamber 1), 0 for coil B."""
     return time

@@ -33,6 +33,7 @@ from ppafo.parameters.declared import (
 )
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.joint import ANKLE, OPPOSITES, JointNames
+from ppafo.parameters.opening_table import entries_of_opening, fields_of_opening
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
     CITATION,
@@ -169,6 +170,10 @@ def declared(document: Mapping[str, Any]) -> dict[str, Field]:
         "reported.valves": InnerTable("reported values of the valves, by valve name", keys=FREE_KEY),
         **{f"valves.{name}.kind": Words("", True, VALVES) for name in names},
     }
+    proportional = [name for name, kind in kinds.items() if kind == "proportional"]
+    # The table acts on the valve that is chosen: of two it would be of both.
+    for name in proportional if len(proportional) == 1 else ():
+        fields |= fields_of_opening(name)
     for path, quantity in quantities.items():
         if not (path.startswith("valves.") and path.split(".")[1] not in known):
             fields |= inside(path, NUMBER_ENTRY, f"{quantity.summary} [{quantity.unit or '-'}]")
@@ -195,6 +200,10 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
             flags[path] = FlagEntry(**table)
         else:
             texts[path] = TextEntry(**table)
+    for name, valve in document["valves"].items():
+        if "opening" in valve:
+            numbers |= entries_of_opening(valve["opening"], folder, f"{file}: valves.{name}.opening")
+            find_effects(numbers)
     actuator = _table(document, "actuator")
     kind = actuator.get("kind", VANE)
     citation = document.get("citation")

@@ -26,7 +26,7 @@ from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity, error_functions
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import Openings, ThermalParameters
-from ppafo.model.ports import at_valve, friction_at_rest
+from ppafo.model.ports import at_valve, friction_at_rest, sent_command
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
 from ppafo.report.kind import of_path
 from ppafo.signals.recording import OF_SECOND_CHAMBER
@@ -77,6 +77,8 @@ _FIRST_COMMANDS = (0.01, 0.1, 0.003, 0.03, 0.3, 1.0)
 """Magnitudes of the command [-] from which the search for the steady state starts."""
 _MOST_STEPS, _HALVINGS = 60, 20
 """Largest number of steps of Newton's method, and of halvings of one."""
+_TRIED_COMMANDS = tuple(np.linspace(-0.95, 0.95, 20).tolist())
+"""Commands [-] at which a proportional valve moves; a table of openings may be flat at some of them."""
 PID_LAWS = ("pid", "pid_feedforward")
 """Controllers whose feedback is a PID: their loop is linear while the command is not clipped."""
 _POINTS, _POINTS_BELOW = 20_000, 2_000
@@ -87,6 +89,8 @@ _LEAST_START = 1.0e3
 """Least magnitude [-] at the lowest frequency of a loop with an integrator: there the integrator decides."""
 _INTEGRATOR = 1.0e-9
 """Magnitude [1/s] up to which a pole counts as an integrator."""
+_SMALL = 1.0e-7
+"""Change of an opening [-] for the slope of an inverted table."""
 _ROUNDING = 1.0e-9
 """Tolerance for the rounding of a delay in sample periods [-]."""
 
@@ -370,7 +374,8 @@ def _opens_in_proportion(run: Run) -> bool:
     still = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True)) | {"command": 0.0}
     plant = plant_of(_without_slew_limit(run), None, still)
     first, second = (
-        [plant.valve(still | {"command": half + change})[1:] for half in (-0.5, 0.5)] for change in (1.0e-4, 2.0e-4)
+        [plant.valve(still | {"command": command + change})[1:] for command in _TRIED_COMMANDS]
+        for change in (1.0e-4, 2.0e-4)
     )
     return first != second
 
@@ -732,6 +737,12 @@ def open_loop(model: LinearModel) -> tuple[Floats, NDArray[np.complex128]] | Non
     # The law skips the dead band that it assumes, within a narrow range of openings.
     band = gains.get("dead_band", 0.0)
     opened = 1.0 - band + (band / SHARPNESS if command < band + (1.0 - band) * SHARPNESS else 0.0)
+    run = plan_run(scenario)
+    if run.program.inverts_valve:
+        # The law sends what the table needs for an opening: the inverse of its slope.
+        opening, sent = (in_program(port, run.program, run.effects) for port in (at_valve, sent_command))
+        wanted = opening({}, model.inputs[0].value)
+        opened *= float(sent({}, wanted + _SMALL) - sent({}, wanted - _SMALL)) / (2.0 * _SMALL)
     steered = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(opened)
 
     def response(frequencies: Floats) -> NDArray[np.complex128]:

@@ -3,7 +3,7 @@
 from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.engine.step.phases import present_pressures
-from ppafo.model.ports import shown_signals
+from ppafo.model.ports import sent_command, shown_signals
 from ppafo.model.sensors import GaitMeasurement, Measurement, measure, measure_gait
 
 
@@ -16,6 +16,8 @@ def control(parts: Program, lane: Lane, now: Now) -> None:
         lane.controller, lane.controller_state, wanted, lane.seen, lane.timing.period
     )
     lane.controller_state = after
+    if parts.inverts_valve:
+        command = sent_command(command)
     lane.result = lane.result._replace(command=command)
 
 

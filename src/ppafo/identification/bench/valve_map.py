@@ -11,6 +11,7 @@ inside the dead band.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,9 +30,11 @@ from ppafo.identification.bench.law import (
 )
 from ppafo.identification.bench.readings import check_no_wrong_reading, check_sources, meter_readings
 from ppafo.identification.fit import SHAPE, Conflict
-from ppafo.identification.least_squares import FitVariable
+from ppafo.identification.least_squares import FitVariable, Flags
 from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.model.effects.kind import SECTION
+from ppafo.model.effects.opening import NODES
 from ppafo.model.valves.proportional import spool_position
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
@@ -50,6 +53,9 @@ _SATURATES = 0.02
 """Least distance of the saturation from the highest command [-] to be identified."""
 _SMALL_COMMAND = 0.2
 """Typical magnitude [-] of a dead band or backlash, which may be 0."""
+_FEWEST_BETWEEN = 2
+"""Least number of readings between two nodes of a table."""
+_FULL = "valve_map.full_area"
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "valve_map.hysteresis", "valve_map.saturation_command"
 _ROUND, _ROUNDS = "valve_map.round_off", (0.05, 0.005, 0.5)
 """Range over which corners of the opening are rounded, tried beside sharp ones: name, start and bounds [-]."""
@@ -89,8 +95,11 @@ def valve_map(
     path: str = "valve",
     confidence: float = 0.95,
     tolerances: Tolerances = DEFAULTS,
+    nodes: Sequence[float] = (),
 ) -> BenchResult:
     """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).
+
+    With ``nodes`` the opening is a table over the command in place of dead band, gain and saturation.
 
     Arguments:
         sources: recordings of command, mass flow, upstream and downstream pressure
@@ -98,12 +107,101 @@ def valve_map(
         path: path of the valve in a set, ``valves.main``
         confidence: confidence level of the intervals [-]
         tolerances: limits of the errors of the bench
+        nodes: commands of the table between 0 and 1 [-], rising; none for a straight line beyond a dead band
 
     Returns:
         the estimates with intervals and verdicts, a summary and two panels
 
     Raises:
         IdentificationError: recordings that do not determine the map; names file, sample and remedy
+    """
+    sweep, is_possible, remarks = _swept(sources, tolerances)
+    band = f"{path}.dead_band"
+    openings = [f"{SECTION}.opening.opening_{number:02}" for number in range(1, len(nodes) + 1)]
+    unknowns = _sought(sources, sweep, gas, band, nodes, openings)
+    numbers = (
+        *unknowns,
+        *flow_tolerances(gas, tolerances, PRESSURES, float(np.abs(sweep.flow).max())),
+    )
+
+    def law(at: Values) -> Floats:
+        true_upstream = true_pressure(at, "upstream_pressure", sweep.upstream)
+        true_downstream = true_pressure(at, "downstream_pressure", sweep.downstream)
+        spool = np.concatenate([spool_of(command, at[_PLAY]) for command in sweep.commands])
+        if nodes:
+            area = at[_FULL] * np.sign(spool) * table_of(nodes, [at[name] for name in openings], np.abs(spool))
+        else:
+            area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION], at[_ROUND])
+        shape = np.abs(orifice_shape(true_upstream, true_downstream, gas.heat_capacity_ratio))
+        flow = read_flow(at, gas, area * gas.choked_flow_constant * shape)
+        # A play needs every command, so that readings that cannot be drop out of the flow alone.
+        return np.where(is_possible, flow, sweep.flow)
+
+    groups = (
+        np.where(sweep.branch < 0.0, "falling commands", "rising commands").tolist(),
+        np.where(sweep.command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
+        np.where(np.abs(sweep.command) > 0.5 * sweep.highest_command, "large commands", "small commands").tolist(),
+    )
+    readings = PooledReadings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
+    fitted, model = solve(law, readings, numbers, confidence)
+    remedy = f"the opening is not the same in both directions, or not {'' if nodes else 'piece by piece '}linear"
+    # Corners are refuted where an opening with rounded ones, tried in its place, explains the readings better.
+    if not nodes and (fitted.conflict is None or fitted.conflict.number == SHAPE):
+        free = [number for number in numbers if math.isinf(number.deviation) or number.name == ZERO]
+        rounded, _ = solve(law, readings, (*free, sought(_ROUND, *_ROUNDS)), confidence)
+        gain = rounded.log_likelihood - fitted.log_likelihood
+        if gain > _BETTER:
+            remedy = (
+                f"an opening whose corners are rounded over {rounded.by_name[_ROUND]:.2g} of the command, through "
+                "which gas flows from the first command on, explains them better; with nodes = [0.05, 0.1, ...] the "
+                "opening is a table"
+            )
+            fitted = replace(fitted, conflict=Conflict("mass_flow", SHAPE, math.sqrt(2.0 * gain), 0.0))
+    values, residuals = fitted.by_name, sweep.flow - model
+    scatter = np.std(residuals) / np.abs(sweep.flow).max()
+    no_play = "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
+    if nodes:
+        reported = [ReportedNumber(_FULL, "m^2", "Effective area Cd A at full command")]
+        reported += [
+            ReportedNumber(name, "", f"Opening at a command of {node:g}", 1.0)
+            for name, node in zip(openings, nodes, strict=True)
+        ]
+        found = f"a table of {len(nodes)} nodes, {1e6 * values[_FULL]:.4g} mm^2 at full command"
+    else:
+        reported = [
+            ReportedNumber(band, "", "Dead band: command below which no gas flows, in both directions", _SMALL_COMMAND),
+            ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
+        ]
+        found = f"dead band {values[band]:.3g}, {1e6 * values[_GAIN]:.4g} mm^2 per command"
+    # Near the highest command there is no saturation to be seen, and no backlash in commands of one direction.
+    if not nodes and values[_SATURATION] < sweep.highest_command - _SATURATES:
+        reported.append(ReportedNumber(_SATURATION, "", "Saturation: command beyond which the opening is constant"))
+    if sweep.is_two_way:
+        width = "Hysteresis: width between rising and falling command"
+        reported.append(ReportedNumber(_PLAY, "", width, _SMALL_COMMAND))
+    marks = []
+    for role, name, on in (("rising", "fitted", sweep.branch == 1.0), ("falling", "", sweep.branch == -1.0)):
+        if on.any():
+            marks.append(readings_mark(f"command {role}", sweep.command[on], sweep.flow[on], role))
+            marks.append(curve_mark(name, sweep.command[on], model[on]))
+    axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
+    result = result_of(
+        PROCEDURE,
+        sources,
+        fitted,
+        reported,
+        f"{sweep.command.size} readings; {found}; scatter {scatter:.2%} of the largest flow",
+        with_residuals("Valve map", *axes, marks, sweep.command, residuals),
+        remedy,
+        (*remarks, *(() if sweep.is_two_way or nodes else (no_play,))),
+    )
+    return _with_nodes(result, band, nodes, openings) if nodes else result
+
+
+def _swept(sources: tuple[RecordingSource, ...], tolerances: Tolerances) -> tuple[_Sweep, Flags, tuple[str, ...]]:
+    """Return the readings, flags of those that are possible, and remarks on the others.
+
+    Raises IdentificationError for channels that are missing or do not move, and for a command beyond 1.
     """
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
     branches = []
@@ -124,71 +222,25 @@ def valve_map(
     measured, is_possible, remarks = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow)
     commands = tuple(source.recording["command"] for source in sources)
     sweep = _Sweep(commands, command, measured, upstream, downstream, np.concatenate(branches))
-    band = f"{path}.dead_band"
-    numbers = (
-        *_sought(sources, sweep, gas, band),
-        *flow_tolerances(gas, tolerances, PRESSURES, float(np.abs(sweep.flow).max())),
-    )
+    return sweep, is_possible, remarks
 
-    def law(at: Values) -> Floats:
-        true_upstream = true_pressure(at, "upstream_pressure", sweep.upstream)
-        true_downstream = true_pressure(at, "downstream_pressure", sweep.downstream)
-        spool = np.concatenate([spool_of(command, at[_PLAY]) for command in sweep.commands])
-        area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION], at[_ROUND])
-        shape = np.abs(orifice_shape(true_upstream, true_downstream, gas.heat_capacity_ratio))
-        flow = read_flow(at, gas, area * gas.choked_flow_constant * shape)
-        # A play needs every command, so that readings that cannot be drop out of the flow alone.
-        return np.where(is_possible, flow, sweep.flow)
 
-    groups = (
-        np.where(sweep.branch < 0.0, "falling commands", "rising commands").tolist(),
-        np.where(sweep.command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
-        np.where(np.abs(sweep.command) > 0.5 * sweep.highest_command, "large commands", "small commands").tolist(),
-    )
-    readings = PooledReadings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
-    fitted, model = solve(law, readings, numbers, confidence)
-    remedy = "the opening is not the same in both directions, or not linear in the command"
-    # Corners are refuted where an opening with rounded ones, tried in its place, explains the readings better.
-    if fitted.conflict is None or fitted.conflict.number == SHAPE:
-        free = [number for number in numbers if math.isinf(number.deviation) or number.name == ZERO]
-        rounded, _ = solve(law, readings, (*free, sought(_ROUND, *_ROUNDS)), confidence)
-        gain = rounded.log_likelihood - fitted.log_likelihood
-        if gain > _BETTER:
-            remedy = (
-                f"an opening whose corners are rounded over {rounded.by_name[_ROUND]:.2g} of the command, through "
-                "which gas flows from the first command on, explains them better"
-            )
-            fitted = replace(fitted, conflict=Conflict("mass_flow", SHAPE, math.sqrt(2.0 * gain), 0.0))
-    values, residuals = fitted.by_name, sweep.flow - model
-    scatter = np.std(residuals) / np.abs(sweep.flow).max()
-    no_play = "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
-    reported = [
-        ReportedNumber(band, "", "Dead band: command below which no gas flows, in both directions", _SMALL_COMMAND),
-        ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
-    ]
-    # Near the highest command there is no saturation to be seen, and no backlash in commands of one direction.
-    if values[_SATURATION] < sweep.highest_command - _SATURATES:
-        reported.append(ReportedNumber(_SATURATION, "", "Saturation: command beyond which the opening is constant"))
-    if sweep.is_two_way:
-        width = "Hysteresis: width between rising and falling command"
-        reported.append(ReportedNumber(_PLAY, "", width, _SMALL_COMMAND))
-    marks = []
-    for role, name, on in (("rising", "fitted", sweep.branch == 1.0), ("falling", "", sweep.branch == -1.0)):
-        if on.any():
-            marks.append(readings_mark(f"command {role}", sweep.command[on], sweep.flow[on], role))
-            marks.append(curve_mark(name, sweep.command[on], model[on]))
-    axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
-    return result_of(
-        PROCEDURE,
-        sources,
-        fitted,
-        reported,
-        f"{sweep.command.size} readings; dead band {values[band]:.3g}, {values[_GAIN] * 1e6:.4g} mm^2 per command; "
-        f"scatter {scatter:.2%} of the largest flow",
-        with_residuals("Valve map", *axes, marks, sweep.command, residuals),
-        remedy,
-        (*remarks, *(() if sweep.is_two_way else (no_play,))),
-    )
+def table_of(nodes: Sequence[float], openings: Sequence[float], size: Floats) -> Floats:
+    """Return the opening [-] of a table for sizes of the command [-]; within the noise an opening may not fall."""
+    rising = np.clip(np.maximum.accumulate(openings), 0.0, 1.0)
+    return np.asarray(np.interp(size, [0.0, *nodes, 1.0], [0.0, *rising.tolist(), 1.0]))
+
+
+def _with_nodes(result: BenchResult, band: str, nodes: Sequence[float], openings: Sequence[str]) -> BenchResult:
+    """Return the result with openings that do not fall, and beside them commands and no dead band, for a set."""
+    highest, estimates = 0.0, {estimate.path: estimate for estimate in result.estimates}
+    for number, (path, node) in enumerate(zip(openings, nodes, strict=True), 1):
+        found = estimates[path]
+        highest = max(highest, found.value) if found.is_usable else highest
+        beside = {f"{SECTION}.opening.command_{number:02}": node, band: 0.0}
+        value = highest if found.is_usable else found.value
+        estimates[path] = replace(found, value=value, high=max(found.high, value), beside=beside)
+    return replace(result, estimates=tuple(estimates.values()))
 
 
 def area_of_command(
@@ -219,8 +271,17 @@ def spool_of(command: Floats, width: float) -> Floats:
     return np.array(positions)
 
 
-def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt, band: str) -> tuple[FitVariable, ...]:
-    """Return the unknowns with first guesses; ``band`` is a path. Raises IdentificationError if there are none.
+def _sought(
+    sources: tuple[RecordingSource, ...],
+    sweep: _Sweep,
+    gas: GasAt,
+    band: str,
+    nodes: Sequence[float],
+    openings: Sequence[str],
+) -> tuple[FitVariable, ...]:
+    """Return the unknowns with first guesses; ``band`` and ``openings`` are paths of the straight line or the table.
+
+    Raises IdentificationError if the readings do not determine them.
 
     The effective area is flow divided by flow per area at the measured pressures, so that a sagging supply is not
     saturation.
@@ -244,6 +305,18 @@ def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt, ban
             "'mass_flow' or 'command'"
         )
     size, largest, highest = np.abs(sweep.command), float(np.abs(areas).max()), sweep.highest_command
+    play = (sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()
+    if nodes:
+        ends = [0.0, *nodes, 1.0]
+        counts, _ = np.histogram(size, ends)
+        if len(nodes) > NODES or min(np.diff(ends)) <= 0.0 or counts.min() < _FEWEST_BETWEEN:
+            raise IdentificationError(
+                f"{sources[0].name}: {PROCEDURE}: nodes = {list(nodes)}: must rise from above 0 to below 1, at most "
+                f"{NODES}, with {_FEWEST_BETWEEN} readings or more between two of them and the ends 0 and 1"
+            )
+        near = [float(np.median(np.abs(areas[np.argsort(np.abs(size - node))[:3]]))) for node in nodes]
+        starts = zip(openings, np.clip(np.array(near) / largest, 0.0, 1.0).tolist(), strict=True)
+        return (sought(_FULL, largest, 0.0), *(sought(name, start, 0.0, 1.0, 1.0) for name, start in starts), *play)
     half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())
     if not half > 0.0:
         raise IdentificationError(
@@ -258,5 +331,5 @@ def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt, ban
         sought(_GAIN, 0.5 * largest / (half - start), 0.0),
         # Just inside the highest command, beyond which no reading changes with it.
         sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
-        *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()),
+        *play,
     )
