@@ -21,6 +21,11 @@ SEALS = tuple(
 STRIBECK = ("effects.stribeck.velocity=2 rad/s",)
 LINE = ("effects.line_resistance.area=8 mm^2",)
 LAMINAR = ("actuator.leak.area=0.1 mm^2", "effects.laminar_leak.coefficient=1e-15 kg/(s Pa^2)", *FREE)
+TABLE = tuple(
+    f"effects.opening.{name}_{number:02}={value}"
+    for number, node in enumerate(((0.05, 0.0), (0.3, 0.1), (0.5, 0.1), (0.8, 0.9)), 1)
+    for name, value in zip(("command", "opening"), node, strict=True)
+)
 STEP, PAIR, SPOOL = "step-response", "torque-task-solenoid", "torque-task-proportional"
 CASES = (
     *((STEP, SEALS), (STEP, STRIBECK), (PAIR, (*SEALS, *STRIBECK, *FREE))),
@@ -28,6 +33,8 @@ CASES = (
     (STEP, (*LINE, *THERMAL, "run.duration=0.3 s")),
     (SPOOL, (*LINE, "run.duration=0.3 s")),
     *((STEP, LAMINAR), (PAIR, LAMINAR)),
+    (SPOOL, (*TABLE, "run.duration=0.3 s")),
+    ("torque-task-slow-valve", (*TABLE, "run.duration=0.3 s")),
 )
 
 

@@ -89,11 +89,18 @@ _KNOTS = (
     *("reference.time_03=0.1 s", "reference.value_03=1 N m"),
 )
 
+_TABLE = tuple(
+    f"effects.opening.{name}_{number:02}={value:g}"
+    for number in range(1, 13)
+    for name, value in (("command", 0.07 * number), ("opening", (number - 1) ** 2 / 150.0))
+)
+
 VANE_FEATURES: dict[str, Feature] = {
     # Valves: what they keep between two steps, and commands that come late.
     "late command": _feature("valve.delay=3 ms", needs="valve"),
     "command late by parts of a step": _feature("valve.delay=2.3 ms", needs="valve"),
     "dead band": _feature("valve.dead_band=0.05", needs="valve"),
+    "table of openings": _feature(*_TABLE),
     "spool": _feature("valve.spool_frequency=40 Hz", "valve.spool_damping_ratio=0.5", needs="valve"),
     "slew": _feature("valve.slew_limit=30 1/s", needs="valve"),
     "solenoid": _feature(*_SOLENOID, needs="valve law clock actuator"),
@@ -208,6 +215,7 @@ VANE_FEATURES: dict[str, Feature] = {
 WALK_FEATURES: dict[str, Feature] = {
     "late command": _feature("valve.delay=5 ms", needs="valve"),
     "spool": _feature("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", needs="valve"),
+    "table of openings": _feature(*_TABLE),
     "thermal gas": _feature(*_THERMAL),
     "supply lines": _feature(*_LINES),
     "joint load": _feature("effects.joint_load.drag=0.01 N m s^2/rad^2", "effects.joint_load.stiffness=1 N m/rad"),

@@ -308,8 +308,8 @@ def _sought(
     play = (sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()
     if nodes:
         ends = [0.0, *nodes, 1.0]
-        counts, _ = np.histogram(size, ends)
-        if len(nodes) > NODES or min(np.diff(ends)) <= 0.0 or counts.min() < _FEWEST_BETWEEN:
+        rises = min(np.diff(ends)) > 0.0
+        if len(nodes) > NODES or not rises or np.histogram(size, ends)[0].min() < _FEWEST_BETWEEN:
             raise IdentificationError(
                 f"{sources[0].name}: {PROCEDURE}: nodes = {list(nodes)}: must rise from above 0 to below 1, at most "
                 f"{NODES}, with {_FEWEST_BETWEEN} readings or more between two of them and the ends 0 and 1"

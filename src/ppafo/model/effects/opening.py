@@ -9,7 +9,7 @@ from ppafo.model.valves.kind import VENTS_ABOVE
 
 NODES = 12
 """Largest number of nodes between the ends of the table, (0, 0) and (1, 1)."""
-SHARPNESS = 0.005
+SHARPNESS = 0.0078125
 """Opening [-] within which an inverted table passes the range of commands at which the valve stays closed."""
 
 
@@ -107,7 +107,7 @@ EFFECT = Effect(
     source="flow over command of the valve's data sheet or of the bench",
     equation="o = o_k + (o_(k+1) - o_k) (u - u_k) / (u_(k+1) - u_k)",
     symbols=(
-        ("u_k", "command_01", "-", "command of a node of the table of openings"),
-        ("o_k", "opening_01", "-", "opening at this command"),
+        ("u_k", "command", "-", "command of a node of the table of openings"),
+        ("o_k", "opening", "-", "opening at this command"),
     ),
 )

@@ -153,6 +153,26 @@ def test_a_round_hole_has_no_dead_band_that_is_identified(noise: float, seed: in
     assert "have a shape that the law has not" in result.conflict or "fitted alone" in result.conflict
 
 
+def test_the_table_of_a_round_hole_has_its_openings_inside_their_intervals_and_no_dead_band() -> None:
+    nodes = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+    half_angle = np.arccos(1.0 - 1.9 * np.array([*nodes, 1.0]))
+    shares = half_angle - 0.5 * np.sin(2.0 * half_angle)
+    inside = 0
+    for seed in range(6):
+        result = valve_map((round_hole(0.003, True, seed),), planted.CO2, nodes=nodes)
+        found = [result[f"effects.opening.opening_{number:02}"] for number in range(1, len(nodes) + 1)]
+        # Straight lines between the nodes miss the curve by up to a third of the noise.
+        inside += sum(
+            item.low - 1e-3 <= share <= item.high + 1e-3
+            for item, share in zip(found, (shares[:-1] / shares[-1]).tolist(), strict=True)
+        )
+        assert all(item.is_identified for item in found)
+        assert found[0].beside == {"effects.opening.command_01": 0.05, "valve.dead_band": 0.0}
+    assert inside >= 54
+    with pytest.raises(IdentificationError, match=r"nodes = \[0.5, 0.4\]: must rise"):
+        valve_map((round_hole(0.0, True, 1),), planted.CO2, nodes=(0.5, 0.4))
+
+
 def test_the_zero_of_the_flow_meter_does_not_move_the_dead_band() -> None:
     source = planted.sweep()
     off = changed(source, "mass_flow", source.recording["mass_flow"] + 4e-5)
