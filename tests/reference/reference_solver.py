@@ -19,7 +19,7 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.errors import SimulationError
 from ppafo.model.plant import PlantParameters
-from ppafo.model.ports import at_valve, friction_at_rest, rebound, shown_signals
+from ppafo.model.ports import at_valve, friction_at_rest, rebound, sent_command, shown_signals
 from ppafo.model.sensors import Measurement, measure
 from tests.interpreted import load_source
 from tests.reference.reference_slopes import (
@@ -72,7 +72,7 @@ class SampledControl:
         if run.program.controller is None:
             raise SimulationError("the reference solver runs controllers of the catalogue only")
         self._run = run
-        self._controller = run.program.controller
+        self._controller, self._inverts = run.program.controller, run.program.inverts_valve
         self._state = run.program.controller.initial
         self._first_signals = first_signals
         self._seen: dict[int, Signals] = {}
@@ -84,7 +84,8 @@ class SampledControl:
         run = self._run
         wanted = run.program.reference.value(run.reference, time)[0]
         seen = self._measurement(sample, present)
-        self.decided, self._state = self._controller.update(run.controller, self._state, wanted, seen, run.period)
+        asked, self._state = self._controller.update(run.controller, self._state, wanted, seen, run.period)
+        self.decided = in_program(sent_command, run.program, run.effects)({}, asked) if self._inverts else asked
         self._on_the_way.append((time + run.command_delay, self.decided))
 
     def looks(self, next_sample: int) -> dict[float, int]:

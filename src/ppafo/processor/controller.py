@@ -46,8 +46,12 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
             f"{scenario.name}: controller.period = {period:.9g} s: must be a multiple of 0.125 ms on the processor, "
             f"at most {MOST_TICKS // 2 * TICK:.3g} s"
         )
-    law = FIXED_LAWS[scenario.controller.kind]
-    row = plan_run(scenario).controller
+    law, run = FIXED_LAWS[scenario.controller.kind], plan_run(scenario)
+    if "sent_command" in run.program.ports_with_laws:
+        raise ScenarioError(
+            f"{scenario.name}: effects.opening: the firmware inverts no table of openings; omit the table"
+        )
+    row = run.controller
     numbers = dict(zip((quantity.name for quantity in law.number_quantities), leaves(row.numbers), strict=True))
     return FixedPointController(
         scenario=scenario, law=law, numbers=numbers, steps=row.steps, limits=row.numbers.limits, ticks=ticks

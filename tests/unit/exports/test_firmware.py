@@ -160,6 +160,7 @@ def test_numbers_stand_in_a_header_with_range_and_origin() -> None:
 @pytest.mark.parametrize(
     ("name", "overrides", "said"),
     [
+        ("torque-task-proportional", ("effects.opening.command_01=0.1",), "inverts no table of openings"),
         ("step-response", (), "'constant' has no fixed-point form; available: pid, on_off"),
         (
             "torque-task-solenoid",

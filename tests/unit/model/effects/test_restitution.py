@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from ppafo.model.catalog import device_effects
@@ -22,13 +21,6 @@ def test_it_is_on_at_0_too_and_no_section_of_effects_has_it() -> None:
     assert effects_of(device) == (EFFECT,)
     assert effect_rows(device) == (Restitution(0.0),)
     assert EFFECT not in device_effects()
-
-
-def test_a_column_of_it_needs_no_call_for_each_run() -> None:
-    device = load_device("ppafo2011")
-    column = np.linspace(0.0, 1.0, 5)
-    (row,) = effect_rows(replace(device, actuator=replace(device.actuator, restitution=column)))
-    assert row.restitution is column
 
 
 def test_an_effect_that_is_always_on_with_a_switch_or_without_a_section_is_refused() -> None:
