@@ -56,7 +56,7 @@ def test_the_jacobian_of_a_step_of_the_lanes_is_that_of_its_own_flows(ratios: tu
     def flows_at(pressure_1: float, pressure_2: float) -> Floats:
         return np.array(flow_rates(gas_flows(PLANT, pressure_1, pressure_2, *ports, blended_port_flow).flows)[:2])
 
-    linear, _ = linearise(*per_mass, gas_flows(PLANT, *pressures, *ports, blended_port_flow), step)
+    linear = linearise(*per_mass, gas_flows(PLANT, *pressures, *ports, blended_port_flow), step)
     by_1 = one_sided_slopes(lambda value: flows_at(value, pressures[1]), pressures[0], 1.0, 1e5)[0] * per_mass[0]
     by_2 = one_sided_slopes(lambda value: flows_at(pressures[0], value), pressures[1], 1.0, 1e5)[0] * per_mass[1]
     found = np.eye(2) - GAMMA * step * np.array([by_1, by_2]).T
