@@ -184,18 +184,13 @@ def test_a_walk_of_every_feature_is_clean_under_the_sanitizers_and_the_same_in_c
         assert (again[0], again[1].tobytes()) == (first[0], first[1].tobytes())
 
 
+CONTRADICTING = {"wearer_body_mass": 1.0, "controller_unload_threshold": 70.0, "controller_peak_time": 0.39}
+
+
 @pytest.mark.parametrize(
     ("overrides", "refused"),
     [
-        (
-            (),
-            {
-                "wearer_body_mass": 1.0,
-                "controller_unload_threshold": 70.0,
-                "controller_peak_time": 0.39,
-                "sensors_force_noise": 5.0,
-            },
-        ),
+        ((), {**CONTRADICTING, "sensors_force_noise": 5.0}),
         (OF_ANOTHER_KIND[0], {"actuator_rod_diameter": 0.5}),
         (OF_ANOTHER_KIND[1], {"actuator_angle_max": 2.5, "supply_pressure": 2.0e5}),
     ],

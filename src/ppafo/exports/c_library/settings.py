@@ -38,8 +38,10 @@ def settings_of(scenario: Scenario, recorded: float | None = None) -> tuple[Expo
     if recorded is None:
         times["run.step"] = _longest_step(scenario)
     else:
-        # A library may walk longer than a file; its step is that of a walk.
+        # A library may walk longer than a file; its step is that of a walk. No file has the command of a plant alone.
         declared |= {f"run.{quantity.name}": quantity for quantity in RUN if quantity.name != "step"}
+        law = scenario.motion.motion_kind.law(scenario)
+        declared |= {f"controller.{quantity.name}": quantity for quantity in law.quantities}
     return tuple(
         ExportParameter(
             c_identifier(path),
