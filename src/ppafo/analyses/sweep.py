@@ -54,7 +54,7 @@ def sweep(
         overrides: values to change, texts or a dictionary as of ``simulate``; of one configuration: 'NAME:PATH=VALUE'
         draws: number of draws in place of the file's
         seed: random seed in place of the file's
-        threads: threads of each process; default: all cores
+        threads: threads of each process; default: all cores, one of a worker
         executor: an Executor of concurrent.futures, such as a cluster's, or the MODULE:OBJECT of one; default: this
             process
         out: a folder, where an interrupted study resumes; default: a temporary folder that exists as long as the
@@ -109,7 +109,7 @@ def sweep(
     # Rows change below: an old summary would pass for a finished study meanwhile.
     if missing:
         (folder.path / SUMMARY).unlink(missing_ok=True)
-    work = partial(compute_chunk, chosen, threads=threads)
+    work = partial(compute_chunk, chosen, threads=threads if workers is None else threads or 1)
     computed: Iterable[tuple[int, tuple[int, bytes]]]
     if workers is None:
         computed = enumerate(work(chunk, count=counter.count_ended) for chunk in missing)

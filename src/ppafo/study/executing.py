@@ -8,7 +8,6 @@ import pickle
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future
-from functools import lru_cache
 from itertools import islice
 from queue import SimpleQueue
 from secrets import token_hex
@@ -91,15 +90,12 @@ def computed_by(
 
 def _computed(sent: bytes, block: Any, _mark: str) -> Any:
     """Return the answer to a block, on a worker."""
-    return _loaded(sent)(block)
-
-
-@lru_cache(maxsize=4)
-def _loaded(sent: bytes) -> Callable[[Any], Any]:
     try:
-        return pickle.loads(sent)  # type: ignore[no-any-return]  # from this package, in the process that submits
+        # Anew for each block: a worker may have several threads, and a Python controller one state.
+        work = pickle.loads(sent)
     except (ImportError, AttributeError) as error:
         raise StudyError(
             f"executor: a worker cannot load the study: {error}; install this module there, or send it by means of the "
             "executor, such as upload_file of Dask's Client"
         ) from error
+    return work(block)

@@ -163,9 +163,11 @@ def scenario_runs(
     """
     check_metrics([name for name in metrics if name not in VERDICT_METRICS], scenario)
 
-    evaluate = partial(_rows_of, scenario, tuple(metrics), frozenset(gauge), threads)
+    evaluate = partial(_rows_of, scenario, tuple(metrics), frozenset(gauge))
     if executor is None:
-        evaluate = partial(evaluate, count=counter.count_ended)
+        evaluate = partial(evaluate, threads, count=counter.count_ended)
+    else:
+        evaluate = partial(evaluate, threads or 1)
     is_slow = scenario.controller.custom is not None
     at_once = _SLOW_AT_ONCE if is_slow else runs_at_once(scenario, _AT_ONCE)
     return Runs(evaluate, metrics, counter, at_once, executor)

@@ -17,7 +17,7 @@ import ppafo
 from ppafo.analyses.study_results import StudyResults
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
-from ppafo.study.executing import _loaded, computed_by, executor_of
+from ppafo.study.executing import _computed, computed_by, executor_of
 from tests.unit.analyses.sweep.test_run_study import contents
 
 PAIR = {"metrics": "rms_error", "configuration": "solenoid", "samples": 64}
@@ -77,7 +77,7 @@ def test_what_cannot_be_loaded_or_sent_is_named(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(sys, "path", [])
     monkeypatch.delitem(sys.modules, "my_law")
     with pytest.raises(StudyError, match="a worker cannot load the study: No module named 'my_law'; install"):
-        _loaded(sent)
+        _computed(sent, 1, "")
     with pytest.raises(StudyError, match="a class or function of the study cannot be sent to workers"):
         list(computed_by(ThreadPoolExecutor(1), lambda block: block, [1]))
     for word in ("nowhere:POOL", "math:nothing", "math:pi"):

@@ -4,6 +4,7 @@ import importlib.util
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -74,6 +75,9 @@ def test_a_study_goes_on_with_the_same_law_and_is_refused_with_any_other(
     out, law = tmp_path / "out", written(LAW).Law()
     first = ppafo.sweep(controlled_by(law), out=out).found.table()["rms_error"]
     assert law.sum != 0.0
+    alone = replace(controlled_by(law), runs_of_chunk=1)
+    with ThreadPoolExecutor(2) as pool:
+        assert np.array_equal(ppafo.sweep(alone, executor=pool).found.table()["rms_error"], first)
     for note in (out / "finished").iterdir():
         note.unlink()
     for same in (law, written(LAW).Law()):
