@@ -23,7 +23,6 @@ from tests.unit.analyses.sweep.test_run_study import contents
 PAIR = {"metrics": "rms_error", "configuration": "solenoid", "samples": 64}
 
 
-@pytest.mark.long
 def test_sweep_sensitivity_and_tune_are_the_same_on_two_processes(
     small_results: StudyResults, small: Any, tmp_path: Path
 ) -> None:
@@ -96,7 +95,6 @@ def dask() -> Iterator[Any]:
         yield client
 
 
-@pytest.mark.long
 def test_a_cluster_that_loses_a_worker_ends_with_the_same_bytes(
     dask: Any, small_results: StudyResults, small: Any, tmp_path: Path
 ) -> None:
