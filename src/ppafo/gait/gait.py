@@ -210,10 +210,7 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[G
     Series and error are in the unit of ``values`` [SI]. Raises DataError if there are too few values.
     """
     if values.size < 2 * harmonics + 2:
-        raise DataError(
-            f"{harmonics} harmonics need at least {2 * harmonics + 2} samples, not {values.size}; give fewer harmonics "
-            "or more samples"
-        )
+        raise DataError(f"{harmonics} harmonics need at least {2 * harmonics + 2} samples, not {values.size}")
     # Both ends are the same phase: a series through both weighs it twice, as the recording has it.
     turns = 2.0 * np.pi * np.linspace(0.0, 1.0, values.size)
     orders = np.arange(1, harmonics + 1)

@@ -167,13 +167,8 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
     for cell in header:
         name, bracket, unit = (part.strip() for part in cell.strip().removesuffix("]").partition("["))
         if name not in COLUMNS:
-            if "torque" in name.lower():
-                raise ParameterError(
-                    f"{file}: column '{one_line(name)[:_LONGEST]}': the table must have volumes, not torques; "
-                    "integrate dV/dangle = dT/dpressure (T/p for a rigid chamber) over the angle, starting from the "
-                    "volumes at the first angle; the code is in docs/how-to/extend.md under 'From torques'"
-                )
             shown, hint = one_line(name)[:_LONGEST], nearest_name(name, COLUMNS)
+            hint = "; how volumes follow from torques is in docs/how-to/extend.md" if "torque" in name.lower() else hint
             raise ParameterError(f"{file}: unknown column '{shown}'{hint}; allowed: {', '.join(COLUMNS)}")
         if name in units:
             raise ParameterError(f"{file}: the column '{name}' occurs twice; rename or remove one of them")
@@ -265,9 +260,7 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
         fall = -float(np.diff(volume, axis=1)[row, column])
         raise ParameterError(
             f"{file}: {name} decreases with pressure at {_point_text(angles[row], pressures[column + 1])}, by "
-            f"{shown_text(fall, 'm^3', '.3g')}; at most the last digit, {shown_text(resolution, 'm^3', '.3g')}, is "
-            "allowed: correct the volume; round measured volumes to their resolution; for volumes from torques fit "
-            "a straight line of the torque over pressure, as rounding changes the torque"
+            f"{shown_text(fall, 'm^3', '.3g')}; allowed is the last digit, {shown_text(resolution, 'm^3', '.3g')}"
         )
     sign, direction = (1.0, "grow") if name == "volume_1" else (-1.0, "shrink")
     wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= -unseen)

@@ -237,10 +237,7 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
     find_effects([path])
     declared = parameter_set.declarations()
     if path in OF_SECOND_CHAMBER and parameter_set.has_one_chamber:
-        raise ParameterError(
-            f"override '{override}' concerns chamber 2, but in {parameter_set.file} {WHY_ONE_CHAMBER}; remove the "
-            "override"
-        )
+        raise ParameterError(f"override '{override}' concerns chamber 2, but in {parameter_set.file} {WHY_ONE_CHAMBER}")
     if path not in declared:
         # So that the hint knows the values of effects that no set of this run has named.
         EFFECTS.load_own()

@@ -129,10 +129,7 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     # A set in the place of a scenario would else be refused key by key.
     if "default_valve" in request.content and not {"run", "controller"} & request.content.keys():
         of_set = (f"device.set={request.file}", f"device.valve={one_line(request.content['default_valve'])}")
-        raise ScenarioError(
-            f"{request.file}: is a parameter set, not a scenario; "
-            f"give the name of a scenario and {override_text(of_set)}"
-        )
+        raise ScenarioError(f"{request.file}: is a parameter set, not a scenario; {override_text(of_set)} takes it")
     file, content = request.file, layout.content
     # What is wrong in the file itself is said as such; what it lacks an override may give.
     _check_layout(request.content, request, content, may_have_gaps=bool(request.overrides))

@@ -40,10 +40,7 @@ class SampledRun:
             self._last_measurement = NOTHING_SEEN
             # Gas temperatures of a walk are kept inside the compiled program alone.
             if program.is_thermal:
-                raise ScenarioError(
-                    "a Python controller cannot run a walk with a thermal gas model; use a controller given by "
-                    "controller.kind, or omit the gas model"
-                )
+                raise ScenarioError("a Python controller cannot run a walk with a thermal gas model")
             self._gait_sensors = _parameter_group(batch, "gait_sensors")
         else:
             effects = [_parameter_group(batch, effect.name) for effect in program.effects]

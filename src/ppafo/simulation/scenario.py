@@ -451,10 +451,7 @@ def vane_motion(scenario: Scenario) -> VaneMotion:
     """Motion of a scenario of a vane alone; ScenarioError for a leg that walks with the device."""
     if isinstance(scenario.motion, FreeMotion | PrescribedMotion):
         return scenario.motion
-    raise ScenarioError(
-        f"{scenario.name}: its motion is {scenario.motion.label}, but only a device that does not walk can be used "
-        "here; give a scenario without a walk"
-    )
+    raise ScenarioError(f"{scenario.name}: its motion is {scenario.motion.label}, but it must not walk here")
 
 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:

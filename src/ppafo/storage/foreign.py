@@ -41,10 +41,7 @@ def read_foreign(
     recordings = read_trials(path, columns, atmosphere, map_name, gas)
     if len(recordings) > 1:
         with refused_as(DataError, path, DataError), in_map(map_name):
-            raise DataError(
-                f"trial selects {len(recordings)} recordings; give the number of one trial (only a procedure of 'ppafo "
-                "identify' reads several)"
-            )
+            raise DataError(f"trial selects {len(recordings)} recordings; give the number of one trial")
     return recordings[0]
 
 

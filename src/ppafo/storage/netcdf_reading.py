@@ -63,7 +63,7 @@ def read_netcdf(path: str | Path) -> Recording:
             if required > max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * len(content)):
                 raise DataError(
                     f"requires {required / 1e6:,.0f} MB of memory, more than {_MAXIMUM_GROWTH} times the size of the "
-                    f"file ({len(content) / 1e6:.2g} MB); the file is probably damaged: write the file again"
+                    f"file ({len(content) / 1e6:.2g} MB)"
                 )
             for name, variable in variables.items():
                 _check_is_whole(name, variable)

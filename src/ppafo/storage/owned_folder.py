@@ -112,10 +112,7 @@ def _check_earlier_result(folder: Path, kind: FolderKind, present: Collection[st
         raise DataError(f"{folder}: is not empty and not a {kind.noun} (it has no {kind.mark}); choose another folder")
     hashes = kind.document_of(folder).get(HASHES)
     if not isinstance(hashes, dict):
-        raise DataError(
-            f"{folder / kind.mark}: has no file hashes (written by an earlier version of ppafo); "
-            "remove the folder, or choose another one"
-        )
+        raise DataError(f"{folder / kind.mark}: has no file hashes (written by an earlier version of ppafo)")
     # Before hashes are compared: a file of somebody else's is the likelier and the clearer reason.
     foreign = sorted(_foreign_names(folder, {*hashes, kind.mark}))
     if foreign:

@@ -60,10 +60,7 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
         levels = {parse_quantity(text, _OUTCOME_LEVELS.get(unit, unit), atmosphere) for atmosphere in atmospheres}
     level = levels.pop() if len(levels) == 1 else None
     if level is None:
-        raise StudyError(
-            f"{what}: must not be a gauge pressure, because {ATMOSPHERE_PATH} varies; give an absolute pressure, for "
-            "example '446 kPa_a'"
-        )
+        raise StudyError(f"{what}: must not be a gauge pressure, because {ATMOSPHERE_PATH} varies")
     return level
 
 

@@ -131,10 +131,7 @@ def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
         return varied
     if not all(gauge):
         other = units[gauge.index(not gauge[0])]
-        raise UnitError(
-            f"the atmosphere varies, so '{units[0]}' and '{other}' cannot be mixed; give only gauge or only absolute "
-            "pressures"
-        )
+        raise UnitError(f"the atmosphere varies, so '{units[0]}' and '{other}' cannot be mixed")
     return replace(varied, is_gauge=True)
 
 

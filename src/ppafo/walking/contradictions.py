@@ -120,10 +120,7 @@ def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
 def check_no_bottle(scenario: Scenario) -> None:
     """Raise ScenarioError if the walk is on a bottle, which is supported by ``ppafo walk`` alone."""
     if walk_of(scenario).bottle is not None:
-        raise ScenarioError(
-            f"{scenario.name}: a walk with a bottle can only be simulated by 'ppafo walk', which computes bottle and "
-            "device together, step by step; omit the bottle, or add [supply_line]"
-        )
+        raise ScenarioError(f"{scenario.name}: a walk with a bottle can only be simulated by 'ppafo walk'")
 
 
 def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:

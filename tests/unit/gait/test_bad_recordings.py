@@ -311,7 +311,7 @@ def test_a_hip_below_the_ground_is_a_sign_and_no_unit(opensim_files: dict[str, P
     opensim_files["ik"].write_text(f"{top}endheader\n{table}\n")
     with pytest.raises(DataError) as caught:
         import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=1.63))
-    assert re.search(r"the hip is -0\.87 m high \(pelvis_ty\), .* its sign is reversed", str(caught.value))
+    assert re.search(r"the hip is -0\.87 m high \(pelvis_ty\): the sign of knee\.up is reversed", str(caught.value))
 
 
 def test_a_moment_that_hardly_shows_its_sign_is_remarked() -> None:

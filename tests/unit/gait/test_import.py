@@ -171,7 +171,7 @@ def test_a_hip_that_does_not_move_is_refused(opensim_files: dict[str, Path]) -> 
     labels, *lines = rows.splitlines()
     fixed = ["\t".join([*line.split("\t")[:5], "0.0", "0.9"]) for line in lines]
     path.write_text(head + "time\t" + "\n".join([labels, *fixed]) + "\n")
-    with pytest.raises(DataError, match=r"the hip does not move \(pelvis_tx is constant\).*omit the stature"):
+    with pytest.raises(DataError, match=r"the hip does not move \(pelvis_tx is constant\)"):
         import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=1.7))
 
 

@@ -190,7 +190,7 @@ def test_a_walk_across_the_axes_is_refused(trial: Trial) -> None:
         for name in ("RKNE", "RANK"):
             points[name] = np.array([points[name][0], points[name][0], points[name][2]])
 
-    with pytest.raises(DataError, match=r"walking direction is 45 deg off lab axis x"):
+    with pytest.raises(DataError, match=r"walking direction is 45 deg off axis x"):
         import_gait([trial(change=turned)], ImportSettings())
 
 

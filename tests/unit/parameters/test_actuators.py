@@ -109,7 +109,7 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
         ((HEADER, *(line.replace(",50,", ",-150,") for line in GOOD)), "pressure = -150 kPa_g is below a perfect vac"),
         (
             (HEADER, *GOOD[:-1], "100,50,140"),
-            "volume_1 decreases with pressure at 100 deg and 50 kPa_g, by 10 mL; at most the last digit, 1 mL, is",
+            "volume_1 decreases with pressure at 100 deg and 50 kPa_g, by 10 mL; allowed is the last digit, 1 mL",
         ),
         ((HEADER, "20,0,-5", *GOOD[1:]), "is negative"),
         ((HEADER, *GOOD[:3], "60,50,220", *GOOD[4:]), "must grow with the angle at the highest pressure"),

@@ -70,7 +70,7 @@ def test_a_mark_without_hashes_removes_nothing(tmp_path: Path) -> None:
     mark = {"format": "ppafo files", "schema_version": 1, "command": "reproduce", "files": ["thesis.txt"]}
     (tmp_path / MARK).write_text(json.dumps(mark))
     (tmp_path / "thesis.txt").write_text("years of work")
-    with pytest.raises(DataError, match=r"has no file hashes .* remove the folder"):
+    with pytest.raises(DataError, match=r"has no file hashes"):
         write_reproduction(tmp_path, WHOLE)
 
 

@@ -47,24 +47,17 @@ def knee_signals(
     up, other = replace(found, terms=found.terms[slice(*ends)]).in_unit(mapped.unit, ("m/s^2", "m"))
     if mapped.thigh is not None:
         if "m/s^2" in (unit, other):
-            raise DataError(
-                f"{found.table.file}: knee.thigh needs hip positions in m, not accelerations in "
-                "m/s^2; use positions, or omit knee.thigh"
-            )
+            raise DataError(f"{found.table.file}: knee.thigh needs hip positions in m, not accelerations in m/s^2")
         leaning = replace(found, terms=found.terms[ends[1] :], unit_key="knee.thigh_unit")
         lean, _ = leaning.in_unit(mapped.thigh_unit, ("rad",))
         for values, terms in ((forward, mapped.forward), (up, mapped.up)):
             if np.ptp(values) == 0.0:
-                raise DataError(
-                    f"{found.table.file}: the hip does not move ({', '.join(terms)} is constant), so the motion "
-                    "of the knee is unknown; omit the stature, or knee in the gait map"
-                )
+                raise DataError(f"{found.table.file}: the hip does not move ({', '.join(terms)} is constant)")
         height = float(np.mean(up[np.isfinite(up)]))
         if -height > _HIP_HEIGHT:
             raise DataError(
-                f"{found.table.file}: the hip is {height:.2f} m high ({', '.join(mapped.up)}), which is below the "
-                "ground, so its sign is reversed; correct the sign in the file, or change the sign of knee.up in a "
-                "gait map"
+                f"{found.table.file}: the hip is {height:.2f} m high ({', '.join(mapped.up)}): the sign of knee.up is "
+                "reversed"
             )
         # The file has the hip: the knee follows by the lean of the thigh.
         forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))

@@ -148,8 +148,7 @@ def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -
     if np.count_nonzero(flat) < _LEAST_FLAT * recorded.rate:
         raise DataError(
             f"{columns.table.file}: the neutral ankle angle is unknown, because the foot (from {mapped.heel!r} to "
-            f"{mapped.toe!r}) is never at rest while the shank leans forward; give columns of the ankle angle in "
-            "ankle_angle.terms of a gait map"
+            f"{mapped.toe!r}) is never at rest while the shank leans forward"
         )
     sign, neutral = mapped.sign_and_neutral()
     angle = _RIGHT_ANGLE + lean - (values - float(np.median(values[flat]))) - sign * neutral

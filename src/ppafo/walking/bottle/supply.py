@@ -136,10 +136,7 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
         )
     own = section.get("overrides", ())
     if any(text.partition("=")[0].strip() == SET_PRESSURE for text in own):
-        raise ScenarioError(
-            f"{reading.file}: {BOTTLE}.{SET_PRESSURE}: not allowed in a walk, where supply.pressure sets "
-            "the regulator of the bottle; set supply.pressure instead"
-        )
+        raise ScenarioError(f"{reading.file}: {BOTTLE}.{SET_PRESSURE}: in a walk, set supply.pressure instead")
     with refused_as(ParameterError, f"{reading.file}: [{BOTTLE}]", ParameterError):
         name = section["name"]
         path = Path(name)

@@ -244,8 +244,7 @@ def _axes(
     oblique = float(np.degrees(np.arctan2(abs(travel[across]), abs(travel[along]))))
     if oblique > _MOST_OBLIQUE:
         raise DataError(
-            f"{table.file}: walking direction is {oblique:.0f} deg off lab axis {'xyz'[along]} (limit "
-            f"{_MOST_OBLIQUE:g} deg); rotate the coordinates so that one axis points along the walk"
+            f"{table.file}: walking direction is {oblique:.0f} deg off axis {'xyz'[along]}, at most {_MOST_OBLIQUE:g}"
         )
     forward = _FORWARDS[along + 3 * bool(travel[along] < 0.0)]
     remarks = () if (forward, up) == ("x", 2) else (f"walking direction is {forward}, upwards is {'xyz'[up]}",)
