@@ -212,7 +212,8 @@ def unknown_value(override: Override, known: tuple[str, ...], owner: str) -> Sce
     section = override.typed.rpartition(".")[0]
     inside = [name for name in known if name.startswith(f"{section}.")]
     hint = nearest_name(override.typed, inside) or nearest_name(override.typed, allowed)
-    hint = hint or f"; available: {', '.join(inside or known)}"
+    # All paths of a scenario are too many to be read.
+    hint = hint or f"; available: {', '.join(inside or dict.fromkeys(name.partition('.')[0] for name in known))}"
     return ScenarioError(f"override '{override}': {owner} no value '{override.typed}'{hint}")
 
 
