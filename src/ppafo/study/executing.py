@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 from ppafo.errors import KindError, PpafoError, StudyError, refused_as
 from ppafo.plugins import name_modules_in, object_of
+from ppafo.version import __version__
 
 _TRIALS = 3
 """Number of workers that may be lost with a block before it is given up."""
@@ -58,7 +59,7 @@ def computed_by(
     def submit(number: int) -> None:
         try:
             # With a mark of its own, as Dask takes equal calls for one, which may be the one that failed.
-            future = executor.submit(_computed, sent, blocks[number], token_hex())
+            future = executor.submit(_computed, sent, blocks[number], __version__, token_hex())
         except RuntimeError as error:  # it was shut down, or a process of it was killed
             raise StudyError(f"executor: takes no more work ({error}); give a new one") from error
         waiting[future] = number
@@ -88,8 +89,10 @@ def computed_by(
             future.cancel()
 
 
-def _computed(sent: bytes, block: Any, _mark: str) -> Any:
+def _computed(sent: bytes, block: Any, version: str, _mark: str) -> Any:
     """Return the answer to a block, on a worker."""
+    if version != __version__:
+        raise StudyError(f"executor: a worker has ppafo {__version__}, not {version}; install the same version there")
     try:
         # Anew for each block: a worker may have several threads, and a Python controller one state.
         work = pickle.loads(sent)

@@ -76,7 +76,9 @@ def test_what_cannot_be_loaded_or_sent_is_named(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(sys, "path", [])
     monkeypatch.delitem(sys.modules, "my_law")
     with pytest.raises(StudyError, match="a worker cannot load the study: No module named 'my_law'; install"):
-        _computed(sent, 1, "")
+        _computed(sent, 1, ppafo.__version__, "")
+    with pytest.raises(StudyError, match=f"a worker has ppafo {ppafo.__version__}, not 0.0.1; install the same"):
+        _computed(sent, 1, "0.0.1", "")
     with pytest.raises(StudyError, match="a class or function of the study cannot be sent to workers"):
         list(computed_by(ThreadPoolExecutor(1), lambda block: block, [1]))
     for word in ("nowhere:POOL", "math:nothing", "math:pi"):
