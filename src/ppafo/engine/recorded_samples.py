@@ -1,6 +1,6 @@
 """Running evaluation of recorded samples by pure functions, compiled for all recordings once; Python gives the same."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from itertools import repeat
 from typing import Any, NamedTuple
@@ -33,30 +33,24 @@ class RunningEvaluation(NamedTuple):
     update: Callable[[Any, Any, Any], Any]
 
 
-def first_sample(evaluation: RunningEvaluation, columns: Mapping[str, Floats]) -> Any:
-    """Sample at the first element of each of some recorded columns (samples,)."""
-    return _zeros(evaluation)._replace(**{name: float(columns[name][0]) for name in evaluation.channels})
+def evaluate_samples(evaluation: RunningEvaluation, start: Callable[[Any], Any], columns: Mapping[str, Floats]) -> Any:
+    """State after all of some recorded columns (samples,), from the state that ``start`` returns at the first one."""
+    channels, zeros = [columns[name] for name in evaluation.channels], rebuilt(evaluation.sample, repeat(0.0))
 
+    def sample_of(row: Iterable[float]) -> Any:
+        return zeros._replace(**dict(zip(evaluation.channels, row, strict=True)))
 
-def evaluate_samples(evaluation: RunningEvaluation, state: Any, columns: Mapping[str, Floats]) -> Any:
-    """State after all of some recorded columns (samples,), from the ``state`` at the first sample."""
-    channels = [columns[name] for name in evaluation.channels]
+    state = start(sample_of(float(channel[0]) for channel in channels))
     module = compiled(current_source("recorded", evaluation, _written), Effort.QUICK)
     if module is not None:
         numbers = np.array(leaves(state), dtype=np.float64)
         module.evaluate(numbers, np.array(channels, dtype=np.float64), len(channels[0]))
         return rebuilt(evaluation.state, numbers.tolist())
-    zeros = _zeros(evaluation)
-    rows = zip(*(channel.tolist() for channel in channels), strict=True)
-    samples = [zeros._replace(**dict(zip(evaluation.channels, row, strict=True))) for row in rows]
+    samples = list(map(sample_of, zip(*(channel.tolist() for channel in channels), strict=True)))
     for sample in samples[1:]:
         later = min(int(evaluation.ahead(state, sample)), len(samples) - 1)
         state = evaluation.update(state, sample, samples[later])
     return state
-
-
-def _zeros(evaluation: RunningEvaluation) -> Any:
-    return rebuilt(evaluation.sample, repeat(0.0))
 
 
 @lru_cache(maxsize=8)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
 from ppafo.engine.in_python import over_samples
-from ppafo.engine.recorded_samples import RunningEvaluation, evaluate_samples, first_sample
+from ppafo.engine.recorded_samples import RunningEvaluation, evaluate_samples
 from ppafo.metrics.command import requested_samples
 from ppafo.metrics.metric import Floats, Readings, controlled_in, extent, followed, hold_start, reference_of
 from ppafo.metrics.settled import (
@@ -192,9 +192,10 @@ def task_parts(scenario: Scenario, recording: Recording) -> tuple[SettledPart, S
     reference, value = followed(recording)
     columns = {"number": np.arange(end + 1.0), "value": value, "reference": reference}
     columns |= {name: recording[name] for name in _OF_RECORDING.channels[3:]}
-    sums = start_settled(course, first_sample(_OF_RECORDING, columns))
-    is_cut = not PROFILES[scenario.reference.kind].is_wave
-    state = evaluate_samples(_OF_RECORDING, RecordedSettled(course, sums, float(is_cut)), columns)
+    is_cut = float(not PROFILES[scenario.reference.kind].is_wave)
+    state = evaluate_samples(
+        _OF_RECORDING, lambda sample: RecordedSettled(course, start_settled(course, sample), is_cut), columns
+    )
     sums, worst_end = state.sums, int(state.worst_end)
     readings = Readings({SETTLED.name: sums}, course, np.asarray(course.interval), len(recording), {})
     numbers = {name: np.asarray(kind.read(readings)) for name, kind in SETTLED_METRICS.items()}
