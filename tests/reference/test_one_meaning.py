@@ -27,7 +27,7 @@ def test_columns_of_a_study_are_single_runs_with_the_same_words(name: str) -> No
 @needs_gcc
 @pytest.mark.parametrize("name", ["torque-task-slow-valve", "proportional-regulators", "swing-foot-angle"])
 def test_settings_of_a_library_are_single_runs_with_the_same_words_or_refused_by_both(name: str) -> None:
-    found = at_library(name, 24, seed=13)
+    found = at_library(name, 24, seed=15)
     assert found.differing == []
     assert found.same > 8
     assert found.refused > 0
