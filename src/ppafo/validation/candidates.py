@@ -379,6 +379,13 @@ def _scaled(path: str, value: float, factor: float) -> ModelChange:
     return ModelChange(numbers={path: factor * value})
 
 
+def _opening_to_the_power(power: float) -> ModelChange:
+    nodes = {}
+    for number, command in enumerate(_CURVED, 1):
+        nodes |= {f"command_{number:02}": command, f"opening_{number:02}": command**power}
+    return ModelChange(effects={"opening": nodes})
+
+
 _EFFECTS = (
     ("stribeck", ("velocity",), "rad/s", 1.0, "friction seems to be higher up to {:.2g} rad/s (Stribeck)"),
     (
@@ -396,12 +403,24 @@ _EFFECTS = (
 """Effects that may be present in the device: settings equal to the magnitude, its unit, shown units in 1 SI, words."""
 _CONSTANT = {"stribeck": {"share": 0.9}}
 """Constant settings of an effect."""
+_CURVED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+"""Commands at which a curved opening is a table [-]."""
+_POWERS = (0.4, 0.7, 1.4, 2.0, 3.0)
+"""Trial powers of the command to which an opening is proportional [-]."""
 _OF_A_GAS = 5
 """Number of trial values of a property of the gas, in geometric progression."""
 
 
 def effects(device: Device) -> Iterator[CandidateCause]:
-    """Yield every effect that is off in the model of the device, with trial magnitudes."""
+    """Yield every effect that is off in the model of the device, with trial magnitudes, and other openings."""
+    if "opening" in device.effects:
+        straight = ModelChange(effects={"opening": {}})
+        yield CandidateCause(
+            "opening", "the valve seems to open by a straight line, not by its table", lambda _: straight
+        )
+    elif device.valve.kind == "proportional":
+        words = "the valve seems to open by the power {:.2g} of its command"
+        yield CandidateCause("opening", words, _opening_to_the_power, _POWERS, is_ratio=True)
     for effect, settings, unit, shown, words in _EFFECTS:
         if effect not in device.effects:
             constant = _CONSTANT.get(effect, {})

@@ -173,6 +173,29 @@ def test_an_effect_is_named_where_no_number_does_the_same(bench: Recording) -> N
     assert found.name == "seal_friction"
 
 
+def test_a_curved_opening_is_named_and_a_table_that_the_valve_has_not() -> None:
+    nodes = [(f"{number:02}", 0.1 * number) for number in range(1, 10)]
+    table = [f"effects.opening.command_{number}={command}" for number, command in nodes]
+    table += [f"effects.opening.opening_{number}={command**1.6}" for number, command in nodes]
+    small, noise = "valve.area=1.5 mm^2", {"pressure_1": 300.0, "pressure_2": 300.0}
+    for true, model in ((table, []), ([], table)):
+        run = simulate(
+            load_scenario(
+                "torque-task-moving-ankle",
+                ["reference.ramp_time=0.1 s", "run.duration=1 s", "run.output_interval=5 ms", small, *true],
+            )
+        ).recording
+        random = np.random.default_rng(7)
+        channels = {
+            name: Channel(run[name] + size * random.standard_normal(len(run)), "Pa") for name, size in noise.items()
+        }
+        channels |= {"command": Channel(run["command"], "-"), "angle": Channel(run["angle"], "rad")}
+        seen = Recording("spool", run.time, channels, "synthetic")
+        found = causes(seen, load_device("ppafo2011", overrides=(small, *model)), motion="measured").found
+        assert found is not None
+        assert found.name == "opening"
+
+
 def test_what_sensors_of_any_bench_are_off_by_is_no_disagreement(bench: Recording) -> None:
     found = causes(with_channel(bench, "pressure_2", bench["pressure_2"] + 1.8e3)).found
     assert found is not None
