@@ -380,7 +380,7 @@ def _scaled(path: str, value: float, factor: float) -> ModelChange:
 
 
 def _opening_to_the_power(power: float) -> ModelChange:
-    nodes = {}
+    nodes: dict[str, float] = {}
     for number, command in enumerate(_CURVED, 1):
         nodes |= {f"command_{number:02}": command, f"opening_{number:02}": command**power}
     return ModelChange(effects={"opening": nodes})
