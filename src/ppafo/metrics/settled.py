@@ -27,7 +27,6 @@ from ppafo.signals.meter import (
     Sample,
     advance_part,
     deciding_sample,
-    shortest_rest,
 )
 
 LARGEST_SHARE = 0.05
@@ -90,24 +89,21 @@ def allowed_squares(at_rest: Numeric, mean_lag: Numeric, lag_squares: Numeric) -
     return at_rest * at_rest + 2.0 * at_rest * mean_lag + lag_squares
 
 
-def weight_of(rests: float, path: float, way: float, time: float, shortest: float, extent: float) -> float:
+def weight_of(rests: float, path: float, way: float, time: float, extent: float) -> float:
     """Weight of the error of a part [-]: 1 at rest, less on a quick ramp, on which every loop is behind.
 
-    ``path`` of the reference leads by ``way``, with ``time`` [s] judged. A rest that is hardly longer than the
-    ``shortest`` one [s], which would be judged with a move, counts little, too.
+    ``path`` of the reference leads by ``way``, with ``time`` [s] judged; ``extent`` is its largest value.
     """
     inverse = 1.0 / (path if path > 0.0 else 1.0)
     slow = min(SLOW_RATE * extent * time * inverse, 1.0)
     moving = max(min(RETURNING * (1.0 - way * inverse), 1.0), slow * slow)
-    resting = 1.0 if time >= shortest else max(2.0 * time / shortest - 1.0, 0.0)
-    return resting if rests > 0.0 or path == 0.0 else moving
+    return 1.0 if rests > 0.0 or path == 0.0 else moving
 
 
 def badness(part: PartSums, course: ReferenceSummary) -> float:
     """Squared ratio of the largest number of a part to its limit, by which the worst of the earlier parts is chosen."""
     extent, taken = max(course.largest, _TINY), max(part.taken, 1.0)
-    way, shortest = abs(part.last - part.first), shortest_rest(course.interval, course.samples) * course.interval
-    weight = weight_of(part.rests, part.path, way, taken * course.interval, shortest, extent)
+    weight = weight_of(part.rests, part.path, abs(part.last - part.first), taken * course.interval, extent)
     # Sums in place of means: one division for all.
     allowed = allowed_squares(LARGEST_SHARE * extent * taken, part.lag_total, part.lag_squares * taken)
     error = weight * weight * part.squares * taken / max(allowed, _TINY)
@@ -115,7 +111,7 @@ def badness(part: PartSums, course: ReferenceSummary) -> float:
     turns = float(int(max(abs(part.swing.turns) - of_lag, 0.0))) / (SUSTAINED - 1.0)
     # Of an angle at rest the range has a limit, too.
     span = (part.highest_error - part.lowest_error) / max(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * extent)
-    at_rest = weight * max(turns, span * (1.0 - course.of_joint))
+    at_rest = max(turns, span * (1.0 - course.of_joint))
     full_motion = LARGEST_LAG * extent * LARGEST_LAG * extent * taken
     reversing = error * max(full_motion, part.lag_squares) / max(part.lag_squares, _TINY)
     far = max(part.highest_error, -part.lowest_error) / (LARGEST_EXCUSED * max(extent, part.path))
@@ -364,7 +360,6 @@ _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
     "settled_extent": ReadAt(("course.largest",)),
     "settled_last": ReadAt(("course.last",)),
     "settled_interval": ReadAt(("course.interval",)),
-    "settled_samples": ReadAt(("course.samples",)),
 }
 SETTLED_METRICS = {
     name: MetricKind(name, "-", "for verdicts", (), None, read, (SETTLED,)) for name, read in _NUMBERS.items()

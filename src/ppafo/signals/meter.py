@@ -155,9 +155,9 @@ def is_straight(course: ReferenceSummary, change: float, later: float, samples: 
     return abs(later - change * samples) <= course.tolerance * samples
 
 
-def shortest_rest(interval: float, samples: float) -> float:
-    """Return the least number of samples of a slow stretch, from their interval [s] and the number of all."""
-    least = min(SHORTEST_REST / interval, SHORTEST_SHARE * samples)
+def shortest_rest(course: ReferenceSummary) -> float:
+    """Return the least number of samples of a slow stretch."""
+    least = min(SHORTEST_REST / course.interval, SHORTEST_SHARE * course.samples)
     return max(FEWEST_OF_REST, float(int(least)) + 1.0)
 
 
@@ -169,7 +169,7 @@ def deciding_sample(course: ReferenceSummary, number: float, reference: float) -
     """
     goes_on = is_straight(course, course.change, reference - course.previous, 1.0)
     middle = 2.0 * number - course.line_start + 1.0
-    return middle if goes_on and course.rests > 0.0 else number - 1.0 + shortest_rest(course.interval, course.samples)
+    return middle if goes_on and course.rests > 0.0 else number - 1.0 + shortest_rest(course)
 
 
 def advance_part(

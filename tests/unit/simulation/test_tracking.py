@@ -366,6 +366,17 @@ def test_an_angle_is_held_to_degrees_where_a_torque_is_held_to_shares(
     assert failure_of(torque) is None
 
 
+def test_a_quick_ramp_excuses_no_error_beyond_the_way() -> None:
+    ramp = moving(sampled(np.linspace(0.0, 43.0, 200), "torque"))._replace(weight=0.01, way=40.0)
+    assert failure_of(ramp) is None
+    assert failure_of(ramp._replace(largest_error=45.0)) == "does not follow"
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_actuator_without_a_supply_is_judged_without_a_warning() -> None:
+    assert simulate(TASK, ["supply.pressure=0 psi_g"]).tracking.fails
+
+
 def test_a_joint_that_reaches_a_stop_is_told_side_time_and_share_although_its_torque_follows() -> None:
     free = simulate(TASK, ["motion.kind=free", "reference.level=3 N m"])
     assert free.tracking.follows

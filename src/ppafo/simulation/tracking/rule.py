@@ -220,10 +220,10 @@ def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | flo
     limits = part_limits(settled, is_switched)
     numbers = settled.rms_error, mean_error, settled.error_range, settled.largest_error
     ratios = [np.asarray(number) / limit for number, limit in zip(numbers, limits, strict=True)]
-    span = ratios[2] * settled.weight
+    span = ratios[2]
     # On a quick ramp every loop lags, by no more than the whole way.
     error = np.maximum(np.max(ratios, axis=0) * settled.weight, settled.largest_error / (LARGEST_EXCUSED * settled.way))
-    reversals = np.where(settled.rests, settled.weight, 1.0) * settled.error_reversals / (SUSTAINED - 1)
+    reversals = np.asarray(settled.error_reversals) / (SUSTAINED - 1)
     # A joint that creeps has a range of its error, too, but a mean error above the standard deviation.
     swings = np.asarray(settled.error_deviation > mean_error)
     if is_switched:

@@ -37,7 +37,6 @@ from ppafo.signals.meter import (
     SAME_LEVEL,
     ReferenceSummary,
     Sample,
-    shortest_rest,
     start_up_of,
 )
 from ppafo.simulation.profiles import limits_of, profile_bounds, profile_parameters
@@ -275,16 +274,14 @@ def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: floa
     def part(prefix: str) -> SettledPart:
         of = {name.removeprefix(f"{prefix}_"): number for name, number in metrics.items() if name.startswith(prefix)}
         rms, mean, turns, rests = of["error"], of["missing"], of["turns"], of["rests"] > 0.0
-        interval = metrics["settled_interval"]
-        time = of["taken"] * interval
+        time = of["taken"] * metrics["settled_interval"]
         periods = math.inf if frequency is None else time * frequency
         # The error of a loop that lags reverses, too.
         of_lag = np.maximum(of["lag_turns"], 0.0 if frequency is None else np.ceil(2.0 * periods))
         turns = turns - np.where(rests, 0.0, of_lag)
         motion, way = np.minimum(of["lag"] / (LARGEST_LAG * np.maximum(change, _TINY)), 1.0), np.abs(of["way"])
         is_ramp = (of["path"] > _LONG_RAMP * change) & (of["path"] - way <= _NO_RETURN * of["path"])
-        shortest = 0.0 if prefix == "settled" else over_samples(shortest_rest, interval, metrics["settled_samples"])
-        weight = over_samples(weight_of, of["rests"], of["path"], way, time, shortest * interval, change)
+        weight = over_samples(weight_of, of["rests"], of["path"], way, time, change)
         numbers: dict[str, Any] = {
             "rms_error": rms,
             "mean_error": mean,
