@@ -286,7 +286,7 @@ def test_results_never_import_and_need_no_module_of_their_own(folder: Path) -> N
     for name in ("study.json", "summary.json"):
         path = folder / "out" / name
         path.write_text(path.read_text(encoding="utf-8").replace("own_metric:KIND", "evil:KIND"), encoding="utf-8")
-    with pytest.raises(DataError, match="is missing or damaged"):
+    with pytest.raises(DataError, match="is damaged"):
         ppafo.load_study_results("out").plot()
     assert main(["export", "figure", "out"]) == 2
     assert "evil" not in sys.modules

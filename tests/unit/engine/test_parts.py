@@ -1,6 +1,5 @@
 """Functions with parts: what they call is an argument, in Python and in the text that is compiled."""
 
-import pickle
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -8,7 +7,7 @@ import pytest
 
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
-from ppafo.model.binding import by_recipe, made_of, recipe_of
+from ppafo.model.binding import made_of
 
 HEADER = "import math\nfrom collections import namedtuple\n\n\n"
 
@@ -80,10 +79,8 @@ def test_parts_are_handed_on_to_what_is_called_in_python_and_in_the_compiled_tex
     assert other is not law
 
 
-def test_equal_parts_give_the_same_function_and_a_pickled_one_is_found_again() -> None:
-    law = made_of(outer, "law", PARTS)
-    assert made_of(outer, "law", Parts(*PARTS)) is law
-    assert by_recipe(pickle.loads(pickle.dumps(recipe_of(law)))) is law
+def test_equal_parts_give_the_same_function() -> None:
+    assert made_of(outer, "law", Parts(*PARTS)) is made_of(outer, "law", PARTS)
 
 
 def test_a_function_with_parts_sees_the_names_of_its_module_as_they_are_now(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -182,7 +182,7 @@ def test_without_the_library_the_message_says_what_to_install(tmp_path: Path, mo
 @pytest.mark.parametrize(
     ("place", "byte", "told"),
     [
-        (b"DESCRIPTIONS\x07\x00\xff", 0x00, "cannot be read, because the library ezc3d crashes"),
+        (b"DESCRIPTIONS\x07\x00\xff", 0x00, "is damaged: the library ezc3d crashes"),
         (b"EZC3D\x03\x00", 0x80, "ezc3d cannot read the file|requires far more memory"),
     ],
     ids=["no dimensions", "a description of negative length"],
