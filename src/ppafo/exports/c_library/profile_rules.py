@@ -10,6 +10,7 @@ from ppafo.control.profiles import TabulatedProfile, disordered_knot
 from ppafo.engine.rows import section_row
 from ppafo.exports.c_library.preparation import Preparation, PreparedLane, count_steps, set_laws, set_shank
 from ppafo.model.actuators.kind import Range
+from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.controlled import CONTROLLED, Ends
 from ppafo.simulation.profiles import ProfileCourse, excursion, widened
@@ -62,15 +63,15 @@ def check_courses(parts: Preparation, lane: PreparedLane, settings: Any) -> None
     if parts.moves_on_path:
         assert parts.program.angle is not None, "a joint on a path"
         stops = widened(settings["actuator.angle_min"], settings["actuator.angle_max"])
-        course = ProfileCourse(parts.program.angle.value)
-        outside = excursion(lane.path, stops[0], stops[1], duration, lane.counts_of_steps.step, parts=course)
+        of_path = made_of(excursion, "excursion_of_path", ProfileCourse(parts.program.angle.value))
+        outside = of_path(lane.path, stops[0], stops[1], duration, lane.counts_of_steps.step)
         lane.fault = first_fault(lane.fault, parts.places["motion.profile.level"] if outside[0] >= 0.0 else 0.0)
     reach = reach_of(parts)
     if reach is not None:
         reached = reach(parts.row("Ends", Ends._fields)(*(settings[path] for path in ENDS)))
         limits = widened(reached[0], reached[1])
-        wanted = ProfileCourse(parts.program.reference.value)
-        beyond = excursion(lane.reference, limits[0], limits[1], duration, lane.counts_of_steps.step, parts=wanted)
+        of_reference = made_of(excursion, "excursion_of_reference", ProfileCourse(parts.program.reference.value))
+        beyond = of_reference(lane.reference, limits[0], limits[1], duration, lane.counts_of_steps.step)
         lane.fault = first_fault(lane.fault, parts.places["reference.level"] if beyond[0] >= 0.0 else 0.0)
 
 
