@@ -51,7 +51,7 @@ class Format(NamedTuple):
 FORMATS = {
     "parameters": Format(load_parameter_set, PACKAGE / "parameters" / "sets", use_set),
     "study": Format(load_study, PACKAGE / "studies" / "library"),
-    "tuning": Format(load_tuning, PACKAGE / "analyses" / "tune" / "library"),
+    "tuning": Format(load_tuning, PACKAGE / "analyses" / "tunings"),
     "design": Format(load_design, PACKAGE / "analyses" / "design" / "library"),
     "walk": Format(load_walk, PACKAGE / "walking" / "configurations"),
     "bottle": Format(load_bottle, PACKAGE / "parameters" / "bottles" / "files"),
