@@ -8,6 +8,7 @@ from ppafo.errors import ParameterError, UnitError
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import SECTION
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
 from ppafo.parameters.graph import acting
@@ -22,6 +23,7 @@ from ppafo.parameters.parameter_set import (
 from ppafo.units import from_si, to_si
 
 _AREA_NAMES, _SONIC_NAMES = ({item.name for item in form} for form in (AREA_FORM, SONIC_FORM))
+_TABLE = f"{SECTION}.opening."
 _FORMS = ((_AREA_NAMES, _SONIC_NAMES), (_SONIC_NAMES, _AREA_NAMES))
 
 
@@ -42,6 +44,11 @@ class NewSet:
 def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], valve: str | None = None) -> NewSet:
     """Return the set with every usable estimate written to its entry; later estimates override earlier ones."""
     used: dict[str, Estimate] = {}
+    estimates = list(estimates)
+    if any(estimate.beside for estimate in estimates):
+        # A new table takes the place of the old one, whose nodes may be others.
+        kept = {path: entry for path, entry in parameter_set.numbers.items() if not path.startswith(_TABLE)}
+        parameter_set = replace(parameter_set, numbers=kept)
     for estimate in estimates:
         find_effects([estimate.path])
         quantity = parameter_set.declarations().get(estimate.path)

@@ -403,7 +403,22 @@ class ValveMapProblem(FlowProcedure):
         """Identify the flow of the valve over command from recordings."""
         gas = context.gas(self, sources)
         path = context.valve_path(self.valve)
-        return valve_map(sources, gas, path, self.confidence, context.tolerances, self.nodes)
+        kinds = list(context.parameter_set.valve_kinds.values())
+        if self.nodes and kinds.count("proportional") > 1:
+            raise IdentificationError(
+                f"{context.label}: nodes: a set with a table of openings has one proportional valve"
+            )
+        result = valve_map(sources, gas, path, self.confidence, context.tolerances, self.nodes)
+        coefficient = number_in_si(context.parameter_set, f"{path}.discharge_coefficient")
+        if not (self.nodes and coefficient and result.estimates[0].is_usable):
+            return result
+        # The set has area and coefficient, of which the map knows the product alone.
+        area, own = 1e6 * result.estimates[0].value / coefficient, number_in_si(context.parameter_set, f"{path}.area")
+        text = f"the opening is a share of the full area: with the Cd of the set {path}.area = {area:.4g} mm^2"
+        remark = (
+            f"{text}, and the set has {1e6 * (own or 0.0):.4g} mm^2, which stays unless it is given in device.overrides"
+        )
+        return replace(result, remarks=(*result.remarks, remark))
 
 
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem

@@ -1,8 +1,9 @@
 """Construction of a device in SI units from a complete and consistent parameter set."""
 
+import itertools
 import math
 import operator
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -29,6 +30,7 @@ from ppafo.parameters.device import (
     Supply,
     Valve,
 )
+from ppafo.parameters.effects import number_under
 from ppafo.parameters.graph import ATMOSPHERE_PATH, DISPLACEMENT_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH, Graph
 from ppafo.parameters.natural_laws import check_laws
 from ppafo.parameters.overrides import FORMS, either, in_two_forms
@@ -133,7 +135,7 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
         yield SUPPLIES, f"actuator: {line(0)}"
     for path, relation, other, holds in consistency(device):
         if not holds:
-            entry, limit = parameter_set.numbers[path], operator.attrgetter(other)(device)
+            entry, limit = parameter_set.numbers[path], number_under(device, other.split("."))
             # In the unit of the number at fault: a gauge pressure beside an absolute one would have to be converted.
             si_unit, room = declaration.quantities({})[path].unit, device.supply.atmospheric_pressure
             unit = entry.unit if declaration.fits(entry.unit, si_unit) else ""
@@ -316,4 +318,15 @@ def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
             else (path, "at least", ATMOSPHERE_PATH, gauge >= 0.0)
             for path, gauge in zip(SUPPLIES, sides, strict=True)
         ),
+        *_order_of_openings(device.effects.get("opening", {})),
     )
+
+
+def _order_of_openings(table: Mapping[str, Any]) -> Iterator[tuple[str, str, str, Any]]:
+    """Yield the rules between the nodes of a table of openings: commands rise, and openings do not fall."""
+    used = [name[-2:] for name, command in table.items() if name.startswith("command") and first(command) > 0.0]
+    for before, after in itertools.pairwise(used):
+        for name, relation, compare in (("command", "below", operator.lt), ("opening", "at most", operator.le)):
+            paths = (f"{SECTION}.opening.{name}_{number}" for number in (before, after))
+            low, high = (table[f"{name}_{number}"] for number in (before, after))
+            yield next(paths), relation, next(paths), compare(low, high)

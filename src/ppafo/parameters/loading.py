@@ -170,10 +170,9 @@ def declared(document: Mapping[str, Any]) -> dict[str, Field]:
         "reported.valves": InnerTable("reported values of the valves, by valve name", keys=FREE_KEY),
         **{f"valves.{name}.kind": Words("", True, VALVES) for name in names},
     }
-    proportional = [name for name, kind in kinds.items() if kind == "proportional"]
-    # The table acts on the valve that is chosen: of two it would be of both.
-    for name in proportional if len(proportional) == 1 else ():
-        fields |= fields_of_opening(name)
+    for name, kind in kinds.items():
+        if kind == "proportional":
+            fields |= fields_of_opening(name)
     for path, quantity in quantities.items():
         if not (path.startswith("valves.") and path.split(".")[1] not in known):
             fields |= inside(path, NUMBER_ENTRY, f"{quantity.summary} [{quantity.unit or '-'}]")
@@ -202,6 +201,9 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
             texts[path] = TextEntry(**table)
     for name, valve in document["valves"].items():
         if "opening" in valve:
+            # The table acts on the valve that is chosen: of two it would be of both.
+            if [each["kind"] for each in document["valves"].values()].count("proportional") > 1:
+                raise ParameterError(f"{file}: valves.{name}.opening: a set with a table has one proportional valve")
             numbers |= entries_of_opening(valve["opening"], folder, f"{file}: valves.{name}.opening")
             find_effects(numbers)
     actuator = _table(document, "actuator")

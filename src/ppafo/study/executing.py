@@ -30,11 +30,13 @@ def executor_of(given: Executor | str | None) -> Executor | None:
     found: Any = given
     if isinstance(given, str):
         name_modules_in(given)
-        with refused_as(StudyError, f"executor = '{given}'", ImportError, AttributeError, KindError):
+        wrong = ImportError, AttributeError, KindError, ValueError, TypeError
+        with refused_as(StudyError, f"executor = '{given}'", *wrong):
             found = object_of(given)
-        found = found() if callable(found) and not isinstance(found, Executor) else found
-    if found is None or isinstance(found, Executor):
-        return found
+            found = found() if callable(found) and not isinstance(found, Executor) else found
+    executor: Executor | None = found
+    if given is None or isinstance(found, Executor):
+        return executor
     raise StudyError(
         f"executor = {given!r}: must be an Executor of concurrent.futures such as Client(...).get_executor() of Dask, "
         "or the MODULE:OBJECT of one, or of a function that returns one"

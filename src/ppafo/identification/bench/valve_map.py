@@ -29,6 +29,7 @@ from ppafo.identification.bench.law import (
     sought,
 )
 from ppafo.identification.bench.readings import check_no_wrong_reading, check_sources, meter_readings
+from ppafo.identification.estimate import Verdict
 from ppafo.identification.fit import SHAPE, Conflict
 from ppafo.identification.least_squares import FitVariable, Flags
 from ppafo.identification.source import RecordingSource, pool
@@ -56,6 +57,8 @@ _SMALL_COMMAND = 0.2
 _FEWEST_BETWEEN = 2
 """Least number of readings between two nodes of a table."""
 _FULL = "valve_map.full_area"
+_NEARLY_FULL = 0.95
+"""Least highest command [-] from which the area at full command is found."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "valve_map.hysteresis", "valve_map.saturation_command"
 _ROUND, _ROUNDS = "valve_map.round_off", (0.05, 0.005, 0.5)
 """Range over which corners of the opening are rounded, tried beside sharp ones: name, start and bounds [-]."""
@@ -144,7 +147,7 @@ def valve_map(
     )
     readings = PooledReadings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
     fitted, model = solve(law, readings, numbers, confidence)
-    remedy = f"the opening is not the same in both directions, or not {'' if nodes else 'piece by piece '}linear"
+    remedy = f"the opening is not the same in both directions, or not {'piece by piece ' if nodes else ''}linear"
     # Corners are refuted where an opening with rounded ones, tried in its place, explains the readings better.
     if not nodes and (fitted.conflict is None or fitted.conflict.number == SHAPE):
         free = [number for number in numbers if math.isinf(number.deviation) or number.name == ZERO]
@@ -234,12 +237,19 @@ def table_of(nodes: Sequence[float], openings: Sequence[float], size: Floats) ->
 def _with_nodes(result: BenchResult, band: str, nodes: Sequence[float], openings: Sequence[str]) -> BenchResult:
     """Return the result with openings that do not fall, and beside them commands and no dead band, for a set."""
     highest, estimates = 0.0, {estimate.path: estimate for estimate in result.estimates}
+    usable = [estimates[path].verdict for path in openings if estimates[path].is_usable]
+    # Shut and fully open are what a node may be; a table without one of its nodes is none.
+    is_whole = all(estimates[path].is_usable or estimates[path].verdict == "at its bound" for path in openings)
+    of_bound: Verdict = usable[0] if usable else "at its bound"
+    unknown: Verdict = "not identifiable"
     for number, (path, node) in enumerate(zip(openings, nodes, strict=True), 1):
         found = estimates[path]
-        highest = max(highest, found.value) if found.is_usable else highest
+        highest = max(highest, found.value)
         beside = {f"{SECTION}.opening.command_{number:02}": node, band: 0.0}
-        value = highest if found.is_usable else found.value
-        estimates[path] = replace(found, value=value, high=max(found.high, value), beside=beside)
+        verdict = found.verdict if found.is_usable else of_bound
+        low, high = min(found.low, highest), max(found.high, highest)
+        found = replace(found, value=highest, low=low, high=high, beside=beside)
+        estimates[path] = replace(found, verdict=verdict if is_whole else unknown)
     return replace(result, estimates=tuple(estimates.values()))
 
 
@@ -308,6 +318,10 @@ def _sought(
     play = (sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()
     if nodes:
         ends = [0.0, *nodes, 1.0]
+        if highest < _NEARLY_FULL:
+            raise IdentificationError(
+                f"{sources[0].name}: {PROCEDURE}: nodes need readings up to full command, not to {highest:.3g}"
+            )
         rises = min(np.diff(ends)) > 0.0
         if len(nodes) > NODES or not rises or np.histogram(size, ends)[0].min() < _FEWEST_BETWEEN:
             raise IdentificationError(

@@ -1,6 +1,5 @@
 """Planning of an ensemble: batches of columns with one program and one clock; contradictory runs are refused."""
 
-import operator
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,7 +14,7 @@ from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, at
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.declaration import is_within, range_rule
-from ppafo.parameters.effects import switches_of
+from ppafo.parameters.effects import number_under, switches_of
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import ScenarioColumns
 from ppafo.simulation.motion_kind import RunTimes
@@ -189,7 +188,7 @@ def _inconsistent_line(scenario: Scenario, path: str, relation: str, other: str,
     """Message about two contradictory numbers of a device in a run."""
     unit, room = declared_numbers(scenario)[path].unit, at(scenario.device.supply.atmospheric_pressure, run)
     number, limit = (
-        shown_text(at(value, run), unit, ".9g", room) for value in operator.attrgetter(path, other)(scenario.device)
+        shown_text(at(number_under(scenario.device, each.split(".")), run), unit, ".9g", room) for each in (path, other)
     )
     return f"{path} = {number} must be {relation} {other} = {limit}"
 

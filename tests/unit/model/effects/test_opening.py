@@ -9,6 +9,7 @@ import ppafo
 from ppafo.errors import ParameterError
 from ppafo.model.effects.opening import NODES, OpeningNode, OpeningTable, opening_of_size, size_of_opening
 from ppafo.parameters import load_device
+from ppafo.simulation.ensemble import run_ensemble
 
 NODES_OF_A_SPOOL = ((0.05, 0.0), (0.3, 0.1), (0.5, 0.1), (0.8, 0.9))
 """Closed up to 0.05, and flat in the middle."""
@@ -38,6 +39,15 @@ def test_a_drawn_table_is_read_between_its_nodes_and_inverted(seed: int) -> None
     assert found == pytest.approx(expected.tolist(), abs=1e-12)
     again = [opening_of_size(size_of_opening(opening, table_of(rows)), table_of(rows)) for opening in found]
     assert again == pytest.approx(found, abs=1e-9)
+
+
+def test_nodes_out_of_order_are_refused_and_a_falling_draw_fails() -> None:
+    falls = ["effects.opening.command_01=0.3", "effects.opening.command_02=0.5", "effects.opening.opening_01=0.4"]
+    with pytest.raises(ParameterError, match=r"opening_01 = 0.4 must be at most"):
+        ppafo.load_scenario("torque-task-proportional", falls)
+    base = ppafo.load_scenario("torque-task-proportional", [*falls, "effects.opening.opening_02=0.5"])
+    found = run_ensemble(base, {"effects.opening.opening_02": np.array([0.6, 0.1])}, ["rms_error"])
+    assert np.isfinite(found.metrics["rms_error"]).tolist() == [True, False]
 
 
 @pytest.mark.parametrize("name", ["torque-task-proportional", "torque-task-slow-valve"])

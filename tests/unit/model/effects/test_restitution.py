@@ -2,18 +2,11 @@
 
 from dataclasses import replace
 
-import pytest
-
 from ppafo.model.catalog import device_effects
 from ppafo.model.effects.kind import effect_problem
-from ppafo.model.effects.restitution import EFFECT, Restitution, rebound_velocity
+from ppafo.model.effects.restitution import EFFECT, Restitution
 from ppafo.parameters.effects import effect_rows, effects_of
 from ppafo.parameters.loading import load_device
-
-
-def test_a_vane_leaves_a_stop_with_its_share_of_the_speed() -> None:
-    assert rebound_velocity(3.0, Restitution(0.4)) == pytest.approx(-1.2)
-    assert rebound_velocity(-3.0, Restitution(0.0)) == 0.0
 
 
 def test_it_is_on_at_0_too_and_no_section_of_effects_has_it() -> None:
