@@ -25,6 +25,7 @@ ON = (
     "effects.seal_friction.dynamic_per_pressure=1e-7 N m/Pa",
     "effects.stribeck.velocity=0.1 rad/s",
     "effects.joint_load.drag=0.01 N m s^2/rad^2",
+    "effects.opening.command_01=0.1",
     "sensors.pressure_bandwidth=80 Hz",
 )
 """Overrides that switch the effects of the package on, each."""
