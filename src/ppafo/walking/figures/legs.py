@@ -87,12 +87,6 @@ def _draw_leg(
         axes.plot(*shank, "o", color="white", markeredgecolor=colour, markersize=1.6 * width, zorder=3.5)
 
 
-def _draw_ground(axes: "Axes", left: float, right: float) -> None:
-    """Draw the ground from ``left`` to ``right`` [m]."""
-    axes.plot([left, right], [0.0, 0.0], color=GREY, linewidth=1.0, zorder=1)
-    axes.fill_between([left, right], [-0.25, -0.25], [0.0, 0.0], color="#f1f1f1", linewidth=0.0, zorder=0)
-
-
 def frames_figure(comparison: WalkComparison) -> "Figure":
     """Return a figure of instants of one stride, without the device (top) and with the device (bottom)."""
     from matplotlib.figure import Figure
@@ -121,7 +115,9 @@ def _draw_frames(axes: "Axes", result: WalkResult, label: str, colour: str, coun
         # Of few instants some are in the middle of stance, of push-off and of the swing.
         turns = turns + 0.5 / count
     legs = legs_of(result, turns)
-    _draw_ground(axes, 0.0, _SLOT * turns.size)
+    ground = [0.0, _SLOT * turns.size]
+    axes.plot(ground, [0.0, 0.0], color=GREY, linewidth=1.0, zorder=1)
+    axes.fill_between(ground, [-0.25, -0.25], [0.0, 0.0], color="#f1f1f1", linewidth=0.0, zorder=0)
     for index in range(turns.size):
         middle = _SLOT * (index + 0.47)
         offset = legs.healthy.ankle[index, 0] - middle
