@@ -165,8 +165,7 @@ class Program:
     @property
     def inverts_valve(self) -> bool:
         """True if the law sends the command for the opening that it wants, where it also passes a dead band."""
-        law = self.controller
-        return "sent_command" in self.ports_with_laws and law is not None and DEAD_BAND in law.quantities
+        return "sent_command" in self.ports_with_laws and DEAD_BAND in getattr(self.controller, "quantities", ())
 
     @property
     def shank_jumps(self) -> bool:

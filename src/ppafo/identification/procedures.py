@@ -403,8 +403,7 @@ class ValveMapProblem(FlowProcedure):
         """Identify the flow of the valve over command from recordings."""
         gas = context.gas(self, sources)
         path = context.valve_path(self.valve)
-        kinds = list(context.parameter_set.valve_kinds.values())
-        if self.nodes and kinds.count("proportional") > 1:
+        if self.nodes and [*context.parameter_set.valve_kinds.values()].count("proportional") > 1:
             raise IdentificationError(
                 f"{context.label}: nodes: a set with a table of openings has one proportional valve"
             )

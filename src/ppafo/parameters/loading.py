@@ -170,9 +170,8 @@ def declared(document: Mapping[str, Any]) -> dict[str, Field]:
         "reported.valves": InnerTable("reported values of the valves, by valve name", keys=FREE_KEY),
         **{f"valves.{name}.kind": Words("", True, VALVES) for name in names},
     }
-    for name, kind in kinds.items():
-        if kind == "proportional":
-            fields |= fields_of_opening(name)
+    for name in (name for name, kind in kinds.items() if kind == "proportional"):
+        fields |= fields_of_opening(name)
     for path, quantity in quantities.items():
         if not (path.startswith("valves.") and path.split(".")[1] not in known):
             fields |= inside(path, NUMBER_ENTRY, f"{quantity.summary} [{quantity.unit or '-'}]")

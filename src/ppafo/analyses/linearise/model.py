@@ -89,8 +89,6 @@ _LEAST_START = 1.0e3
 """Least magnitude [-] at the lowest frequency of a loop with an integrator: there the integrator decides."""
 _INTEGRATOR = 1.0e-9
 """Magnitude [1/s] up to which a pole counts as an integrator."""
-_SMALL = 1.0e-7
-"""Change of an opening [-] for the slope of an inverted table."""
 _ROUNDING = 1.0e-9
 """Tolerance for the rounding of a delay in sample periods [-]."""
 
@@ -157,6 +155,7 @@ class LinearModel:
     ``sides``: side of each limit of the plant, in words
     ``edges``: side on which the model holds, "above" or "below", by name of each state or input at a kink
     ``delays``: delays that the model omits
+    ``sent_per_opening``: slope of the inverted table of openings [-]; 1 without a table
     ``margins``: margins of the loop with the scenario's controller and these delays; None unless it is a PID
     """
 
@@ -173,6 +172,7 @@ class LinearModel:
     sides: Mapping[str, str]
     edges: Mapping[str, str]
     delays: OmittedDelays
+    sent_per_opening: float = 1.0
     margins: LoopMargins | None = None
 
     def __getattr__(self, name: str) -> Floats:
@@ -669,6 +669,7 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         sides=in_words,
         edges={name: "above" if sides[name] > 0.0 else "below" for name in kinks},
         delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),
+        sent_per_opening=sent_per_opening(run, values["command"]),
     )
     return replace(model, margins=loop_margins(model))
 
@@ -701,6 +702,15 @@ def limits_of(scenario: Scenario, linearised: LinearisedPlant, point: Point) -> 
         is_vacuum = min(at["supply_pressure"], at["dorsiflexion_pressure"]) < atmosphere
         valve = f"{'evacuates' if is_vacuum else 'feeds'} chamber {chamber}, open by {max(openings):.4g}"
     return {"valve": valve, joint.name: vane, **regimes}
+
+
+def sent_per_opening(run: Run, command: float) -> float:
+    """Return the change of the command that a law sends over that of the opening that it wants [-]."""
+    if not run.program.inverts_valve:
+        return 1.0
+    opening, sent = (in_program(port, run.program, run.effects) for port in (at_valve, sent_command))
+    slopes, _ = one_sided_slopes(lambda wanted: np.array([sent({}, wanted)]), opening({}, command), 1.0, 1.0)
+    return float(slopes[0])
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:
@@ -737,12 +747,7 @@ def open_loop(model: LinearModel) -> tuple[Floats, NDArray[np.complex128]] | Non
     # The law skips the dead band that it assumes, within a narrow range of openings.
     band = gains.get("dead_band", 0.0)
     opened = 1.0 - band + (band / SHARPNESS if command < band + (1.0 - band) * SHARPNESS else 0.0)
-    run = plan_run(scenario)
-    if run.program.inverts_valve:
-        # The law sends what the table needs for an opening: the inverse of its slope.
-        opening, sent = (in_program(port, run.program, run.effects) for port in (at_valve, sent_command))
-        wanted = opening({}, model.inputs[0].value)
-        opened *= float(sent({}, wanted + _SMALL) - sent({}, wanted - _SMALL)) / (2.0 * _SMALL)
+    opened *= model.sent_per_opening
     steered = error_functions(scenario.controlled, scenario.device.supply.is_vacuum).steered(opened)
 
     def response(frequencies: Floats) -> NDArray[np.complex128]:
