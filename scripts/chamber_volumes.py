@@ -33,7 +33,7 @@ def row(dead: float, displacement: float | None) -> str:
     met = [not claim.is_missed for claim in claims]
     met += [all(seen.holds for seen in told), all(seen.holds for seen in swings)]
     better, pair, spool, saved = (claim.found for claim in claims)
-    reserved = "; ".join(f"{seen.id}: {seen.difference}" for seen in told if seen.holds and seen.difference)
+    reserved = "; ".join(f"{seen.entry.id}: {seen.difference}" for seen in told if seen.holds and seen.difference)
     shown = f"{sum(seen.holds for seen in told)} of {len(told)}{f' ({reserved})' if reserved else ''}"
     return f"{dead:5g}  {better:18}  {pair:19}  {spool:6}  {saved:18}  {sum(met)} of {len(met)}  {shown}"
 

@@ -92,7 +92,7 @@ def test_a_missed_window_is_named_and_fails_unless_values_were_changed(
 ) -> None:
     # As if the solenoid valves took three times the gas.
     claims = tuple(
-        dataclasses.replace(claim, value=3.3, verdict="undetermined") if claim.id == "co2_solenoid" else claim
+        dataclasses.replace(claim, value=3.3, verdict="undetermined") if claim.entry.id == "co2_solenoid" else claim
         for claim in reproduction.claims
     )
 

@@ -28,29 +28,26 @@ def printed_with(**values: float) -> ReportedSet:
 
 
 def arithmetic(**values: float) -> dict[str, Claim]:
-    return {claim.id: claim for claim in arithmetic_claims(printed_with(**values))}
+    return {claim.entry.id: claim for claim in arithmetic_claims(printed_with(**values))}
 
 
 def test_sixteen_rows_have_five_verdicts(reproduction: Reproduction) -> None:
     counts = verdict_counts(reproduction.claims)
     assert tuple(counts.values()) == (2, 3, 6, 0, 4, 1)
     assert reproduction.json_document()["counts"] == counts
-    assert count_sentence([claim.verdict for claim in reproduction.claims]).startswith(
-        "16 claims: 2 consistent, 3 inconsistent as reported, 6 met"
-    )
+    assert count_sentence(reproduction.claims).startswith("16 claims: 2 consistent, 3 inconsistent as reported, 6 met")
 
 
 def test_every_statement_that_needs_a_measurement_is_in_the_one_row_that_is_not_testable(
     reproduction: Reproduction,
 ) -> None:
     (row,) = (claim for claim in reproduction.claims if claim.verdict == "not_testable")
-    assert row.words == f"{len(NOT_PUBLISHED)} statements"
+    assert row.entry.words == f"{len(NOT_PUBLISHED)} statements"
     assert (row.value, row.found) == (None, "")
 
 
 def test_no_claim_rests_on_a_synthetic_measurement(reproduction: Reproduction) -> None:
-    resting = [claim.id for claim in reproduction.claims if any("synthetic" in text for text in claim.assumptions)]
-    assert resting == []
+    assert not any("synthetic" in text for claim in reproduction.claims for text in claim.assumptions)
 
 
 @pytest.fixture(scope="module")
@@ -111,16 +108,17 @@ def test_what_u_is_decides_about_the_error_and_not_about_the_saving(reproduction
 
 
 def test_a_claim_is_missed_only_outside_its_window(reproduction: Reproduction) -> None:
-    claim = next(claim for claim in reproduction.claims if claim.id == "co2_solenoid")
-    assert claim.window == (1.0, 1.2)
+    claim = next(claim for claim in reproduction.claims if claim.entry.id == "co2_solenoid")
+    assert claim.limits == (1.0, 1.2)
     values = {1.0: False, 1.2: False, 0.99: True, 1.21: True, None: True}
     for value, is_missed in values.items():
         assert dataclasses.replace(claim, value=value).is_missed is is_missed
-    assert dataclasses.replace(claim, value=2.0, window=None).is_missed is False
+    half = claim.entry.model_copy(update={"at_most": None})
+    assert dataclasses.replace(claim, value=2.0, entry=half).is_missed is False
 
 
 def test_simulated_claims_name_every_assumption_of_scenario_and_set(reproduction: Reproduction) -> None:
-    claim = next(claim for claim in reproduction.claims if claim.id == "co2_saving")
+    claim = next(claim for claim in reproduction.claims if claim.entry.id == "co2_saving")
     named = {text.partition(" = ")[0] for text in claim.assumptions}
     for run in (reproduction.solenoid, reproduction.proportional):
         assert {item.path for item in run.scenario.assumptions} <= named
@@ -143,13 +141,13 @@ def test_an_override_of_a_scenario_reaches_those_that_have_the_value(changed: Re
 
 
 def test_overrides_leave_the_paper_s_own_arithmetic_alone(reproduction: Reproduction, changed: Reproduction) -> None:
-    before, after = ({claim.id: claim.found for claim in run.claims} for run in (reproduction, changed))
+    before, after = ({claim.entry.id: claim.found for claim in run.claims} for run in (reproduction, changed))
     assert after["swept_volume"] == before["swept_volume"]
     assert after["co2_solenoid"] != before["co2_solenoid"]
 
 
 def test_a_window_that_is_missed_leaves_the_claim_undetermined(changed: Reproduction) -> None:
-    assert "co2_solenoid" in {claim.id for claim in changed.missed}
+    assert "co2_solenoid" in {claim.entry.id for claim in changed.missed}
     assert {claim.verdict for claim in changed.missed} == {"undetermined"}
 
 

@@ -80,7 +80,7 @@ def test_the_supply_holds_its_pressure_times_the_torque_constant(reproduction: R
 def test_the_page_states_every_claim_with_both_numbers_and_the_verdict(reproduction: Reproduction, page: str) -> None:
     text = words(page)
     for claim in reproduction.claims:
-        assert words(typeset(claim.statement)) in text
+        assert words(typeset(claim.entry.statement)) in text
         assert words(typeset(claim.note)) in text
     assert "No experimental result is confirmed independently of fitted settings." in text
     assert "the dissertations of K. A. Shorter (2011) and Y. Li (2013)" in text

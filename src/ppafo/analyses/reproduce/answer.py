@@ -87,15 +87,12 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     A claim of another publication that is not met counts as a result, not as a failure.
     """
     reproduction = solved.reproduction
-    rows: list[Sequence[Cell]] = [(SEED, *_row(claim)) for claim in solved.of_paper]
+    rows: list[Sequence[Cell]] = [(study, *_row(claim)) for study, claim in solved.claims]
     details = [] if reproduction is None else [Section(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
     for publication in solved.studies:
         stated_claims: list[Sequence[Cell]] = []
         for claim in publication.claims:
             entry = claim.entry
-            # A number that only own arithmetic on published ones gives.
-            published = claim.published or (f"{entry.own} (own sum)" if entry.own else None)
-            rows.append((publication.name, entry.id, published, claim.ours, VERDICTS[claim.verdict]))
             stated = f"{entry.statement} ({claim.source})"
             agrees = _agrees(entry.at_least, entry.at_most, entry.unit)
             stated_claims.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, claim.note or None))
@@ -111,7 +108,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
         parts=(
             Section(
                 columns=columns_of(_STUDIES_HEAD, rows),
-                remarks=("", count_sentence(solved.verdicts)),
+                remarks=("", count_sentence([claim for _, claim in solved.claims])),
                 left=len(_STUDIES_HEAD),
             ),
             Section("How to read it", said=(_RULE,), is_detail=True),
@@ -123,9 +120,12 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     )
 
 
-def _row(claim: Claim) -> tuple[str, str, str, str]:
-    """Return the row of a claim of the paper in the table of claims."""
-    return claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]
+def _row(claim: Claim) -> tuple[str, str | None, str, str]:
+    """Return the row of a claim in the table of claims."""
+    entry = claim.entry
+    # A number that only own arithmetic on published ones gives.
+    published = claim.published or (f"{entry.own} (own sum)" if entry.own else None)
+    return entry.id, published, claim.ours, VERDICTS[claim.verdict]
 
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
@@ -148,13 +148,12 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         sentences.append(f"{words}; the verdicts still compare this device with the paper")
     # On the page a claim has its window in its note; at the command line only what misses it is said.
     remarks = [
-        f"missed: {claim.id} is outside {claim.window[0]:g} to {claim.window[1]:g} {claim.unit}"
+        f"missed: {claim.entry.id} is outside {claim.entry.at_least:g} to {claim.entry.at_most:g} {claim.entry.unit}"
         for claim in missed
-        if claim.window is not None
     ]
     claims = Section(
         columns=columns_of(_HEAD, map(_row, reproduction.claims)),
-        remarks=("", count_sentence([claim.verdict for claim in reproduction.claims]), *remarks),
+        remarks=("", count_sentence(reproduction.claims), *remarks),
         left=len(_HEAD),
     )
     head = ("U is", "RMS error less by", "CO2 less by", f"error at {WITHIN_REACH:g} N m less by")
@@ -179,7 +178,7 @@ def _figures(reproduction: Reproduction) -> list[Section]:
     """Return the figures of the reproduction page as sections, each drawn on demand."""
     supply = reproduction.step.scenario.device.supply
     levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
-    stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}
+    stated = {claim.entry.id: claim.entry.published or 0.0 for claim in reproduction.claims}
     # Without the bench figures 7 and 8 have the simulation alone.
     step, tasks, synthetic = None, None, reproduction.synthetic
     if isinstance(synthetic, SyntheticEvidence):
@@ -215,7 +214,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "paper": load_parameter_set(reproduction.printed_set).citation,
         "nothing_confirmed": NOTHING_CONFIRMED,
         **fields_of(reproduction, "overrides", "claims", "step_observations", "torque_observations"),
-        "count_sentence": count_sentence([claim.verdict for claim in reproduction.claims]),
+        "count_sentence": count_sentence(reproduction.claims),
         "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
         "words": VERDICTS,
         "symbols": _SYMBOLS,

@@ -1,10 +1,12 @@
-"""Claim of the paper with our value and its verdict, and statements of its text on a recording."""
+"""Claim of a publication with our value and its verdict, and statements of the paper's text on a recording."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
-from ppafo.parameters.publications.publication import paper_entries
+from ppafo.documents.json_text import fields_of
+from ppafo.parameters.publications.publication import ClaimEntry, paper_entries
 from ppafo.report.writing import format_reported_quantity, quantity
 
 Verdict = Literal[
@@ -24,59 +26,67 @@ MEANINGS: dict[Verdict, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Claim of the paper, with the value computed by this package and the verdict.
+    """Claim of a publication, with the value computed by this package and the verdict.
 
-    ``paper``, ``value``: published value and our value, both in ``unit``; None if not a single number
-    ``words``, ``found``: text displayed in place of ``paper`` and ``value``; empty if not needed
-    ``source``: page, section or equation of the paper
-    ``assumptions``: assumptions of our value beyond the paper
+    ``entry``: the statement, with its number or words and the range in which it holds
+    ``value``: our value in the unit of the entry; None if it is no single number, or not computed
     ``note``: reason of the verdict
-    ``window``: range into which ``value`` must fall for this package to be sound; None for other claims
+    ``assumptions``: assumptions of our value beyond the publication
+    ``found``: text displayed in place of ``value``; empty if not needed
     ``range``: smallest and largest of our values over unknown quantities
+    ``citation``: publication; empty for the paper
+    ``arguments``: arguments of the computation [SI]
     """
 
-    id: str
-    statement: str
-    verdict: Verdict
-    source: str
-    note: str
-    paper: float | None = None
+    entry: ClaimEntry
+    verdict: Verdict = "not_testable"
     value: float | None = None
-    unit: str = "-"
+    note: str = ""
     assumptions: tuple[str, ...] = ()
-    window: tuple[float, float] | None = None
-    words: str = ""
     found: str = ""
     range: tuple[float, float] | None = None
+    citation: str = ""
+    arguments: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def source(self) -> str:
+        """Publication, unless it is the paper, with page, section or equation."""
+        return ", ".join(filter(None, (self.entry.source or self.citation, self.entry.where)))
 
     @property
     def published(self) -> str:
-        """Published value of the claim as displayed text."""
-        return self.words if self.paper is None else format_reported_quantity(self.paper, self.unit)
+        """Published value as displayed text with its direction; empty for a computation of our own."""
+        entry = self.entry
+        number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
+        return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
 
     @property
     def ours(self) -> str:
         """Value computed by this package for the claim, as displayed text."""
-        return self.found or quantity(self.value, self.unit, 3)
+        return self.found or quantity(self.value, self.entry.unit or "-", 3)
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Range in which the claim holds, in its unit; a side that the file leaves open is infinite."""
+        low, high = self.entry.at_least, self.entry.at_most
+        return -math.inf if low is None else low, math.inf if high is None else high
 
     @property
     def is_missed(self) -> bool:
-        """True if the claim has a window and our value is outside."""
-        if self.window is None:
-            return False
-        return self.value is None or not self.window[0] <= self.value <= self.window[1]
+        """True if the range of the claim is closed and our value is outside."""
+        low, high = self.limits
+        return math.isfinite(high - low) and (self.value is None or not low <= self.value <= high)
 
     def document(self) -> dict[str, Any]:
         """Return the claim as plain data for ``claims.json``."""
-        values = {name: getattr(self, name) for name in _DOCUMENT}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
-
-
-_DOCUMENT = (
-    *("id", "statement", "paper", "words", "value", "found", "range", "unit"),
-    *("verdict", "assumptions", "source", "note"),
-)
-"""Fields of a claim in ``claims.json``, in order."""
+        entry = self.entry
+        return {
+            **fields_of(entry, "id", "statement", "direction", "words", "own", "unit", "computation", "arguments"),
+            **fields_of(self, "published", "value", "found", "range", "verdict", "assumptions", "note", "source"),
+            "paper": entry.published,
+            "agrees_from": entry.at_least,
+            "agrees_to": entry.at_most,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,65 +96,35 @@ class Observation:
     ``difference`` is a deviation of the recording from the text beyond the statement; empty if there is none.
     """
 
-    id: str
-    statement: str
+    entry: ClaimEntry
     holds: bool
     evidence: str
-    source: str
     difference: str = ""
-
-
-def stated_claim(
-    identifier: str,
-    value: float | None,
-    verdict: Verdict,
-    note: str,
-    assumptions: tuple[str, ...] = (),
-    **more: Any,
-) -> Claim:
-    """Build the claim of an entry of the paper's file from the computed value, the verdict and further fields."""
-    entry = paper_entries()[identifier]
-    return Claim(
-        id=identifier,
-        statement=entry.statement,
-        verdict=verdict,
-        source=entry.where,
-        note=note,
-        paper=entry.published,
-        value=value,
-        unit=entry.unit or "-",
-        assumptions=assumptions,
-        words=entry.words,
-        **more,
-    )
 
 
 def claim_on_text(
     identifier: str, statement: str, observations: Sequence[Observation], assumptions: tuple[str, ...]
 ) -> Claim:
     """Return a claim that summarises the paper's statements on a recording, one observation for each."""
-    missing = [observation.id for observation in observations if not observation.holds]
+    missing = [observation.entry.id for observation in observations if not observation.holds]
     reserved = [observation for observation in observations if observation.holds and observation.difference]
     plain = len(observations) - len(missing) - len(reserved)
     notes = [f"Not shown: {', '.join(missing)}."] if missing else []
-    notes += [f"With a reservation: {observation.id}, {observation.difference}." for observation in reserved]
+    notes += [f"With a reservation: {observation.entry.id}, {observation.difference}." for observation in reserved]
+    where = "; ".join(dict.fromkeys(observation.entry.where for observation in observations))
     return Claim(
-        id=identifier,
-        statement=statement,
-        value=float(plain),
-        verdict="undetermined" if missing else "met_by_fitted_settings",
-        source="; ".join(dict.fromkeys(observation.source for observation in observations)),
-        note=" ".join((*notes, "Each statement with its numbers is listed below.")),
-        assumptions=assumptions,
-        words=f"{len(observations)} statements",
-        found=f"{plain} shown, {len(reserved)} with a reservation" if reserved else f"{plain} shown",
+        ClaimEntry(id=identifier, statement=statement, where=where, words=f"{len(observations)} statements"),
+        "undetermined" if missing else "met_by_fitted_settings",
+        float(plain),
+        " ".join((*notes, "Each statement with its numbers is listed below.")),
+        assumptions,
+        f"{plain} shown, {len(reserved)} with a reservation" if reserved else f"{plain} shown",
     )
 
 
 def observation(identifier: str, holds: bool, evidence: str, difference: str = "") -> Observation:
     """Return the observation for an entry of the paper's file; ``holds`` is the verdict of the recording."""
-    entry = paper_entries()[identifier]
-    return Observation(identifier, entry.statement, holds, evidence, entry.where, difference)
+    return Observation(paper_entries()[identifier], holds, evidence, difference)
 
 
 def verdict_counts(claims: Sequence[Claim]) -> dict[Verdict, int]:
@@ -152,7 +132,7 @@ def verdict_counts(claims: Sequence[Claim]) -> dict[Verdict, int]:
     return {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
 
 
-def count_sentence(verdicts: Sequence[Verdict]) -> str:
+def count_sentence(claims: Sequence[Claim]) -> str:
     """Return the numbers of verdicts in words, for example ``16 claims: 2 consistent, 3 inconsistent as reported``."""
-    counts = ", ".join(f"{count} {words}" for key, words in VERDICTS.items() if (count := verdicts.count(key)))
-    return f"{len(verdicts)} claims: {counts}"
+    counts = ", ".join(f"{count} {VERDICTS[verdict]}" for verdict, count in verdict_counts(claims).items() if count)
+    return f"{len(claims)} claims: {counts}"

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.reproduce.claim import VERDICTS, Claim, Verdict
+from ppafo.analyses.reproduce.claim import Claim, Verdict, verdict_counts
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.json_text import fields_of
 from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.parameters import load_device
 from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, read_publication
 from ppafo.progress import Progress, Report
-from ppafo.report.writing import format_reported_quantity, quantity
 from ppafo.units import from_si, parse_quantity
 from ppafo.version import __version__
 from ppafo.walking.loading import load_walk
@@ -101,58 +99,13 @@ SEED, ALL = PAPER, "all"
 
 
 @dataclass(frozen=True, slots=True)
-class PublishedClaim:
-    """Claim of a publication with its arguments in SI, and, once judged, our value in its unit and the verdict.
-
-    ``value`` is None if the claim cannot be computed.
-    """
-
-    entry: ClaimEntry
-    source: str
-    arguments: Mapping[str, float]
-    value: float | None = None
-    verdict: Verdict = "not_testable"
-
-    @property
-    def published(self) -> str:
-        """Published value as displayed text with its direction; empty for a computation of our own."""
-        entry = self.entry
-        number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
-        return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
-
-    @property
-    def ours(self) -> str:
-        """Our value as displayed text."""
-        return quantity(self.value, self.entry.unit or "-", 3)
-
-    @property
-    def note(self) -> str:
-        """Reason for the verdict, or reason why the claim cannot be tested."""
-        return self.entry.note or self.entry.not_testable
-
-    def document(self, study: str) -> dict[str, Any]:
-        """Return the claim as plain data for ``claims.json``."""
-        return {
-            "study": study,
-            **fields_of(self.entry, "id", "statement", "direction", "own", "unit", "computation"),
-            **fields_of(self, "published", "value", "verdict", "note"),
-            "paper": self.entry.published,
-            "agrees_from": self.entry.at_least,
-            "agrees_to": self.entry.at_most,
-            "arguments": dict(self.entry.arguments),
-            "assumptions": list(self.entry.assumed),
-            "source": self.source,
-        }
-
-
-@dataclass(frozen=True, slots=True)
 class Publication:
     """Publication with its claims in the order of the file."""
 
     name: str
     title: str
     citation: str
-    claims: tuple[PublishedClaim, ...]
+    claims: tuple[Claim, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,25 +116,18 @@ class Studies:
     reproduction: "Reproduction | None" = None
 
     @property
-    def of_paper(self) -> tuple[Claim, ...]:
-        """Claims of the paper, if it is included."""
-        return () if self.reproduction is None else self.reproduction.claims
-
-    @property
-    def verdicts(self) -> list[Verdict]:
-        """Verdicts of all claims, starting with the paper's."""
-        studied = (claim.verdict for study in self.studies for claim in study.claims)
-        return [*(claim.verdict for claim in self.of_paper), *studied]
+    def claims(self) -> list[tuple[str, Claim]]:
+        """Claims of all publications with the name of each, starting with the paper's."""
+        of_paper = () if self.reproduction is None else self.reproduction.claims
+        studied = ((study.name, claim) for study in self.studies for claim in study.claims)
+        return [*((SEED, claim) for claim in of_paper), *studied]
 
     def json_document(self) -> dict[str, Any]:
         """Return claims with verdicts, and the number of claims for each verdict, as plain data in SI."""
         return {
             "study": self.studies[0].name if self.reproduction is None else ALL,
-            "counts": {verdict: self.verdicts.count(verdict) for verdict in VERDICTS},
-            "claims": [
-                *({"study": SEED, **claim.document()} for claim in self.of_paper),
-                *(claim.document(study.name) for study in self.studies for claim in study.claims),
-            ],
+            "counts": verdict_counts([claim for _, claim in self.claims]),
+            "claims": [{"study": study, **claim.document()} for study, claim in self.claims],
             "versions": {"ppafo": __version__},
         }
 
@@ -196,19 +142,19 @@ def load_publication(name_or_path: str | Path) -> Publication:
     return Publication(document.name, document.title, document.citation, claims)
 
 
-def _checked(entry: ClaimEntry, citation: str, where: str) -> PublishedClaim:
+def _checked(entry: ClaimEntry, citation: str, where: str) -> Claim:
     """Return a claim whose computation, range, unit and arguments fit each other; ``where`` is its place."""
-    source = f"{entry.source or citation}, {entry.where}"
+    claim = Claim(entry, note=entry.note or entry.not_testable, assumptions=entry.assumed, citation=citation)
     if bool(entry.computation) == bool(entry.not_testable):
         raise ScenarioError(f"{where}: give either computation, or not_testable with the reason")
     if entry.not_testable:
-        return PublishedClaim(entry, source, {})
+        return claim
     if entry.computation not in COMPUTATIONS:
         known = known_names(entry.computation, COMPUTATIONS)
         raise ScenarioError(f"{where}.computation: '{entry.computation}' is unknown{known}")
     if entry.at_least is None and entry.at_most is None:
         raise ScenarioError(f"{where}: give at_least, at_most or both, the range in which the claim holds")
-    low, high = _range(entry)
+    low, high = claim.limits
     if low > high:
         raise ScenarioError(f"{where}: at_least = {low:g} must not exceed at_most = {high:g}")
     # What is published has to agree with itself: else the range was typed wrongly.
@@ -232,13 +178,7 @@ def _checked(entry: ClaimEntry, citation: str, where: str) -> PublishedClaim:
         # An absolute pressure does not lie below 0.
         if not 0.0 <= values[name] < math.inf:
             raise ScenarioError(f"{key} = '{text}': must be finite and at least 0 {unit}")
-    return PublishedClaim(entry, source, values)
-
-
-def _range(entry: ClaimEntry) -> tuple[float, float]:
-    """Return the range in which a claim holds, in its unit; a side that the file leaves open is infinite."""
-    low, high = entry.at_least, entry.at_most
-    return -math.inf if low is None else low, math.inf if high is None else high
+    return replace(claim, arguments=values)
 
 
 def study_names() -> tuple[str, ...]:
@@ -279,13 +219,13 @@ def run_studies(study: str, report: Report) -> tuple[Publication, ...]:
     return tuple(studies)
 
 
-def judge(claim: PublishedClaim) -> PublishedClaim:
+def judge(claim: Claim) -> Claim:
     """Compute our value for a claim and judge it; SimulationError if a walk fails."""
     entry, computation = claim.entry, COMPUTATIONS.get(claim.entry.computation)
     if computation is None:
         return claim
     value = from_si(computation.compute(**claim.arguments), entry.unit, computation.unit)
-    low, high = _range(entry)
+    low, high = claim.limits
     # A model with assumptions that does not agree is no evidence against what was measured.
     agrees: Verdict = "plausible" if entry.assumed else "consistent"
     disagrees: Verdict = "undetermined" if entry.assumed else "inconsistent_as_reported"

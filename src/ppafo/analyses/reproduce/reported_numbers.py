@@ -12,7 +12,7 @@ from ppafo.parameters import ParameterSet, load_parameter_set
 from ppafo.parameters.audit.evidence import Evidence, ReportedRange, digits
 from ppafo.parameters.device import Gas
 from ppafo.parameters.parameter_set import Entry
-from ppafo.parameters.publications.publication import paper_entries
+from ppafo.parameters.publications.publication import ClaimEntry, paper_entries
 from ppafo.report.writing import quantity
 
 T = TypeVar("T")
@@ -112,12 +112,14 @@ def _orifice_constants(reported: ReportedSet) -> Claim:
     # The reported digits leave a range open; what is computed from the gas does not.
     holds = all(reported.range(path).meets(ReportedRange(value, value)) for path, value in constants.items())
     return Claim(
-        id="orifice_constants",
-        statement="C1, C2 and the critical pressure ratio follow from k, molar mass and temperature of the gas.",
+        ClaimEntry(
+            id="orifice_constants",
+            statement="C1, C2 and the critical pressure ratio follow from k, molar mass and temperature of the gas.",
+            where=", ".join(reported.entry(path).source for path in constants),
+            words=", ".join(reported.quotation(path) for path in constants),
+        ),
         verdict=_verdict(holds),
-        source=", ".join(reported.entry(path).source for path in constants),
         note="To the reported digits, with the exponent (k + 1)/(k - 1) under the root of C1 and not the reported one.",
-        words=", ".join(reported.quotation(path) for path in constants),
         found=", ".join(reported.text(path, value) for path, value in constants.items()),
     )
 
@@ -135,13 +137,15 @@ def _step_percentages() -> Claim:
     )
     percentages = [100.0 * error / full for error, full in zip(errors, ranges, strict=True)]
     return Claim(
-        id="step_percentages",
-        statement="The errors of the step response in percent of the full ranges of 110 deg, 55 psi and 110 psi.",
-        unit="%",
+        ClaimEntry(
+            id="step_percentages",
+            statement="The errors of the step response in percent of the full ranges of 110 deg, 55 psi and 110 psi.",
+            unit="%",
+            where=entries["step_percent_position"].where,
+            words=f"{', '.join(f'{percent:g}' for percent in percents)} %",
+        ),
         verdict=_verdict(holds),
-        source=entries["step_percent_position"].where,
         note="Reported errors over reported ranges; nothing is simulated.",
-        words=f"{', '.join(f'{percent:g}' for percent in percents)} %",
         found=f"{', '.join(f'{percent:.2f}' for percent in percentages)} %",
     )
 
@@ -159,16 +163,18 @@ def _damping_and_friction(reported: ReportedSet) -> Claim:
     needed = [reported.in_reported_unit(_INERTIA, reported.in_si(path) / rate) for path, rate in rates.items()]
     unit = reported.entry(_INERTIA).unit
     return Claim(
-        id="damping_and_friction",
-        statement=f"Damping and dynamic friction are the inertia, {reported.quotation(_INERTIA)}, "
-        "times measured rates.",
+        ClaimEntry(
+            id="damping_and_friction",
+            statement=f"Damping and dynamic friction are the inertia, {reported.quotation(_INERTIA)}, "
+            "times measured rates.",
+            where=reported.entry("friction.viscous_damping").source,
+            words=", ".join(reported.quotation(path) for path in friction),
+        ),
         verdict=_verdict(holds),
-        source=reported.entry("friction.viscous_damping").source,
         note="The products hold to the reported digits."
         if holds
         else f"The reported products need inertias of {' and '.join(f'{value:.2g}' for value in needed)} {unit}: "
         f"one slip, a factor of ten in the inertia, explains both, so that it counts once.",
-        words=", ".join(reported.quotation(path) for path in friction),
         found=", ".join(reported.text(path, value, 3) for path, value in friction.items()),
     )
 
@@ -193,11 +199,13 @@ def _discharge_coefficient(reported: ReportedSet) -> Claim:
     areas = " and ".join(reported.quotation(f"valves.{valve}.area") for valve in ("solenoid", "proportional"))
     path = "valves.solenoid.discharge_coefficient"
     return Claim(
-        id="discharge_coefficient",
-        statement=f"One discharge coefficient gives {' at '.join(stated)} through {areas}.",
-        paper=reported.entry(path).value,
+        ClaimEntry(
+            id="discharge_coefficient",
+            statement=f"One discharge coefficient gives {' at '.join(stated)} through {areas}.",
+            published=reported.entry(path).value,
+            where=reported.entry(path).source,
+        ),
         verdict=_verdict(all(agreements)),
-        source=reported.entry(path).source,
         note="Agrees to the reported digits."
         if all(agreements)
         else f"No one coefficient gives the same flow through both areas; {reported.entry(path).value:g} passes "
@@ -217,12 +225,14 @@ def _swept_volume(reported: ReportedSet) -> Claim:
     needed = reported.in_si(constant)
     share = 100.0 * needed / reported.in_si(path)
     return Claim(
-        id="swept_volume",
-        statement="The vane has this displacement per radian, from the data sheet of the actuator.",
-        paper=reported.entry(path).value,
-        unit=reported.entry(path).unit,
+        ClaimEntry(
+            id="swept_volume",
+            statement="The vane has this displacement per radian, from the data sheet of the actuator.",
+            published=reported.entry(path).value,
+            unit=reported.entry(path).unit,
+            where=reported.entry(path).source,
+        ),
         verdict=_verdict(reported.range(constant).meets(reported.range(path))),
-        source=reported.entry(path).source,
         note=f"Virtual work with the reported torque constant, which is free of friction as the mean of rising and "
         f"falling readings. {reported.quotation(path)} would give the shaft {share:.0f} % of the "
         "work of the gas. Equation (5) is negative beyond 90 deg; figure 7 goes to 130.",
@@ -231,13 +241,15 @@ def _swept_volume(reported: ReportedSet) -> Claim:
 
 
 NOT_PUBLISHED_CLAIM = Claim(
-    id="not_published",
-    statement="Torque constant, static friction, leak, the four RMS errors of the step response with what explains "
-    "them (dynamics beyond the model, temperature), and size and weight of the proportional valve.",
+    ClaimEntry(
+        id="not_published",
+        statement="Torque constant, static friction, leak, the four RMS errors of the step response with what explains "
+        "them (dynamics beyond the model, temperature), and size and weight of the proportional valve.",
+        where="sections 'Identification', 'PPAFO Model Validation' and 'Discussion'",
+        words=f"{len(NOT_PUBLISHED)} statements",
+    ),
     verdict="not_testable",
-    source="sections 'Identification', 'PPAFO Model Validation' and 'Discussion'",
     note="The recordings, masses and sizes are not published. Tests show that the procedures recover known values from "
     "synthetic recordings, which says nothing about the paper's device.",
-    words=f"{len(NOT_PUBLISHED)} statements",
 )
 """Claim that summarises all statements that no published data can test."""

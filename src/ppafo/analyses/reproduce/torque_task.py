@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from ppafo.analyses.reproduce.claim import Claim, Observation, Verdict, observation, stated_claim
+from ppafo.analyses.reproduce.claim import Claim, Observation, observation
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.metrics import Metric
@@ -157,17 +157,14 @@ def torque_task_claims(
 
 
 def _claim_over_phases(identifier: str, values: Floats, decimals: int, note: str, rests_on: tuple[str, ...]) -> Claim:
-    """Return a claim on the median of values (runs,), in the unit of the claim, judged by the window of the claim."""
+    """Return a claim on the median of values (runs,), in the unit of the claim, judged by the range of the claim."""
     entry = paper_entries()[identifier]
-    assert entry.at_least is not None, f"{identifier} has a window"
-    assert entry.at_most is not None, f"{identifier} has a window"
-    window = entry.at_least, entry.at_most
     if not np.isfinite(values).all():
-        return stated_claim(identifier, None, "undetermined", note, rests_on, window=window)
+        return Claim(entry, "undetermined", None, note, rests_on)
     median, ends, text = _median_and_range(values, decimals, entry.unit)
-    verdict: Verdict = "met_by_fitted_settings" if window[0] <= median <= window[1] else "undetermined"
-    note = f"{note} Accepted from {window[0]:g} to {window[1]:g} {entry.unit}."
-    return stated_claim(identifier, median, verdict, note, rests_on, window=window, found=text, range=ends)
+    note = f"{note} Accepted from {entry.at_least:g} to {entry.at_most:g} {entry.unit}."
+    claim = Claim(entry, "met_by_fitted_settings", median, note, rests_on, text, ends)
+    return replace(claim, verdict="undetermined") if claim.is_missed else claim
 
 
 def _median_and_range(values: Floats, decimals: int, words: str) -> tuple[float, tuple[float, float], str]:
@@ -241,16 +238,16 @@ def control_claims(solenoid: Result, proportional: Result, pair_errors: Floats) 
     limited, beyond = paper_entries()["limited_by_switching"], paper_entries()["beyond_improved_control"]
     faster_error = _error_with(solenoid, FASTER)
     if isinstance(faster_error, str):
-        faster = stated_claim(limited.id, None, "undetermined", f"{limited.note} {faster_error}.")
+        faster = Claim(limited, "undetermined", note=f"{limited.note} {faster_error}.")
     else:
         less = 100.0 * (1.0 - faster_error / pair_errors)
         median, ends, found = _median_and_range(less, 0, "% less error at 100 Hz")
-        faster = stated_claim(limited.id, median, "undetermined", limited.note, _RESTS_ON, found=found, range=ends)
+        faster = Claim(limited, "undetermined", median, limited.note, _RESTS_ON, found, ends)
     return [
         faster,
         _undetermined("gains_minimise_error", proportional, TUNED),
         _undetermined("dead_zone_amplifies_delay", solenoid, DEAD_ZONE),
-        stated_claim(beyond.id, None, "undetermined", beyond.not_testable),
+        Claim(beyond, "undetermined", note=beyond.not_testable),
     ]
 
 
@@ -269,11 +266,11 @@ def _undetermined(identifier: str, run: Result, overrides: tuple[str, ...]) -> C
     entry, error = paper_entries()[identifier], run.metrics["rms_error"].value
     changed_error = _error_with(run, overrides)
     if isinstance(changed_error, str):
-        return stated_claim(identifier, None, "undetermined", f"{entry.note} {changed_error}.")
+        return Claim(entry, "undetermined", note=f"{entry.note} {changed_error}.")
     change = 100.0 * (changed_error / error - 1.0)
     sentence = f"{abs(change):.0f} % {'more' if change > 0.0 else 'less'} error"
     note = f"{entry.note} In this task {changed_error:.3f} instead of {error:.3f} N m."
-    return stated_claim(identifier, change, "undetermined", note, _RESTS_ON, found=sentence)
+    return Claim(entry, "undetermined", change, note, _RESTS_ON, sentence)
 
 
 # Interpretations of U in equation (13), the command of the proportional valve, and their effect on the task.
