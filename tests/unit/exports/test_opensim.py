@@ -9,8 +9,8 @@ from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
 from ppafo.exports.opensim import device_torque, opensim_files
 from ppafo.gait import load_gait, walk_recording
+from ppafo.gait.recorded.forms.opensim import read_opensim
 from ppafo.storage import write_csv
-from ppafo.storage.opensim import read_opensim
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk
 

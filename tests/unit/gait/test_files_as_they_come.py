@@ -91,8 +91,8 @@ def test_a_wrong_count_of_columns_and_repeated_last_times_are_mended_and_said(tm
     path.write_text(text + 2 * (text.splitlines()[-1] + "\n"))
     found = import_gait([path], PERSON)
     assert_true(found.gait, ("shank_angle", "ankle_angle"))
-    assert "ik.mot: the header states 9 columns, but labels and rows have 5: 5 columns were read" in found.remarks
-    assert "ik.mot: the last 2 rows repeat the time 5.19 s and were dropped" in found.remarks
+    assert "ik.mot: the header states 9 columns, but labels and rows have 5, which were read" in found.remarks
+    assert "ik.mot: 2 of the last rows repeat the time 5.19 s and were dropped" in found.remarks
 
 
 def test_one_cycle_that_wraps_around_is_a_stride(tmp_path: Path) -> None:

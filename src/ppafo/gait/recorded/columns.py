@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.mapping import setting_text
-from ppafo.gait.recorded.table import COORDINATES, MotionTable
+from ppafo.gait.recorded.table import COORDINATES, MotionTable, marker_of
 from ppafo.signals.recording import Floats
 from ppafo.units import to_si
 from ppafo.wording import nearest_name, one_line
@@ -115,17 +115,17 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
     files = ", ".join(table.file for table in tables)
     for curve, wanted in names.items():
         missing = next((name for name in wanted if name not in known), wanted[0])
-        twins = [name for name in known if re.fullmatch(re.escape(_marker(missing)) + r"#\d+(\.[xyz])?", name)]
+        twins = [name for name in known if re.fullmatch(re.escape(marker_of(missing)) + r"#\d+(\.[xyz])?", name)]
         if twins:
-            either = " or ".join(repr(_marker(name)) for name in twins if name[-2:] not in COORDINATES[1:])
+            either = " or ".join(repr(marker_of(name)) for name in twins if name[-2:] not in COORDINATES[1:])
             raise DataError(
-                f"{curve}: {files} has several different columns {_marker(missing)!r}; choose {either} in a gait "
+                f"{curve}: {files} has several different columns {marker_of(missing)!r}; choose {either} in a gait "
                 f"map ({setting_text('columns')})"
             )
         reason = f"there is no column {missing!r}{nearest_name(missing, known)}"
         reasons.append(f"{curve}: {'no file has all columns of this curve' if missing in known else reason}")
     # A marker counts once, not by its coordinates.
-    markers = list(dict.fromkeys(one_line(_marker(name)) for name in known))
+    markers = list(dict.fromkeys(one_line(marker_of(name)) for name in known))
     first_names = ", ".join(markers[:_MOST_NAMES]) + (", ..." if len(markers) > _MOST_NAMES else "")
     texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
     listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
@@ -134,8 +134,3 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
     return (
         f"{'; '.join(reasons)} ({files}: {listed}){needed}; name the columns in {schema}, or add a file that has them"
     )
-
-
-def _marker(name: str) -> str:
-    """Return the marker of a coordinate column; any other column name is returned unchanged."""
-    return name[:-2] if name[-2:] in COORDINATES else name

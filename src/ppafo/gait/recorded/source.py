@@ -51,7 +51,7 @@ FORMS: Kinds[GaitForm] = Kinds(
         "dflow": "ppafo.gait.recorded.forms.motion_capture:DFLOW",
         "csv": "ppafo.gait.recorded.forms.comma_separated:FORM",
         "c3d": "ppafo.gait.recorded.forms.c3d:FORM",
-        "trc": "ppafo.gait.recorded.forms.markers:TRC",
+        "trc": "ppafo.gait.recorded.forms.motion_capture:TRC",
         "matlab": "ppafo.gait.recorded.forms.matlab:FORM",
     },
 )

@@ -25,6 +25,11 @@ def bare_label(label: str) -> str:
     return label.rpartition(":")[2].strip()
 
 
+def marker_of(name: str) -> str:
+    """Return the marker of a coordinate column; any other column name is returned unchanged."""
+    return name[:-2] if name[-2:] in COORDINATES else name
+
+
 Events = dict[tuple[str, str], list[float]]
 
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import DataError
+from ppafo.gait.recorded.delimited import merged, told_apart
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import AXES, Events, MotionTable, TrialData, bare_label
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
-from ppafo.storage.text_table import doubled, said_of_doubled, told_apart
 from ppafo.storage.trial_reading import check_can_be_read
 from ppafo.wording import count_of, one_line
 
@@ -66,14 +66,14 @@ def read_c3d(path: str | Path) -> MotionTable:
     written = [bare_label(label) for label in _texts(group, "LABELS")][:number]
     # A point whose label is not its own has its description for a name, or its number.
     labels = told_apart(written, [bare_label(text) for text in _texts(group, "DESCRIPTIONS")])
-    twins = doubled(written, labels)
     frames = points.shape[2]
-    columns = {
+    coordinates = {
         f"{label}.{axis}": points[row, number, :]
         for number, label in enumerate(labels)
         for row, axis in enumerate(AXES)
     }
-    units = {name: unit for name, unit in _units(parameters["POINT"], labels).items() if name in columns}
+    columns, doubled = merged([f"{label}.{axis}" for label in written for axis in AXES], coordinates, "points")
+    units = {name: unit for name, unit in _units(group, (*labels, *written)).items() if name in columns}
     analogs: Floats = content["data"]["analogs"][0]
     if analogs.shape[0] and frames:
         # Analog samples are a whole multiple of the points' by the format.
@@ -100,9 +100,9 @@ def read_c3d(path: str | Path) -> MotionTable:
         *_events(parameters.get("EVENT", {})),
     )
     time = (first + np.arange(frames)) / rate
-    remarks = said_of_doubled(twins, dict.fromkeys(labels), "points")
+    remarks = [*trial.remarks, *doubled]
     remarks += [f"{count_of(number - len(labels), 'point')} without a label not read"] if len(labels) < number else []
-    return MotionTable(str(path), time, columns, units, remarks=(*trial.remarks, *remarks), trial=trial)
+    return MotionTable(str(path), time, columns, units, remarks=tuple(remarks), trial=trial)
 
 
 def open_c3d(path: str | Path) -> Any:

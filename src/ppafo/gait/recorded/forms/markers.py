@@ -1,14 +1,13 @@
-"""Markers and model outputs under their usual laboratory names, detection of the laboratory axes, and TRC files."""
+"""Markers and model outputs under their usual laboratory names, and detection of the laboratory axes."""
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.recorded.form import Convention, GaitForm
+from ppafo.gait.recorded.form import Convention
 from ppafo.gait.recorded.mapping import (
     AngleMap,
     Axis,
@@ -23,8 +22,6 @@ from ppafo.gait.recorded.mapping import (
 )
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
-from ppafo.storage.files import read_bytes
-from ppafo.storage.trc import read_trc
 
 PLATE = "force plate "
 """Prefix of the columns ``force plate 1.x``, ``.y``, ``.z`` [N]: force on a plate in laboratory axes."""
@@ -293,20 +290,3 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
         )
     was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file states no unit"
     return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'}, from its magnitude: {was}"]
-
-
-def _read_trc(path: str | Path) -> MotionTable:
-    """Return the markers of a TRC file as columns ``LABEL.x``, ``.y``, ``.z``."""
-    trc = read_trc(path)
-    columns = {f"{name}.{axis}": xyz[row] for name, xyz in trc.markers.items() for row, axis in enumerate("xyz")}
-    return MotionTable(str(path), trc.time, columns, dict.fromkeys(columns, trc.unit), remarks=trc.remarks)
-
-
-TRC = GaitForm(
-    name="trc",
-    summary="TRC files with markers",
-    suffixes=(".trc", ".txt"),
-    read=_read_trc,
-    convention=marker_convention,
-    recognises=lambda path: Path(path).suffix.lower() == ".trc" or read_bytes(path).startswith(b"PathFileType"),
-)

@@ -1,4 +1,4 @@
-"""Text exports of motion capture: Vicon Nexus CSV, Qualisys TSV, OptiTrack Motive CSV, D-Flow text and BTS EMT.
+"""Text exports of motion capture: Vicon Nexus CSV, Qualisys TSV, OptiTrack Motive CSV, D-Flow text, BTS EMT and TRC.
 
 Each format is recognised by its first line, which states the frame rate or the clock. Markers become columns
 ``LABEL.x``, ``.y`` and ``.z``, without the subject's name before a colon.
@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import DataError, refused_as
-from ppafo.gait.recorded.delimited import NumberBlock, cells_of, delimiter_of, lines_of, rows_of, table_of
+from ppafo.gait.recorded.delimited import NumberBlock, cells_of, delimiter_of, lines_of, rows_of, tabbed_lines, table_of
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import AXES, MotionTable, bare_label
 from ppafo.signals.recording import Floats
-from ppafo.wording import one_line
+from ppafo.wording import LONGEST_SHOWN, one_line
 
 _NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
 """Block titles of a Nexus export: markers and model outputs; then force plates and other analog channels."""
@@ -26,6 +26,8 @@ _LENGTHS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
 _MOTIVE_ROWS = 3
 """Least number of rows above the axes of a Motive export: types, names and quantities."""
 _DFLOW = {"Pos": "m", "Cop": "m", "For": "N", "Mom": "N m"}
+_TRC, _TRC_ROWS = "PathFileType", 5
+"""First word of a TRC file, and number of lines before its first row."""
 _NUMBER = re.compile(r"[+-]?\.?\d|nan", re.IGNORECASE)
 """Pattern of the start of a numeric cell."""
 _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
@@ -233,15 +235,50 @@ def _read_bts(path: str | Path) -> MotionTable:
     return table_of(path, block, names, units, "time", noun="markers")
 
 
-def _form(name: str, summary: str, first: Sequence[str], read: Callable[[str | Path], MotionTable]) -> GaitForm:
+def read_trc(path: str | Path) -> MotionTable:
+    """Return the markers of a TRC file.
+
+    Line 1 is ``PathFileType 4 (X/Y/Z) NAME``; lines 2 and 3 have names and values of the header. Line 4 has ``Frame#``,
+    ``Time`` and a marker name for every three columns, line 5 ``X1 Y1 Z1 ...``; the rows follow.
+    """
+    lines = tabbed_lines(path)
+    if not lines[0].startswith(_TRC) or len(lines) <= _TRC_ROWS:
+        raise DataError(
+            f"{path}: is not a .trc file: line 1 must begin with '{_TRC}', and rows must follow line {_TRC_ROWS}"
+        )
+    unit = dict(zip(lines[1].split(), lines[2].split(), strict=False)).get("Units", "")
+    if unit not in _LENGTHS.values():
+        shown = one_line(unit)[:LONGEST_SHOWN]
+        raise DataError(f"{path}: line 3: Units is {shown!r}; allowed are {', '.join(_LENGTHS.values())}")
+    head = cells_of(lines[3], "\t")
+    labels = [label for label in head[2:] if label]
+    if [cell.lower() for cell in head[1:2]] != ["time"] or not labels:
+        raise DataError(f"{path}: line 4: must have 'Frame#', 'Time' and the names of markers, separated by tabs")
+    names = ["", "time", *(f"{label}.{axis}" for label in labels for axis in AXES)]
+    rows = lines[_TRC_ROWS:]
+    block = NumberBlock(lines, _TRC_ROWS, "\t" if any("\t" in line for line in rows) else None)
+    return table_of(path, block, names, ["", "s", *[unit] * (len(names) - 2)], "time", noun="markers")
+
+
+_SHARED = (".csv", ".txt", ".tsv")
+"""File suffixes of several formats."""
+
+
+def _form(
+    name: str,
+    summary: str,
+    first: Sequence[str],
+    read: Callable[[str | Path], MotionTable],
+    suffixes: tuple[str, ...] = _SHARED,
+) -> GaitForm:
     def recognises(path: str | Path) -> bool:
         line = next((line for line in lines_of(path) if line.strip()), "")
-        return re.split(r"[,;\t]", line, maxsplit=1)[0].strip().strip('"').strip() in first
+        return Path(path).suffix.lower() not in _SHARED or cells_of(re.split(r"[,;\t]", line)[0], ",")[0] in first
 
     return GaitForm(
         name=name,
         summary=summary,
-        suffixes=(".csv", ".txt", ".tsv"),
+        suffixes=suffixes,
         read=read,
         recognises=recognises,
         convention=marker_convention,
@@ -251,7 +288,6 @@ def _form(name: str, summary: str, first: Sequence[str], read: Callable[[str | P
 NEXUS = _form("nexus", "CSV exports of Vicon Nexus", (*_NEXUS_MOTION, _NEXUS_DEVICES), _read_nexus)
 QUALISYS = _form("qualisys", "TSV exports of Qualisys Track Manager", ("NO_OF_FRAMES",), _read_qualisys)
 MOTIVE = _form("motive", "CSV exports of OptiTrack Motive", ("Format Version",), _read_motive)
-BTS = replace(
-    _form("bts", "EMT text files of BTS Bioengineering", ("BTS ASCII format",), _read_bts), suffixes=(".emt",)
-)
+BTS = _form("bts", "EMT text files of BTS Bioengineering", (), _read_bts, (".emt",))
 DFLOW = _form("dflow", "text files of D-Flow", ("TimeStamp", "% TimeStamp"), _read_dflow)
+TRC = _form("trc", "TRC files with markers", (_TRC,), read_trc, (".trc", ".txt"))

@@ -1,21 +1,38 @@
-"""OpenSim's tables of motion and force (.mot, .sto), and CSV files with OpenSim's column names, as gait recordings."""
+"""OpenSim's tables of motion and force (.mot, .sto), and CSV files with OpenSim's column names, as gait recordings.
+
+The header of a table ends with the line ``endheader``; it has ``nRows=211`` and ``inDegrees=yes`` (or the sentence
+"Angles are in degrees."), or ``datarows 9009`` in the older style. One line of labels and the rows follow.
+"""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from ppafo.errors import DataError, refused_as
+from ppafo.gait.recorded.delimited import NumberBlock, cells_of, tabbed_lines, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.comma_separated import plain_names, read_plain_csv
 from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map, setting_text
 from ppafo.gait.recorded.table import MotionTable
+from ppafo.signals.recording import TIME
+from ppafo.storage.comma_separated import finite_number
 from ppafo.storage.files import read_bytes
-from ppafo.storage.opensim import GAPS, read_opensim
+from ppafo.storage.opensim import END, KIND
+from ppafo.wording import LONGEST_SHOWN, one_line
 
 _CSV = ".csv"
 _STATE = re.compile(r".*/([^/]+)/value")
 """Pattern of a coordinate among OpenSim's states, such as ``/jointset/ankle_r/ankle_angle_r/value``."""
+_COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)", re.IGNORECASE)
+_DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
+_SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
+_ANGLES = {"yes": "deg", "degrees": "deg", "no": "rad", "radians": "rad"}
+_MOST_DIGITS = 11
+"""Largest number of digits in a header count."""
 
 
 def _is_table(path: str | Path) -> bool:
@@ -27,23 +44,109 @@ def _is_table(path: str | Path) -> bool:
 
 
 def _read(path: str | Path) -> MotionTable:
-    """Return the table with the units implied by OpenSim's labels; the header states the unit of angles.
+    """Return the table of either form with the units implied by OpenSim's labels."""
+    if not _is_table(path):
+        return read_opensim(path)
+    plain = read_plain_csv(path)
+    return replace(plain, units={name: unit or unit_of_label(name, name, "") for name, unit in plain.units.items()})
 
-    A coordinate that is named by its path among the states is also available under its own name.
+
+class _Header(NamedTuple):
+    """Header of an OpenSim table: counts by key in lower case, unit of angles, kind of the recording, last line."""
+
+    counts: dict[str, int]
+    angle: str
+    kind: str
+    end: int
+
+
+def read_opensim(path: str | Path) -> MotionTable:
+    """Return the table of a ``.mot`` or ``.sto`` file. Raises DataError with file, line and column of an error.
+
+    A coordinate that is named by its path among the states is also available under its own name. A column count in the
+    header that contradicts all rows, and last rows that repeat a time, are repaired with a remark.
     """
-    if _is_table(path):
-        plain = read_plain_csv(path)
-        return replace(plain, units={name: unit or unit_of_label(name, name, "") for name, unit in plain.units.items()})
-    table = read_opensim(path, GAPS)
-    is_unstated = table.in_degrees is None and table.is_old
-    angle = "deg" if is_unstated else {True: "deg", False: "rad", None: ""}[table.in_degrees]
+    lines = tabbed_lines(path)
+    with refused_as(DataError, path, DataError):
+        header = _header(lines)
+        at = next((number for number in range(header.end + 1, len(lines)) if lines[number].strip()), None)
+        if at is None:
+            raise DataError(f"has nothing after '{END}': the file is cut off")
+        # Labels may hold blanks where tabs separate them.
+        labels = cells_of(lines[at].strip(), "\t" if "\t" in lines[at] else None)
+        if labels[0].lower() != TIME:
+            first = one_line(labels[0])[:LONGEST_SHOWN]
+            raise DataError(f"line {at + 1}: the first column must be '{TIME}', not {first!r}")
+        if "" in labels:
+            raise DataError(f"line {at + 1}: column {labels.index('') + 1} has no name")
+        rows, remarks = _rows(lines, at + 1, len(labels)), list[str]()
+        stated = header.counts.get("nrows", header.counts.get("datarows", len(rows)))
+        if stated != len(rows):
+            raise DataError(f"has {len(rows)} rows, but the header states {stated}: the file is cut off or was edited")
+    count = header.counts.get("ncolumns", header.counts.get("datacolumns", len(labels)))
+    if count != len(labels):
+        remarks.append(f"the header states {count} columns, but labels and rows have {len(labels)}, which were read")
+    # Some tools repeat the last time.
+    kept = len(rows)
+    while kept > 1 and _time_of(rows[kept - 1]) == _time_of(rows[kept - 2]):
+        kept -= 1
+    if kept < len(rows):
+        remarks.append(f"{len(rows) - kept} of the last rows repeat the time {_time_of(rows[-1])} s and were dropped")
+    block = NumberBlock(lines[: at + 1 + kept], at + 1, None, is_ragged=False)
+    table = table_of(path, block, labels, [""] * len(labels), labels[0], kind=header.kind)
+    # The older style of SIMM has its angles in degrees.
+    is_unstated = not header.angle and "datacolumns" in header.counts
+    angle = "deg" if is_unstated else header.angle
     paths = {match[1]: name for name in table.columns if (match := _STATE.fullmatch(name))}
     columns = {**table.columns, **{name: table.columns[path] for name, path in paths.items()}}
     units = {name: unit_of_label(paths.get(name, name), name, angle) for name in columns}
-    remarks = table.remarks
-    if is_unstated and any(unit == "deg" for unit in units.values()):
-        remarks = (*remarks, "the header states no unit of angles; degrees assumed, as in older OpenSim files")
-    return MotionTable(str(path), table.time, columns, units, kind=table.kind, remarks=remarks)
+    remarks += table.remarks
+    if is_unstated and "deg" in units.values():
+        remarks.append("the header states no unit of angles; degrees assumed, as in older OpenSim files")
+    return replace(table, columns=columns, units=units, remarks=tuple(remarks))
+
+
+def _rows(lines: Sequence[str], first: int, width: int) -> list[str]:
+    """Return the rows from an index on; only blank lines may follow the last."""
+    last = len(lines)
+    while last > first and not lines[last - 1].strip():
+        last -= 1
+    if last == first:
+        raise DataError("has labels but no rows")
+    for number, line in enumerate(lines[first:last], first + 1):
+        if not line.strip():
+            raise DataError(f"line {number} has 0 values for {width} columns")
+    return [*lines[first:last]]
+
+
+def _time_of(row: str) -> float | str:
+    cell = row.split(maxsplit=1)[0]
+    time = finite_number(cell)
+    return cell if time is None else time
+
+
+def _header(lines: Sequence[str]) -> _Header:
+    """Parse the header, up to ``endheader``. Raises DataError with the line of an error."""
+    end = next((index for index, line in enumerate(lines) if line.strip().lower() == END), None)
+    if end is None:
+        raise DataError(f"has no line '{END}': the header is cut off, or this is not a .mot or .sto file")
+    counts, angle, kind = dict[str, int](), "", ""
+    for number, line in enumerate(map(str.strip, lines[:end]), start=1):
+        if count := _COUNT.match(line):
+            text = count[2]
+            if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
+                raise DataError(f"line {number}: {count[1]} is {one_line(text)[:LONGEST_SHOWN]!r}, not a whole number")
+            counts[count[1].lower()] = int(text)
+        if stated := _DEGREES.match(line) or _SENTENCE.search(line):
+            unit = _ANGLES.get(stated[1].lower())
+            if unit is None:
+                word = one_line(stated[1])[:LONGEST_SHOWN]
+                raise DataError(f"line {number}: inDegrees is {word!r}; it must be 'yes' or 'no'")
+            if angle not in ("", unit):
+                raise DataError(f"line {number}: the header states both degrees and radians")
+            angle = unit
+        kind = kind or next((known for known in ("simulated", "synthetic") if line == f"{KIND}{known}"), "")
+    return _Header(counts, angle, kind or "measured", end)
 
 
 def unit_of_label(path: str, label: str, angle: str) -> str:

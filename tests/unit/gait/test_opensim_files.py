@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
+from ppafo.gait.recorded.forms.opensim import read_opensim
 from ppafo.signals import Channel, Recording
-from ppafo.storage.opensim import read_opensim, write_opensim
+from ppafo.storage.opensim import write_opensim
 
 NEW = "Walk\nversion=1\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\tknee_angle_r\tankle_angle_r\n"
 OLD = (
@@ -23,15 +24,16 @@ def table(text: str, folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("head", "in_degrees"), [(NEW, True), (OLD, None)], ids=["new header", "old header"])
-def test_both_styles_of_header_are_read(tmp_path: Path, head: str, in_degrees: bool | None) -> None:
+@pytest.mark.parametrize(("head", "said"), [(NEW, 0), (OLD, 1)], ids=["new header", "old header"])
+def test_both_styles_of_header_are_read(tmp_path: Path, head: str, said: int) -> None:
     found = read_opensim(table(head + ROWS, tmp_path))
     assert found.time.tolist() == [0.0, 0.01, 0.02]
     assert {name: values.tolist() for name, values in found.columns.items()} == {
         "knee_angle_r": [-1.5, -1.6, -1.7],
         "ankle_angle_r": [2.0, 3.0, 0.5],
     }
-    assert found.in_degrees is in_degrees
+    assert set(found.units.values()) == {"deg"}
+    assert len(found.remarks) == said
 
 
 def test_line_ends_of_every_system_are_read(tmp_path: Path) -> None:
@@ -59,7 +61,7 @@ def test_line_ends_of_every_system_are_read(tmp_path: Path) -> None:
             "the header states both degrees and radians",
         ),
         (NEW.replace("time\t", "frame\t") + ROWS, "line 7: the first column must be 'time', not 'frame'"),
-        (NEW + ROWS.replace("\t2\n", "\tnan\n"), "line 8, column 'ankle_angle_r': 'nan' is not a finite number"),
+        (NEW + ROWS.replace("\n 0.01", "\n\n 0.01"), "line 9 has 0 values for 3 columns"),
         (NEW + ROWS.replace("-1.6", "1,6"), "line 9, column 'knee_angle_r': '1,6' is not a finite number"),
         (NEW + ROWS.replace("-1.7", "1e999"), "line 10, column 'knee_angle_r': '1e999' is not a finite number"),
         (NEW + ROWS.replace("\t.5", ""), "line 10 has 2 values for 3 columns"),
@@ -88,7 +90,7 @@ def test_a_written_table_is_read_back_bit_by_bit(tmp_path: Path, recording: Reco
     found = read_opensim(write_opensim(tmp_path / "walk.sto", recording))
     assert np.array_equal(found.time, recording.time)
     assert all(np.array_equal(found.columns[name], recording[name]) for name in recording.names)
-    assert (found.name, found.in_degrees) == ("walk of a model", False)
+    assert (found.kind, found.units["angle"]) == ("simulated", "rad")
 
 
 def test_the_written_format_is_that_of_opensim(tmp_path: Path, recording: Recording) -> None:
@@ -102,18 +104,16 @@ def test_the_written_format_is_that_of_opensim(tmp_path: Path, recording: Record
 
 
 @pytest.mark.parametrize(
-    ("name", "rows", "columns", "in_degrees"),
+    ("name", "rows", "columns"),
     [
-        ("subject01_walk1_ik.mot", 211, 23, True),
-        ("subject01_walk1_grf_15s.mot", 9009, 18, None),
-        ("std_subject01_InverseDynamics.sto", 73, 23, None),
+        ("subject01_walk1_ik.mot", 211, 23),
+        ("subject01_walk1_grf_15s.mot", 9009, 18),
+        ("std_subject01_InverseDynamics.sto", 73, 23),
     ],
 )
-def test_real_files_of_opensim_are_read(
-    shared_data: Path, name: str, rows: int, columns: int, in_degrees: bool | None
-) -> None:
+def test_real_files_of_opensim_are_read(shared_data: Path, name: str, rows: int, columns: int) -> None:
     found = read_opensim(shared_data / "gait" / "opensim_subject01" / name)
-    assert (found.time.size, len(found.columns), found.in_degrees) == (rows, columns, in_degrees)
+    assert (found.time.size, len(found.columns)) == (rows, columns)
 
 
 def test_two_columns_of_one_label_have_their_numbers(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.storage.trc import read_trc
+from ppafo.gait.recorded.forms.motion_capture import read_trc
 
 HEAD = (
     "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n100\t100\t3\t2\tmm\n"
@@ -24,11 +24,12 @@ def table(text: str, folder: Path) -> Path:
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_markers_are_read_and_what_was_not_seen_is_a_gap(tmp_path: Path, end: str) -> None:
     found = read_trc(table((HEAD + ROWS).replace("\n", end), tmp_path))
-    assert (found.unit, list(found.markers), found.time.tolist()) == ("mm", ["RKNE", "R.Ankle"], [0.0, 0.01, 0.02])
-    assert np.isnan(found.markers["RKNE"][:, 1]).all()
-    assert found.markers["RKNE"][:2, 2].tolist() == [1.0, 2.0]
-    assert np.isnan(found.markers["R.Ankle"][:, 2]).all()
-    assert found.markers["R.Ankle"][:, 1].tolist() == [4.0, 5.0, 6.0]
+    knee, ankle = (np.array([found.columns[f"{name}.{axis}"] for axis in "xyz"]) for name in ("RKNE", "R.Ankle"))
+    assert (set(found.units.values()), found.time.tolist()) == ({"mm"}, [0.0, 0.01, 0.02])
+    assert np.isnan(knee[:, 1]).all()
+    assert knee[:2, 2].tolist() == [1.0, 2.0]
+    assert np.isnan(ankle[:, 2]).all()
+    assert ankle[:, 1].tolist() == [4.0, 5.0, 6.0]
 
 
 @pytest.mark.parametrize(
@@ -36,15 +37,15 @@ def test_markers_are_read_and_what_was_not_seen_is_a_gap(tmp_path: Path, end: st
     [
         ("time,angle\n0,1\n", "is not a .trc file: line 1 must begin with 'PathFileType'"),
         (HEAD, "has no rows"),
-        (HEAD.replace("\tmm\n", "\tinch\n") + ROWS, "line 3: Units is 'inch'; allowed are mm, cm, m"),
-        (HEAD.replace("\tUnits", "") + ROWS, "line 3: Units is ''; allowed are mm, cm, m"),
-        (HEAD.replace("Time", "Clock") + ROWS, "line 4: must begin with 'Frame#', 'Time'"),
-        (HEAD.replace("RKNE", "").replace("R.Ankle", "") + ROWS, "line 4: has no marker names"),
+        (HEAD.replace("\tmm\n", "\tinch\n") + ROWS, "line 3: Units is 'inch'; allowed are m, cm, mm"),
+        (HEAD.replace("\tUnits", "") + ROWS, "line 3: Units is ''; allowed are m, cm, mm"),
+        (HEAD.replace("Time", "Clock") + ROWS, "line 4: must have 'Frame#', 'Time'"),
+        (HEAD.replace("RKNE", "").replace("R.Ankle", "") + ROWS, "line 4: must have"),
         (HEAD + ROWS.replace("\t6\n2", "\t6\t7\n2"), "line 7 has 9 values for 8 columns"),
-        (HEAD + ROWS.replace("\t4\t", "\tfour\t", 1), "line 7, column 'X of R.Ankle': 'four' is not a finite number"),
+        (HEAD + ROWS.replace("\t4\t", "\tfour\t", 1), "line 7, column 'R.Ankle.x': 'four' is not a finite number"),
         (HEAD + ROWS.replace("0.01", "nan"), "line 8, column 'time': 'nan' is not a finite number"),
         (HEAD + ROWS.replace("0.02", "0.01"), "line 9, column 'time': the clock stands still: 0.01 s follows 0.01 s"),
-        (HEAD + ROWS.replace("\t4\t", "\t1e999\t", 1), "line 7, column 'X of R.Ankle': '1e999' is not a finite number"),
+        (HEAD + ROWS.replace("\t4\t", "\t1e999\t", 1), "line 7, column 'R.Ankle.x': '1e999' is not a finite number"),
         (HEAD + ROWS + "\0", "is not a text file (byte"),
         ("\xff", "is not a .trc file"),
     ],
@@ -60,12 +61,11 @@ def test_a_damaged_table_is_refused_with_its_line(tmp_path: Path, text: str, mes
 
 def test_two_markers_of_one_name_have_their_numbers(tmp_path: Path) -> None:
     found = read_trc(table(HEAD.replace("R.Ankle", "RKNE") + ROWS, tmp_path))
-    assert list(found.markers) == ["RKNE#1", "RKNE#2"]
-    assert found.markers["RKNE#2"][:, 1].tolist() == [4.0, 5.0, 6.0]
+    assert [found.columns[f"RKNE#2.{axis}"][1] for axis in "xyz"] == [4.0, 5.0, 6.0]
     assert found.remarks == ("several markers are named 'RKNE': they were renamed 'RKNE#1', 'RKNE#2'",)
 
 
 def test_the_same_marker_twice_is_one(tmp_path: Path) -> None:
     rows = "1\t0.00\t1\t2\t3\t1\t2\t3\n2\t0.01\t\t\t\t\t\t\n"
     found = read_trc(table(HEAD.replace("R.Ankle", "RKNE") + rows, tmp_path))
-    assert (list(found.markers), found.remarks) == (["RKNE"], ())
+    assert (list(found.columns), found.remarks) == (["RKNE.x", "RKNE.y", "RKNE.z"], ())
