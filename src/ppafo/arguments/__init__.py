@@ -67,6 +67,7 @@ Minutes = Annotated[
     ),
 ]
 Mass = Annotated[float, _quantity_word("MASS", "kg", ABOVE_ZERO)]
+BodyMass = Annotated[float, _quantity_word("MASS", "kg", NumberRange(lowest=1.0, highest=500.0))]
 Length = Annotated[float, _quantity_word("LENGTH", "m", ABOVE_ZERO)]
 FigureWidth = Annotated[float, _quantity_word("WIDTH", "m", NumberRange(lowest=0.06, highest=0.4))]
 Time = Annotated[float, _quantity_word("TIME", "s")]

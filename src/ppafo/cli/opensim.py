@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from ppafo.arguments import Folder, Gait, Mass, Minutes, Overrides, Word
+from ppafo.arguments import BodyMass, Folder, Gait, Minutes, Overrides, Word
 from ppafo.arguments.reading import times
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
@@ -27,7 +27,7 @@ def export_opensim(
     minutes: Minutes | None = None,
     side: Side = "right",
     strikes: Strikes | None = None,
-    body_mass: Mass | None = None,
+    body_mass: BodyMass | None = None,
     overrides: Overrides = (),
     out: Folder,
 ) -> CommandOutput:

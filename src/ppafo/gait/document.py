@@ -9,7 +9,7 @@ from ppafo.arguments import checked
 from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind, label, value_text
 from ppafo.errors import DataError
-from ppafo.gait.gait import CURVES, REQUIRED, Gait, GaitCurve, Origin, plain_unit
+from ppafo.gait.gait import BODY_MASSES, CURVES, REQUIRED, SPEEDS, STATURES, Gait, GaitCurve, Origin, plain_unit
 from ppafo.gait.plausible import check_gait
 from ppafo.model.declaration import Number, Quantity
 from ppafo.parameters.declared import (
@@ -38,14 +38,12 @@ _SUMMARIES = {
     "knee_up": "acceleration of the knee upwards, without gravity",
 }
 _NUMBERS: dict[str, tuple[str, Quantity]] = {
-    "subject.body_mass": ("body_mass", Number("kg", "mass of the wearer, such as '62 kg'", None, 1.0, 500.0)),
-    "subject.stature": ("stature", Number("m", "height of the wearer", None, 0.5, 2.5, optional=True)),
-    "subject.walking_speed": ("walking_speed", Number("m/s", "speed of this gait", None, 0.05, 4.0, optional=True)),
+    "subject.body_mass": ("body_mass", Number("kg", "mass of the wearer, such as '62 kg'", None, *BODY_MASSES)),
+    "subject.stature": ("stature", Number("m", "height of the wearer", None, *STATURES, optional=True)),
+    "subject.walking_speed": ("walking_speed", Number("m/s", "speed of this gait", None, *SPEEDS, optional=True)),
     "subject.recorded_speed": (
         "recorded_speed",
-        Number(
-            "m/s", "speed at which the curves were recorded, where it is another one", None, 0.05, 4.0, optional=True
-        ),
+        Number("m/s", "speed at which the curves were recorded, where it is another one", None, *SPEEDS, optional=True),
     ),
     "stride.time": (
         "stride_time",

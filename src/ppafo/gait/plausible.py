@@ -1,8 +1,7 @@
 """Plausibility of a stride: limits wide enough for impaired walking that exclude impossible values.
 
-Each error names file, curve, number and limits, and a remedy for mistakes in units, signs and sides. A sign is rejected
-only if the opposite sign fits clearly better, because impaired walking often breaks the rules of healthy walking
-slightly.
+Each error names file, curve, number and limits. A sign is rejected only if the opposite sign fits clearly better,
+because impaired walking often breaks the rules of healthy walking slightly.
 """
 
 from functools import partial
@@ -11,7 +10,7 @@ import numpy as np
 
 from ppafo.errors import DataError, check_all
 from ppafo.gait.gait import HARMONICS, Gait, fit_curve
-from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride, SignSource, other_sign
+from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride
 from ppafo.gait.plausible_angles import check_ankle, check_ankle_range, check_shank
 from ppafo.gait.plausible_knee import check_knee, check_knee_means
 from ppafo.signals.recording import Floats
@@ -25,11 +24,11 @@ def check_gait(gait: Gait, file: str) -> None:
     """Raise DataError for a gait file with an implausible stride, by the checks of ``check_plausible``."""
     percent = np.linspace(0.0, 1.0, 101)
     curves = {name: curve.values_at(percent) for name, curve in gait.curves.items()}
-    check_plausible(MeanStride(dict.fromkeys(curves, file), curves, gait.stance_share, gait.stride_time, "gait_file"))
+    check_plausible(MeanStride(dict.fromkeys(curves, file), curves, gait.stance_share, gait.stride_time))
 
 
 def check_plausible(walk: MeanStride) -> None:
-    """Raise DataError for an implausible mean stride; the message names file, curve, number, limits and remedy."""
+    """Raise DataError for an implausible mean stride; the message names file, curve, number and limits."""
     # A check in a chain is made only where those before it pass: a wrong unit would be refused again as a wrong sign.
     chains = (
         (check_stride_time,),
@@ -49,27 +48,19 @@ def check_stride_time(walk: MeanStride) -> None:
     if not low <= walk.stride_time <= high:
         raise DataError(
             f"{walk.file['shank_angle']}: the stride time is {walk.stride_time:.3g} s (plausible: {low:g} to "
-            f"{high:g} s); check the unit of time"
+            f"{high:g} s)"
         )
 
 
 def check_stance(walk: MeanStride) -> None:
     """Raise DataError for a stance fraction that is implausible for walking."""
     low, high = STANCE_FRACTION
-    if low <= walk.stance_share <= high:
-        return
-    if walk.signs_from == "gait_file":
-        hint = "set stride.stance_share to the fraction from heel strike to toe-off"
-    elif "vertical_force" in walk.curves:
-        hint = "check foot, sign and unit of vertical_force"
-    else:
-        remedy = other_sign(walk.signs_from, "shank_angle.positive")
-        hint = f"if the sign of shank_angle, which determines the stance, is reversed: {remedy}"
-    file = walk.file.get("vertical_force", walk.file["shank_angle"])
-    raise DataError(
-        f"{file}: the foot is on the ground for {100.0 * walk.stance_share:.0f} % of the stride "
-        f"(plausible: {100.0 * low:.0f} to {100.0 * high:.0f} %); {hint}"
-    )
+    if not low <= walk.stance_share <= high:
+        decides = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
+        raise DataError(
+            f"{walk.file[decides]}: the foot is on the ground for {100.0 * walk.stance_share:.0f} % of the stride, by "
+            f"{decides} (plausible: {100.0 * low:.0f} to {100.0 * high:.0f} %)"
+        )
 
 
 # Far from 0 and nearer to the half stride at which the other foot lies.
@@ -93,7 +84,7 @@ def check_side(walk: MeanStride, usual: Gait) -> None:
     if apart > _OTHER_FOOT and in_place > _ALIKE_SHANK and best > _ALIKE and own < _UNLIKE:
         raise DataError(
             f"{walk.file['ankle_angle']}: ankle_angle is shifted by {100.0 * apart:.0f} % of the stride against "
-            "shank_angle, so it belongs to the other foot; give ankle and shank of the same side"
+            "shank_angle, so it belongs to the other foot"
         )
 
 
@@ -126,7 +117,7 @@ _FOOT_ALONE = 0.05
 """Moment that is accepted in swing however weak the push-off [N m/kg]."""
 
 
-def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
+def check_force_scale(file: str, force: Floats) -> None:
     """Raise DataError for a vertical force [body weights] whose unit or sign prevents the detection of heel strikes."""
     # One contact in a long record is less than 2 % of it.
     loaded = force[np.abs(force) > _ON_GROUND]
@@ -135,15 +126,9 @@ def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
     # A reversed sign is looked for first: its peak would be refused as too small.
     low, high = FORCE_PEAK
     if -lowest > CLEARLY_BETTER * highest:
-        raise DataError(
-            f"{file}: vertical_force peaks at {lowest:.3g} body weights, below 0, so its sign is reversed; "
-            f"{other_sign(signs_from, 'vertical_force.positive')}"
-        )
+        raise DataError(f"{file}: vertical_force peaks at {lowest:.3g} body weights, below 0, so its sign is reversed")
     if not low <= highest <= high:
-        raise DataError(
-            f"{file}: vertical_force reaches {highest:.3g} body weights (plausible: {low:g} to {high:g}); check the "
-            "body mass and the unit ('N', or '-' for body weights)"
-        )
+        raise DataError(f"{file}: vertical_force reaches {highest:.3g} body weights (plausible: {low:g} to {high:g})")
 
 
 def check_moment(walk: MeanStride) -> None:
@@ -153,15 +138,11 @@ def check_moment(walk: MeanStride) -> None:
     moment = walk.curves["ankle_moment"]
     where = f"{walk.file['ankle_moment']}: ankle_moment"
     if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > CLEARLY_BETTER * float(np.max(moment)):
-        raise DataError(
-            f"{where} peaks at {np.min(moment):.3g} N m/kg, in dorsiflexion, so its sign is reversed; "
-            f"{other_sign(walk.signs_from, 'ankle_moment.positive')}"
-        )
+        raise DataError(f"{where} peaks at {np.min(moment):.3g} N m/kg, in dorsiflexion, so its sign is reversed")
     peak, (low, high) = float(np.max(moment)), MOMENT_PEAK
     if not low <= peak <= high:
         raise DataError(
-            f"{where} reaches {without_exponent(peak, '.3g')} N m/kg (plausible: {low:g} to {high:g} N m/kg); check "
-            "the body mass and the unit (N m, N m/kg, N mm/kg)"
+            f"{where} reaches {without_exponent(peak, '.3g')} N m/kg (plausible: {low:g} to {high:g} N m/kg)"
         )
 
 
@@ -176,7 +157,7 @@ def moment_remarks(moment: Floats) -> list[str]:
         return []
     return [
         f"the sign of ankle_moment is uncertain: it peaks at {down:.2g} N m/kg in plantarflexion and {up:.2g} N m/kg "
-        "in dorsiflexion; check that the moment is above 0 in push-off"
+        "in dorsiflexion"
     ]
 
 
@@ -191,20 +172,10 @@ def check_moment_time(walk: MeanStride) -> None:
     if at < fraction and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
         return
     where = "" if at >= fraction else f" and is {swing:.2g} N m/kg in swing"
-    force = "toe-off is guessed without a vertical force: give one; or " if walk.is_toe_off_guessed else ""
     raise DataError(
         f"{column} peaks at {100.0 * at:.0f} % of the stride{where}, but the foot is off the ground "
-        f"from {100.0 * fraction:.0f} % on; {force}{_OTHER_TIME[walk.signs_from]}"
+        f"from {100.0 * fraction:.0f} % on: the moment is of the other foot, or has another clock"
     )
-
-
-_OTHER_TIME: dict[SignSource, str] = {
-    **dict.fromkeys(
-        ("map", "columns"),
-        "the moment is of the other foot or has another clock: choose the other side, or the column of this foot",
-    ),
-    "gait_file": "give the moment of the same foot, starting at its heel strike",
-}
 
 
 def check_force(walk: MeanStride) -> None:
@@ -217,8 +188,7 @@ def check_force(walk: MeanStride) -> None:
     if not FORCE_PEAK[0] <= peak <= FORCE_PEAK[1] or not FORCE_MEAN[0] <= mean <= FORCE_MEAN[1]:
         raise DataError(
             f"{where} has a mean of {mean:.3g} body weights (plausible: {FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g}) and a "
-            f"peak of {peak:.3g} (plausible: {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}); check the body mass and the unit "
-            "('N', or '-' for body weights)"
+            f"peak of {peak:.3g} (plausible: {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g})"
         )
 
 
@@ -230,6 +200,5 @@ def force_remarks(force: Floats) -> list[str]:
         return []
     return [
         f"vertical_force has a mean of {mean:.3g} body weights, but each leg of a steady walk carries about 0.5 "
-        f"(usual: {low:g} to {high:g}); check the scale of the force and the body mass ({2.0 * mean:.2g} times the "
-        "mass would give 0.5)"
+        f"(usual: {low:g} to {high:g})"
     ]

@@ -4,7 +4,7 @@ import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import Gait
-from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride, SignSource, other_sign
+from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride
 from ppafo.signals.recording import Floats
 
 SHANK_RANGE = (25.0, 120.0)
@@ -39,14 +39,14 @@ def check_shank(walk: MeanStride) -> None:
     growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
     if growth > _TURNED_BACK * travel:
         raise DataError(
-            f"{where} increases by {growth:.2g} deg in mid-stance, so the shank would rotate backwards over the foot; "
-            f"{other_sign(walk.signs_from, 'shank_angle.positive')}{_other_foot(walk)}"
+            f"{where} increases by {growth:.2g} deg in mid-stance, so the shank would rotate backwards over the foot: "
+            "its sign is reversed, or a vertical force is of the other foot"
         )
     if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
         raise DataError(
             f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average (plausible: above -10 "
             "deg at heel strike, and -50 to 10 deg on average; 0 is vertical, positive with the ankle in front of the "
-            f"knee); check the zero and the columns of the angle{_other_foot(walk)}"
+            "knee)"
         )
 
 
@@ -55,12 +55,13 @@ def check_angle_range(where: str, travel: float, limits: tuple[float, float], is
     low, high = limits
     if low <= travel and (is_whole or travel <= high):
         return
-    hint = "check unit and columns"
-    if low <= np.degrees(travel) <= high:
-        hint = "the numbers look like radians: give the unit 'rad'"
-    elif low <= np.radians(travel) <= high:
-        hint = "the numbers look like degrees: give the unit 'deg'"
-    raise DataError(f"{where} has a range of {travel:.3g} deg (plausible in a stride: {low:g} to {high:g} deg); {hint}")
+    likely = [
+        unit
+        for unit, number in (("radians", np.degrees(travel)), ("degrees", np.radians(travel)))
+        if low <= number <= high
+    ]
+    hint = "".join(f"; the numbers look like {unit}" for unit in likely)
+    raise DataError(f"{where} has a range of {travel:.3g} deg (plausible in a stride: {low:g} to {high:g} deg){hint}")
 
 
 def check_ankle_range(walk: MeanStride) -> None:
@@ -80,7 +81,7 @@ def check_ankle(walk: MeanStride) -> None:
             DataError(
                 f"{where} moves into plantarflexion while the shank rotates forward: the flat foot would rotate by "
                 f"{turned:.2g} deg (RMS), but only by {reversed_turned:.2g} deg with the opposite sign, so the sign is "
-                f"reversed; {other_sign(walk.signs_from, 'ankle_angle.positive', 'the opposite sign about 90 deg')}"
+                "reversed"
             )
         )
     # A reversed sign turns the angle about 90 deg: the zero is wrong, too, where the foot is tilted even then.
@@ -107,7 +108,7 @@ def _check_ankle_zero(walk: MeanStride, theta: Floats, foot: float) -> None:
     tilt = f"implies a foot tilted by {foot:.0f} deg in mid-stance (plausible: up to {REFUSED_TILT:g} deg) and "
     raise DataError(
         f"{walk.file['ankle_angle']}: ankle_angle {tilt if foot else ''}ranges from {as_read.min():.0f} to "
-        f"{as_read.max():.0f} deg (neutral: 90 deg); {_NEUTRAL[walk.signs_from]}"
+        f"{as_read.max():.0f} deg (neutral: 90 deg)"
     )
 
 
@@ -140,38 +141,23 @@ def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
         return []
     return [
         f"the sign of ankle_angle is uncertain: in mid-stance the flat foot rotates by {turned:.2g} deg (RMS), and by "
-        f"{reversed_turned:.2g} deg with the opposite sign; check that the angle increases in plantarflexion"
+        f"{reversed_turned:.2g} deg with the opposite sign"
     ]
 
 
-def zero_remarks(tilt: float, correction: str) -> list[str]:
-    """Return a remark on the zero of an ankle angle if the standing foot appears tilted [deg]."""
+def zero_remarks(shank: Floats, ankle: Floats) -> list[str]:
+    """Return a remark on the zero of an ankle angle if the standing foot appears tilted; curves [rad]."""
+    tilt = standing_tilt(shank, ankle)
     if abs(tilt) <= REMARKED_TILT:
         return []
     way = "toes down" if tilt > 0.0 else "toes up"
     return [
         f"the zero of ankle_angle seems to be off: the flat foot appears tilted by {abs(tilt):.1f} deg, {way} (mean "
-        f"from 15 to 40 % of the stride, usual: up to {REMARKED_TILT:g} deg); on level ground, {correction}"
+        f"from 15 to 40 % of the stride, usual on level ground: up to {REMARKED_TILT:g} deg)"
     ]
 
 
 def gait_file_remarks(gait: Gait) -> list[str]:
-    """Return a remark on the ankle zero of a finished gait, with the corrected mean of its series."""
+    """Return a remark on the ankle zero of a finished gait."""
     percent = np.linspace(0.0, 1.0, 101)
-    tilt = standing_tilt(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
-    mean = float(np.degrees(gait.ankle_angle.mean)) - tilt
-    return zero_remarks(tilt, f"set the mean of [ankle_angle] in gait '{gait.name}' to {mean:.1f} deg")
-
-
-_NEUTRAL: dict[SignSource, str] = {
-    "map": "set ankle_angle.neutral in the gait map to the value in the file with the foot perpendicular to the shank",
-    "columns": "correct the file so that the angle is 90 deg with the foot perpendicular to the shank, or give a gait "
-    "map with ankle_angle.neutral",
-    "gait_file": "correct the mean so that the angle is 90 deg with the foot perpendicular to the shank",
-}
-
-
-def _other_foot(walk: MeanStride) -> str:
-    if walk.signs_from == "gait_file" or "vertical_force" not in walk.curves:
-        return ""
-    return "; if the force is of the other foot, choose the other side, or the force column of this foot"
+    return zero_remarks(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))

@@ -7,7 +7,7 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError, check_all, raise_noted
 from ppafo.gait.gait import HARMONICS, KNEE, fit_curve
-from ppafo.gait.mean_stride import MeanStride, SignSource, other_sign
+from ppafo.gait.mean_stride import MeanStride
 from ppafo.signals.recording import Floats
 
 FOOT_FLAT = slice(15, 43)
@@ -41,12 +41,6 @@ A knee_up too small by a factor and a wrong sign alone are not recognised here. 
 almost as well as the given curves.
 """
 
-_WHERE: dict[SignSource, str] = {
-    "map": "in the gait map or the file",
-    "columns": "in the file",
-    "gait_file": "in the gait file",
-}
-
 
 def _check_turning(walk: MeanStride) -> None:
     """Raise DataError for a knee that turns about the resting ankle only after a correction."""
@@ -62,7 +56,7 @@ def _check_turning(walk: MeanStride) -> None:
             raise DataError(
                 f"{walk.file['knee_forward']}: knee_forward and knee_up differ by {100.0 * missed:.0f} % "
                 f"({100.0 * left:.0f} % if corrected) from a rotation of the knee about the resting ankle while the "
-                f"foot is flat; {remedy} {_WHERE[walk.signs_from]}"
+                f"foot is flat; {remedy}"
             )
 
 
@@ -126,7 +120,7 @@ def check_knee_means(walk: MeanStride) -> None:
         [
             DataError(
                 f"{walk.file[name]}: {name} has a mean of {mean:.3g} m/s^2, but must average to 0 over a stride "
-                f"(allowed: up to {KNEE_MEAN:g} m/s^2); subtract gravity from accelerometer data"
+                f"(allowed: up to {KNEE_MEAN:g} m/s^2; gravity is not part of it)"
             )
             for name, mean in means.items()
             if abs(mean) > KNEE_MEAN
@@ -138,16 +132,12 @@ def _check_knee_curve(walk: MeanStride, name: str) -> None:
     values, where = walk.curves[name], f"{walk.file[name]}: {name}"
     travel, (low, high) = float(np.ptp(values)), KNEE_TRAVEL
     if not low <= travel <= high:
-        raise DataError(
-            f"{where} has a range of {travel:.3g} m/s^2 per stride (plausible: {low:g} to {high:g} m/s^2); "
-            "check the unit (m/s^2, or m for a position)"
-        )
+        raise DataError(f"{where} has a range of {travel:.3g} m/s^2 per stride (plausible: {low:g} to {high:g} m/s^2)")
     # Gait phase of the swing, below 0 before toe-off.
     swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
     driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
     if held - driven > _HELD_BACK * travel:
         raise DataError(
             f"{where} is {driven:.3g} m/s^2 around toe-off and {held:.3g} m/s^2 in mid-swing, while walking has the "
-            "opposite pattern: the sign is reversed, or the data are of the other knee; "
-            f"{other_sign(walk.signs_from, f'the sign of knee.{name[5:]}')}"
+            "opposite pattern: the sign is reversed, or the data are of the other knee"
         )

@@ -64,6 +64,7 @@ def test_a_recording_is_written_with_what_it_has(tmp_path: Path, capsys: pytest.
     words = ["export", "opensim", str(tmp_path / "walk.csv"), "--out", str(tmp_path / "out")]
     assert main(words) == 0
     assert "left out: ankle_moment, vertical_force" in capsys.readouterr().out
+    assert main([*words, "--body-mass", "1 g"]) == 2
     assert main([*words, "--body-mass", "62 kg"]) == 0
     table = read_opensim(tmp_path / "out" / "recording.sto")
     assert table.kind == "synthetic"

@@ -66,7 +66,7 @@ CASES: dict[str, tuple[Change, str]] = {
     "shank from the horizontal": (changed(SHANK, lambda x: x + 1.57), "shank_angle is 106 deg at heel strike and"),
     "ankle counted the other way": (
         changed(ANKLE, lambda x: np.pi - x),
-        "the sign is reversed; correct the sign in the file, or change ankle_angle.positive in a gait",
+        "the sign is reversed",
     ),
     "ankle with zero as neutral": (
         changed(ANKLE, lambda x: x - np.pi / 2.0),
@@ -76,7 +76,7 @@ CASES: dict[str, tuple[Change, str]] = {
     "moment of the body per kg": (changed(MOMENT, lambda x: 62.0 * x), "ankle_moment reaches 90.2 N m/kg (plausible"),
     "moment of the other foot": (
         changed(MOMENT, lambda x: np.roll(x, 104)),
-        "ankle_moment peaks at 98 % of the stride, but the foot is off the ground from 64 % on; the moment is of",
+        "ankle_moment peaks at 98 % of the stride, but the foot is off the ground from 64 % on: the moment is of",
     ),
     "moment of the other foot, without a force": (
         lambda columns: {
@@ -84,37 +84,37 @@ CASES: dict[str, tuple[Change, str]] = {
             for name, values in columns.items()
             if name != FORCE
         },
-        "on; toe-off is guessed without a vertical force: give one; or the moment is of the other foot",
+        "on: the moment is of the other foot",
     ),
     "moment on a later clock": (
         changed(MOMENT, lambda x: np.roll(x, 21)),
         "ankle_moment peaks at 58 % of the stride and is 0.57 N m/kg in swing, but the foot is off the ground from 64",
     ),
-    "force of the other foot": (changed(FORCE, lambda x: np.roll(x, 104)), "choose the other side"),
+    "force of the other foot": (changed(FORCE, lambda x: np.roll(x, 104)), "of the other foot"),
     "force in newton without a unit": (
         changed(FORCE, lambda x: 608.0 * x),
-        "vertical_force reaches 619 body weights (plausible: 0.5 to 2.5); check the body mass",
+        "vertical_force reaches 619 body weights (plausible: 0.5 to 2.5)",
     ),
     "force of both feet": (changed(FORCE, lambda x: x + 0.5), "0 heel strikes in vertical_force"),
-    "force downwards": (changed(FORCE, np.negative), "below 0, so its sign is reversed; correct the sign in the file"),
+    "force downwards": (changed(FORCE, np.negative), "below 0, so its sign is reversed"),
     "knee counted backwards": (changed(FORWARD, np.negative), "knee_forward is -10.1 m/s^2 around toe-off and 7.69"),
     "knee counted down": (
         changed(UP, np.negative),
-        "correct the sign in the file, or change the sign of knee.up in a gait map",
+        "knee_up is -5.03 m/s^2 around toe-off and 4.6",
     ),
-    "knee with gravity": (changed(UP, lambda x: x + 9.81), "subtract gravity from accelerometer data"),
-    "knee in millimetres": (scaled((FORWARD, UP), 1000.0), "divide both by 1000 in the file"),
+    "knee with gravity": (changed(UP, lambda x: x + 9.81), "knee_up has a mean of 9.81 m/s^2"),
+    "knee in millimetres": (scaled((FORWARD, UP), 1000.0), "divide both by 1000"),
     "knee forward alone times g": (scaled((FORWARD,), 9.80665), "divide knee_forward by 9.80665"),
-    "knee times g": (scaled((FORWARD, UP), 9.80665), "divide both by 9.80665 in the file"),
+    "knee times g": (scaled((FORWARD, UP), 9.80665), "divide both by 9.80665"),
     "knee in centimetres": (
         scaled((FORWARD, UP), 100.0),
-        "knee_forward has a range of 2.02e+03 m/s^2 per stride (plausible: 0.5 to 80 m/s^2); check the unit",
+        "knee_forward has a range of 2.02e+03 m/s^2 per stride (plausible: 0.5 to 80 m/s^2)",
     ),
-    "knee exchanged": (exchanged, "exchange them in the file"),
+    "knee exchanged": (exchanged, "exchange them"),
     "knee in g": (
         scaled((FORWARD, UP), 1.0 / 9.80665),
         "knee_forward and knee_up differ by 79 % (42 % if corrected) from a rotation of the knee about the resting "
-        "ankle while the foot is flat; multiply both by 9.80665 in the file",
+        "ankle while the foot is flat; multiply both by 9.80665",
     ),
     "shank in noise": (
         changed(SHANK, lambda x: x + np.random.default_rng(4).normal(0.0, 0.7, x.size)),
@@ -136,9 +136,7 @@ CASES: dict[str, tuple[Change, str]] = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_what_no_leg_does_is_refused_with_the_remedy(
-    csv_of: Callable[..., Path], columns: dict[str, Floats], case: str
-) -> None:
+def test_what_no_leg_does_is_refused(csv_of: Callable[..., Path], columns: dict[str, Floats], case: str) -> None:
     change, message = CASES[case]
     path = csv_of(change(columns))
     with pytest.raises(DataError, match=re.escape(message)) as refused:
@@ -151,7 +149,9 @@ def test_a_drop_out_in_all_strides_but_one_refuses_the_record(
     csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
     change = held((SHANK,), 150, 700)
-    with pytest.raises(DataError, match=r"column 'shank_angle' of shank_angle is constant from .* cut the file there"):
+    with pytest.raises(
+        DataError, match=r"column 'shank_angle' of shank_angle is constant from .* while the wearer walks"
+    ):
         import_gait([csv_of(change(columns))], ImportSettings(62.0))
 
 
@@ -184,11 +184,8 @@ def test_a_reversed_shank_without_a_force_is_named_as_what_it_is(
     csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
     reversed_shank = changed(SHANK, np.negative)({name: x for name, x in columns.items() if name != FORCE})
-    with pytest.raises(
-        DataError, match=r"if the sign of shank_angle, which determines the stance, is reversed: correct"
-    ) as refused:
+    with pytest.raises(DataError, match=r"on the ground for 18 % of the stride, by shank_angle \(plausible"):
         import_gait([csv_of(reversed_shank)], ImportSettings(62.0))
-    assert "force" not in str(refused.value)
 
 
 @pytest.mark.parametrize(("factor", "shown"), [(0.6, "0.278"), (0.9, "0.417"), (1.3, "0.602")])
@@ -203,9 +200,7 @@ def test_a_force_that_is_not_half_the_weight_is_remarked(
 def test_a_time_in_milliseconds_is_refused(
     csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording
 ) -> None:
-    with pytest.raises(
-        DataError, match=r"the stride time is 1.04e\+03 s \(plausible: 0.5 to 3 s\); check the unit of time"
-    ):
+    with pytest.raises(DataError, match=r"the stride time is 1.04e\+03 s \(plausible: 0.5 to 3 s\)"):
         import_gait([csv_of(columns, 1000.0 * walk.time)], ImportSettings(62.0))
 
 
@@ -224,9 +219,8 @@ def test_a_record_of_one_heel_strike_has_the_right_column(
     csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, first: int, last: int, said: str
 ) -> None:
     part = {name: values[first:last] for name, values in columns.items()}
-    with pytest.raises(DataError, match=said) as refused:
+    with pytest.raises(DataError, match=said):
         import_gait([csv_of(part, walk.time[first:last])], ImportSettings(62.0))
-    assert "least_strides" not in str(refused.value)
 
 
 def test_a_moment_file_without_a_whole_stride_is_named(opensim_files: dict[str, Path]) -> None:
@@ -234,7 +228,7 @@ def test_a_moment_file_without_a_whole_stride_is_named(opensim_files: dict[str, 
     lines = path.read_text().splitlines()
     kept = [line if not line.startswith("nRows") else "nRows=150" for line in lines[: 6 + 150]]
     path.write_text("\n".join(kept) + "\n")
-    with pytest.raises(DataError, match=r"walk_id.sto: ankle_moment, 0 to .* covers no whole stride .* omit the file"):
+    with pytest.raises(DataError, match=r"walk_id.sto: ankle_moment, 0 to .* covers no whole stride"):
         import_gait(list(opensim_files.values()), ImportSettings(62.0))
 
 
@@ -249,7 +243,7 @@ def test_files_of_different_forms_need_a_map(
     opensim_files: dict[str, Path], csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
     mixed = [csv_of(columns), opensim_files["grf"]]
-    with pytest.raises(DataError, match=r"different formats \(csv, opensim\); name the columns of all of them in a"):
+    with pytest.raises(DataError, match=r"different formats \(csv, opensim\)"):
         import_gait(mixed, ImportSettings(62.0))
 
 
@@ -261,7 +255,7 @@ def test_files_of_different_forms_need_a_map(
         (ImportSettings(62.0, walking_speed=50.0), "walking speed 50 m/s is not plausible"),
         (ImportSettings(62.0, stature=175.0), "stature 175 m is not plausible; allowed is 0.5 to 2.5 m"),
         (ImportSettings(62.0, low_pass=0.1), "low pass 0.1 Hz is not plausible"),
-        (ImportSettings(62.0, low_pass=500.0), "has 200.3 samples per second; choose a cut-off frequency below"),
+        (ImportSettings(62.0, low_pass=500.0), "has 200.3 samples per second, so a cut-off frequency must be below"),
         (ImportSettings(62.0, least_strides=0), "the minimum number of strides must be 1 or more, not 0"),
         (ImportSettings(62.0, name="My gait"), "name 'My gait' must consist of lower-case letters"),
     ],

@@ -123,9 +123,7 @@ def test_what_a_map_leaves_out_is_read_from_the_outputs_of_the_model(
     moment = walk.resample(np.arange(0.0, walk.duration, 0.01))["ankle_moment"]
     # In kN m/kg: the format refuses the column, and a map of the moment alone mends it.
     path = written({"RAnkleMoment": np.array([1e-3 * moment, 0.0 * moment, 0.0 * moment])}, walk_along=-1.0)
-    with pytest.raises(
-        DataError, match="implausible for a moment in walking; give the unit of the column in a gait map"
-    ):
+    with pytest.raises(DataError, match="implausible for a moment in walking, in any of 'N m/kg'"):
         import_gait([path], ImportSettings(normative.body_mass))
     named = GaitMap(ankle_moment=MomentMap(terms=("RAnkleMoment.x",), positive="plantarflexion", unit="kN m/kg"))
     found = import_gait([path], ImportSettings(normative.body_mass, columns=named))

@@ -78,11 +78,11 @@ def test_one_contact_in_a_long_record_of_a_plate_is_a_force() -> None:
     time = np.arange(0.0, 60.0, 0.01)
     weights = force(time, "right", [1]) / (MASS * 9.80665)
     assert np.count_nonzero(weights) < 0.02 * time.size
-    check_force_scale("plate", weights, "columns")
+    check_force_scale("plate", weights)
     with pytest.raises(DataError, match="its sign is reversed"):
-        check_force_scale("plate", -weights, "columns")
-    with pytest.raises(DataError, match="check the body mass"):
-        check_force_scale("plate", 10.0 * weights, "columns")
+        check_force_scale("plate", -weights)
+    with pytest.raises(DataError, match=r"reaches 9.94 body weights"):
+        check_force_scale("plate", 10.0 * weights)
 
 
 def test_a_wrong_count_of_columns_and_repeated_last_times_are_mended_and_said(tmp_path: Path) -> None:
@@ -182,9 +182,7 @@ def test_start_and_end_leave_out_the_rest(tmp_path: Path) -> None:
     part = import_gait([path], ImportSettings(MASS, start=1.2, end=4.5))
     assert (len(whole.strides), len(part.strides)) == (3, 2)
     assert all(item.start >= 1.2 and item.end <= 4.5 for item in part.strides)
-    with pytest.raises(
-        DataError, match=r"has no samples from 7 to 5.19 s; choose .* within the recording, 0 to 5.19 s"
-    ):
+    with pytest.raises(DataError, match=r"has no samples from start 7 to end 5.19 s, but from 0 to 5.19 s"):
         import_gait([path], ImportSettings(MASS, start=7.0))
     with pytest.raises(DataError, match=r"the start, 3 s, must be before the end, 2 s"):
         import_gait([path], ImportSettings(MASS, start=3.0, end=2.0))
@@ -196,7 +194,6 @@ def test_the_reading_of_a_neutral_ankle_may_be_given(tmp_path: Path) -> None:
     path = opensim(tmp_path / "ik.mot", TIME, columns, "inDegrees=yes")
     (said,) = [line for line in import_gait([path], PERSON).remarks if "zero of ankle_angle" in line]
     assert "tilted by 12." in said
-    assert "ankle_neutral=-0.2" in said
     found = import_gait([path], ImportSettings(MASS, ankle_neutral=np.radians(-8.0)))
     assert_true(found.gait, ("ankle_angle",))
     assert not any("zero of ankle_angle" in line for line in found.remarks)
@@ -285,10 +282,10 @@ def test_a_plain_table_with_opensims_names_is_read(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("PacketCounter,shank\n1,two\n", "need it in a gait map, such as time = { rate = '100 Hz' }"),
+        ("PacketCounter,shank\n1,two\n", "or frames with time.rate of a gait map"),
         (
             "time,shank_angle [deg/s],ankle_angle [deg]\n" + "".join(f"{k},1,{75 + 5 * k}\n" for k in range(9)),
-            "; integrate the rate",
+            "; a rate is not integrated",
         ),
         ("time,a,\n0,1,2\n", "a column has no name"),
         ("time,a\n0,1,2\n", "line 2 has 3 values for 2 columns"),

@@ -18,7 +18,7 @@ from ppafo.gait import Gait, at_speed, list_gaits, load_gait, speed_range, walk_
 from ppafo.gait.document import gait_toml, json_schema, parse_gait
 from ppafo.gait.finding import gait_finding
 from ppafo.gait.gait import KNEE, GaitCurve
-from ppafo.gait.plausible_angles import gait_file_remarks, standing_tilt
+from ppafo.gait.plausible_angles import gait_file_remarks
 from ppafo.gait.recorded import ImportedGait, ImportSettings, import_gait
 from ppafo.storage import write_csv
 
@@ -115,11 +115,11 @@ def turned(amplitudes: tuple[float, ...]) -> tuple[float, ...]:
 IMPLAUSIBLE = {
     "ankle": (
         {"ankle_angle": lambda c: dataclasses.replace(negative(c), mean=math.pi - c.mean)},
-        "the sign is reversed; write mean, cosine and sine with the opposite sign about 90 deg",
+        "the sign is reversed",
     ),
     "moment of the other foot": (
         {"ankle_moment": lambda c: dataclasses.replace(c, cosines=turned(c.cosines), sines=turned(c.sines))},
-        "peaks at 98 % of the stride, but the foot is off the ground from 64 % on; give the moment of the same foot",
+        "peaks at 98 % of the stride, but the foot is off the ground from 64 % on: the moment is of the other foot",
     ),
     "knee in g": (
         {"knee_forward": lambda c: c.scale(1.0 / 9.80665), "knee_up": lambda c: c.scale(1.0 / 9.80665)},
@@ -129,12 +129,11 @@ IMPLAUSIBLE = {
 
 
 @pytest.mark.parametrize("case", IMPLAUSIBLE)
-def test_a_gait_file_that_no_leg_walks_is_refused_with_the_remedy(normative: Gait, case: str) -> None:
+def test_a_gait_file_that_no_leg_walks_is_refused(normative: Gait, case: str) -> None:
     changes, message = IMPLAUSIBLE[case]
     wrong = dataclasses.replace(normative, **{name: change(normative.curves[name]) for name, change in changes.items()})
     with pytest.raises(DataError, match=f"^bad.toml: .*{re.escape(message)}") as refused:
         parse_gait(gait_toml(wrong).encode(), "bad.toml")
-    assert "gait map" not in str(refused.value), "none was given"
     assert "\n" not in str(refused.value)
 
 
@@ -260,21 +259,12 @@ def test_stride_times_of_the_subject_follow_the_law_of_the_scaling(normative: Ga
 
 
 @pytest.mark.parametrize(("tilt", "remarked"), [(0.0, ""), (5.0, "tilted by 9.6 deg"), (-12.0, "tilted by 7.4 deg")])
-def test_an_ankle_zero_that_is_off_is_remarked_with_the_correction(tilt: float, remarked: str) -> None:
+def test_an_ankle_zero_that_is_off_is_remarked(tilt: float, remarked: str) -> None:
     gait = load_gait()
     moved = replace(gait, ankle_angle=replace(gait.ankle_angle, mean=gait.ankle_angle.mean + math.radians(tilt)))
     remarks = gait_file_remarks(parse_gait(gait_toml(moved).encode(), "moved.toml"))
     assert bool(remarks) == bool(remarked)
     assert all(remarked in line for line in remarks)
-    if remarks:
-        mean = float(re.search(r"to (\S+) deg$", remarks[0])[1])  # type: ignore[index]
-        corrected = replace(gait, ankle_angle=replace(gait.ankle_angle, mean=math.radians(mean)))
-        assert abs(standing_tilt_of(corrected)) < 0.1
-
-
-def standing_tilt_of(gait: Gait) -> float:
-    percent = np.linspace(0.0, 1.0, 101)
-    return standing_tilt(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
 
 
 @pytest.mark.parametrize("tilt", [17.0, -26.0])

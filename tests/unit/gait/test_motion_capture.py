@@ -149,8 +149,8 @@ def test_a_marker_that_is_held_until_it_jumps_was_lost_and_one_at_rest_was_not(
 @pytest.mark.parametrize(
     ("forward", "vertical", "said"),
     [
-        ("y", "z", "correct the columns or the forward axis of the shank"),
-        ("-x", "z", "shank_angle.forward = '-x' is reversed: 'RTOE' is behind 'RHEE' along it; give 'x'"),
+        ("y", "z", "shank_angle has a range of 0 deg in the whole recording"),
+        ("-x", "z", "shank_angle.forward = '-x' is reversed: 'RTOE' is behind 'RHEE' along it; the axis is 'x'"),
         ("x", "y", "is no shank upright along it"),
     ],
 )

@@ -166,7 +166,7 @@ def test_without_events_the_shank_gives_the_strides_and_the_plate_corrects_them(
     text = "\n".join(found.remarks)
     assert "walking direction is -y, upwards is z" in text
     assert "few contacts on force plates: heel strikes and toe-offs from shank_angle, shifted by" in text
-    with pytest.raises(DataError, match=r"trial.c3d: does not state the body mass; give it, such as body_mass=62"):
+    with pytest.raises(DataError, match=r"trial.c3d: does not state the body mass, and body_mass is not given"):
         import_gait([path], ImportSettings())
 
 

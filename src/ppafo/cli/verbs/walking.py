@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from ppafo.arguments import (
     Angle,
+    BodyMass,
     Count,
     File,
     Frequency,
     Gait,
     Length,
-    Mass,
     Name,
     Speed,
     Time,
@@ -54,7 +54,7 @@ def gait_show(gait: Gait, *, speed: Speed | None = None) -> Finding[GaitFound]:
 def gait_import(
     files: Sequence[File],
     *,
-    body_mass: Mass | None = None,
+    body_mass: BodyMass | None = None,
     side: Literal["right", "left"] = "right",
     map_: File | None = None,
     speed: Speed | None = None,

@@ -8,7 +8,6 @@ from textwrap import shorten
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
-from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.mapping import setting_text
 from ppafo.gait.recorded.table import COORDINATES, MotionTable, marker_of
 from ppafo.signals.recording import Floats
@@ -18,16 +17,9 @@ from ppafo.wording import nearest_name, one_line
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
 _RATE = "rad/s"
-_NOT_INTEGRATED = (
-    "; integrate the rate over each stride, less its mean over the stride, and set the zero while standing"
-)
+_NOT_INTEGRATED = "; a rate is not integrated"
 _MOST_NAMES, _LONGEST_TEXT = 12, 160
 """Limits of an error message: number of column names, and characters of the names and of a remark."""
-_BOTH_ANGLES = (
-    "; the foot is placed by both angles: shank_angle (0 vertical, positive with the ankle in front of the knee; also "
-    "pelvis, hip and knee angles, or markers) and ankle_angle (90 deg neutral, growing in plantarflexion)"
-)
-"""Reason for the required curves, their conventions, and other sources of a shank angle, in an error message."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +52,7 @@ class CurveColumns:
         unit = stated or self.table.units[name]
         values = self.table.columns[name]
         if not unit:
-            gait_map = f"a gait map ({setting_text('columns')})"
-            raise DataError(f"{where} has no unit in the file; give {self.unit_key} in {gait_map}")
+            raise DataError(f"{where} has no unit, in the file or as {self.unit_key} of a gait map")
         parsed_unit = "" if unit == "-" else unit
         problem = ""
         for si_unit in (*si_units, _RATE):
@@ -81,7 +72,7 @@ class CurveColumns:
 def check_recorded(values: Floats, where: str) -> None:
     """Raise DataError for a column without any number; ``where`` is its name in the message."""
     if not np.isfinite(values).any():
-        raise DataError(f"{where} contains no numbers; use another file, or map another column")
+        raise DataError(f"{where} contains no numbers")
 
 
 def find_columns(
@@ -93,9 +84,7 @@ def find_columns(
     holders = [table for table in tables if all(name in table.columns for name in unsigned)]
     if len(holders) > 1:
         files = " and ".join(table.file for table in holders)
-        raise DataError(
-            f"{curve}: {files} both have the column {unsigned[0]!r}; omit one file, or choose another column"
-        )
+        raise DataError(f"{curve}: {files} both have the column {unsigned[0]!r}")
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
         terms = tuple(zip(signs, unsigned, strict=True))
@@ -129,8 +118,4 @@ def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTa
     first_names = ", ".join(markers[:_MOST_NAMES]) + (", ..." if len(markers) > _MOST_NAMES else "")
     texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
     listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
-    schema = f"a gait map ({setting_text('columns')}; format: 'ppafo doctor --schema gait-map')"
-    needed = _BOTH_ANGLES if names.keys() & set(REQUIRED) else ""
-    return (
-        f"{'; '.join(reasons)} ({files}: {listed}){needed}; name the columns in {schema}, or add a file that has them"
-    )
+    return f"{'; '.join(reasons)} ({files}: {listed}); a gait map ({setting_text('columns')}) names other columns"

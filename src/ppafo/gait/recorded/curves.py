@@ -11,7 +11,6 @@ import numpy as np
 from ppafo.errors import DataError, raise_noted
 from ppafo.gait.gait import HARMONICS, FitError, fit_curve
 from ppafo.gait.recorded.footfalls import Stride
-from ppafo.gait.recorded.mapping import setting_text
 from ppafo.gait.recorded.signal import Signal
 from ppafo.signals.recording import Floats
 
@@ -87,7 +86,7 @@ def check_scatter(
     """Raise DataError for curves that scatter by a quarter of their range, or whose Fourier series fits badly."""
     most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
     scatters = _scatters(curves, errors, REFUSED_SPREAD, REFUSED_MISFIT)
-    raise_noted([DataError(f"{walk[name].file}: {message}; {most}; {_remedy()}") for name, message in scatters])
+    raise_noted([DataError(f"{walk[name].file}: {message}; {most}") for name, message in scatters])
 
 
 def _scatters(
@@ -107,14 +106,10 @@ def _scatters(
             )
 
 
-def _remedy() -> str:
-    return f"smooth the recording ({setting_text('low_pass', 6.0, '6 Hz')}), or record more or steadier strides"
-
-
 def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> list[str]:
     """Return a remark on each curve with unusual scatter between strides or an unusual misfit of its series."""
     scatters = _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
-    return [f"{message}: the data are noisy, or the walk is not steady; {_remedy()}" for _, message in scatters]
+    return [f"{message}: the data are noisy, or the walk is not steady" for _, message in scatters]
 
 
 def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Floats:

@@ -189,7 +189,7 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
         if lowest - middle < 2 or smooth.values[lowest] > _DEEPEST:
             raise DataError(
                 f"{shank.file}: no toe-off was found: after {smooth.time[first]:g} s, the shank does not lean forward "
-                "far enough before the swing; give a vertical force, or correct the sign of the shank angle"
+                "far enough before the swing"
             )
         off = middle + int(np.argmin(rate[middle:lowest]))
         strides.append(Stride(*(float(smooth.time[sample]) for sample in (first, off, last))))

@@ -11,14 +11,22 @@ from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
 from ppafo.gait.mean_stride import MeanStride
-from ppafo.gait.plausible import check_plausible, check_side
+from ppafo.gait.plausible import check_plausible, check_side, force_remarks, moment_remarks
+from ppafo.gait.plausible_angles import sign_remarks, zero_remarks
 from ppafo.gait.recorded.columns import LOADS
-from ppafo.gait.recorded.curves import CurveStatistics, check_scatter, over_strides, statistics
-from ppafo.gait.recorded.footfalls import SHANK, Footfalls, Stride, find_footfalls, strides_of_curve, strides_within
-from ppafo.gait.recorded.knee import check_direction
+from ppafo.gait.recorded.curves import CurveStatistics, check_scatter, over_strides, scatter_remarks, statistics
+from ppafo.gait.recorded.footfalls import (
+    FORCE,
+    SHANK,
+    Footfalls,
+    Stride,
+    find_footfalls,
+    strides_of_curve,
+    strides_within,
+)
+from ppafo.gait.recorded.knee import check_direction, knee_remarks
 from ppafo.gait.recorded.mapping import ImportSettings, check_settings
-from ppafo.gait.recorded.remarks import import_remarks
-from ppafo.gait.recorded.signal import low_pass
+from ppafo.gait.recorded.signal import Signal, low_pass
 from ppafo.gait.recorded.source import GaitSource, read_source
 from ppafo.gait.recorded.strides import (
     StrideSelection,
@@ -67,7 +75,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     except PpafoError as error:
         raise_noted([*wrong, error])
     curves, strides, unmeasured = _curves_over_strides(source, footfalls, wrong)
-    mean_stride = _mean_stride(source, footfalls.events, curves, strides)
+    mean_stride = _mean_stride(source, curves, strides)
     fitted = {name: fit_curve(curve.mean, HARMONICS[name], curve.spread) for name, curve in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     walk = {name: footfalls.walk[name] for name in curves}
@@ -78,9 +86,9 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
         check_side(mean_stride, load_gait())
         check_plausible(mean_stride)
     with noted_in(wrong):
-        check_direction(walk, source.signs_from)
+        check_direction(walk)
     raise_noted(wrong)
-    further = import_remarks(source, footfalls.events, walk, curves, errors, strides, mean_stride)
+    further = _remarks(source, footfalls.events, walk, curves, errors, strides)
     return ImportedGait(
         gait=_gait(
             source, footfalls.events, {name: curve for name, (curve, _) in fitted.items()}, mean_stride, strides
@@ -132,7 +140,7 @@ def _curves_over_strides(
         wrong.append(
             DataError(
                 f"{file}: {name}, {time[0]:.4g} to {time[-1]:.4g} s, covers no whole stride (first stride: "
-                f"{strides.taken[0].start:.4g} to {strides.taken[0].end:.4g} s); give a longer file, or omit the file"
+                f"{strides.taken[0].start:.4g} to {strides.taken[0].end:.4g} s)"
             )
         )
     if any(name not in remaining for name in REQUIRED):
@@ -141,9 +149,7 @@ def _curves_over_strides(
     return remaining, strides, remarks
 
 
-def _mean_stride(
-    source: GaitSource, events: str, curves: Mapping[str, CurveStatistics], strides: StrideSelection
-) -> MeanStride:
+def _mean_stride(source: GaitSource, curves: Mapping[str, CurveStatistics], strides: StrideSelection) -> MeanStride:
     """Return the mean curves with stance fraction and stride time, as the plausibility checks need them."""
     # Both coordinates of the knee may be from one marker, whose scale is one.
     knee, is_one_marker = source.columns.knee, False
@@ -155,10 +161,31 @@ def _mean_stride(
         curves={name: curve.mean for name, curve in curves.items()},
         stance_share=float(np.mean([stride.stance_share for stride in strides.taken])),
         stride_time=float(np.mean([stride.time for stride in strides.taken])),
-        signs_from=source.signs_from,
         is_knee_one_marker=is_one_marker,
-        is_toe_off_guessed=events == SHANK and "vertical_force" not in curves,
     )
+
+
+def _remarks(
+    source: GaitSource,
+    events: str,
+    walk: Mapping[str, Signal],
+    curves: Mapping[str, CurveStatistics],
+    errors: Mapping[str, FitError],
+    strides: StrideSelection,
+) -> list[str]:
+    """Return the remarks on strides, signs and sizes of the curves, zero of the ankle, and scatter."""
+    means, count = {name: curve.mean for name, curve in curves.items()}, len(strides.taken)
+    less = ": heel strikes and toe-offs are from shank_angle and less exact" if events == SHANK else ""
+    return [
+        *(f"stride from {each.start:.4g} to {each.end:.4g} s left out: {why}" for each, why in strides.left_out),
+        *(f"{name} covers {own} of {count} strides" for name in curves if (own := len(curves[name].strides)) < count),
+        *(force_remarks(means[FORCE]) if FORCE in means else [f"no vertical force{less}"]),
+        *knee_remarks(source.columns.knee, walk, source.settings.stature),
+        *sign_remarks(means["shank_angle"], means["ankle_angle"]),
+        *(moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []),
+        *zero_remarks(means["shank_angle"], means["ankle_angle"]),
+        *scatter_remarks(curves, errors),
+    ]
 
 
 def _gait(

@@ -7,7 +7,6 @@ import numpy as np
 
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.gait import HARMONICS
-from ppafo.gait.mean_stride import SignSource, other_sign
 from ppafo.gait.recorded.columns import find_columns
 from ppafo.gait.recorded.mapping import KneeMap, setting_text
 from ppafo.gait.recorded.signal import Signal
@@ -37,7 +36,7 @@ def knee_signals(
     if mapped.thigh is not None and mapped.thigh_length is None and stature is None:
         if is_default:
             return {}
-        raise DataError("knee.thigh needs the thigh length: give knee.thigh_length in the gait map, or the stature")
+        raise DataError("knee.thigh needs knee.thigh_length, or the stature")
     thigh = mapped.thigh or ()
     found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, is_default)
     if found is None:
@@ -75,9 +74,8 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
     Raises DataError for an implausible length of the thigh.
     """
     if mapped is None or "knee_forward" not in walk:
-        why = "no columns of the knee were found; name them by knee.forward and knee.up of a gait map"
-        if mapped is not None and mapped.thigh is not None:
-            why = f"the thigh length is unknown; give {setting_text('stature')}, or a gait map with knee.thigh_length"
+        lacks_length = mapped is not None and mapped.thigh is not None
+        why = f"the thigh length is unknown without {setting_text('stature')}" if lacks_length else "it has no columns"
         return [f"no acceleration of the knee: {why}"]
     remarks = []
     if mapped.thigh is not None and mapped.thigh_length is None:
@@ -91,7 +89,7 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
     return remarks
 
 
-def check_direction(walk: Mapping[str, Signal], signs_from: SignSource) -> None:
+def check_direction(walk: Mapping[str, Signal]) -> None:
     """Raise DataError for a knee that moves backwards; on a treadmill, the knee stays in about the same place."""
     knee = walk.get("knee_forward")
     if knee is None or not knee.is_position:
@@ -100,7 +98,7 @@ def check_direction(walk: Mapping[str, Signal], signs_from: SignSource) -> None:
     if speed < -_FASTEST_BACK:
         raise DataError(
             f"{knee.file}: the knee moves backwards at {-speed:.2g} m/s, so knee.forward points against the "
-            f"walking direction; {other_sign(signs_from, 'the sign of knee.forward')}"
+            "walking direction"
         )
 
 

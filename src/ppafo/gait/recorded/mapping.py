@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, make_schema, read_model
 from ppafo.documents.toml_text import NAME, TomlKind
 from ppafo.errors import DataError, UnitError, raise_noted, refused_as
+from ppafo.gait.gait import BODY_MASSES, SPEEDS, STATURES
 from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.units import parse_quantity
 from ppafo.wording import argument_text
@@ -227,7 +228,7 @@ def load_map(path: str | Path) -> GaitMap:
     """Load a gait map from a TOML file; raises DataError if it cannot be used."""
     loaded = read_model(_FILE, GaitMap, path)[0]
     if loaded.model_fields_set <= {"schema_version"}:
-        raise DataError(f"{path}: the gait map has no curve; add a table such as [ankle_angle], or omit the map")
+        raise DataError(f"{path}: the gait map has no curve, such as [ankle_angle]")
     return loaded
 
 
@@ -275,21 +276,15 @@ _OPTIONS = {"columns": "--map", "least_strides": "--minimum-strides", "longest_g
 """Options of ``ppafo gait import`` with names different from the settings."""
 
 
-def setting_text(name: str, value: float | None = None, shown: str = "") -> str:
-    """Return a setting as the caller would write it, with its value [SI], or ``shown`` with a unit for an option.
-
-    >>> setting_text("least_strides"), setting_text("low_pass", 6.0, "6 Hz")
-    ('least_strides', 'low_pass=6')
-    """
-    text = argument_text(name, shown, _OPTIONS.get(name, ""))
-    # A field of ``ImportSettings`` is a plain number, and no text with a unit.
-    return text if value is None or text.startswith("--") else f"{name}={value:.4g}"
+def setting_text(name: str) -> str:
+    """Return a setting as the caller would write it."""
+    return argument_text(name, option=_OPTIONS.get(name, ""))
 
 
 _PLAUSIBLE = {
-    "body_mass": (1.0, 500.0, "kg"),
-    "walking_speed": (0.05, 4.0, "m/s"),
-    "stature": (0.5, 2.5, "m"),
+    "body_mass": (*BODY_MASSES, "kg"),
+    "walking_speed": (*SPEEDS, "m/s"),
+    "stature": (*STATURES, "m"),
     # Below 1 Hz the gait itself would be removed; usual are 6 Hz.
     "low_pass": (1.0, 1.0e6, "Hz"),
     "longest_gap": (0.0, LONGEST_FILLED, "s"),

@@ -64,14 +64,14 @@ def low_pass(signal: Signal, cut_off: float) -> Signal:
     from scipy.signal import butter, sosfiltfilt
 
     if signal.time.size < _MINIMUM_SAMPLES:
-        raise DataError(f"{signal.file}: {signal.time.size} rows are too few for a stride; give a longer recording")
+        raise DataError(f"{signal.file}: {signal.time.size} rows are too few for a stride")
     # A filter needs even samples; the jitter of a clock is small beside a stride.
     even = np.linspace(signal.time[0], signal.time[-1], signal.time.size)
     relative = cut_off / _DOUBLE_PASS / (0.5 * signal.rate)
     if relative >= 1.0:
         raise DataError(
-            f"{signal.file}: has {signal.rate:.4g} samples per second; choose a cut-off frequency below "
-            f"{0.5 * signal.rate * _DOUBLE_PASS:.3g} Hz instead of {cut_off:g} Hz"
+            f"{signal.file}: has {signal.rate:.4g} samples per second, so a cut-off frequency must be below "
+            f"{0.5 * signal.rate * _DOUBLE_PASS:.3g} Hz, not {cut_off:g} Hz"
         )
     sections = butter(_ORDER, relative, output="sos")
     values = sosfiltfilt(sections, np.interp(even, signal.time, signal.values))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.mean_stride import MeanStride, SignSource
+from ppafo.gait.mean_stride import MeanStride
 from ppafo.gait.plausible import check_force_scale, check_moment
 from ppafo.gait.plausible_angles import check_ankle_alone
 from ppafo.gait.recorded.columns import LOADS
@@ -93,9 +93,7 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
     """Return the convention that fits the content of files; ``body_mass`` [kg] tells moments from moments per mass."""
     names = sorted({table.form for table in tables})
     if len(names) > 1 and any(FORMS[name].is_whole for name in names):
-        raise DataError(
-            f"the files have different formats ({', '.join(names)}); name the columns of all of them in a gait map"
-        )
+        raise DataError(f"the files have different formats ({', '.join(names)}), which only a gait map can join")
     conventions = [FORMS[table.form].convention(table, side, body_mass) for table in tables]
     # One convention for all files: each curve is from the first file that has its columns.
     columns = {}
@@ -162,15 +160,13 @@ class GaitSource:
     """Recording for the import of a gait.
 
     ``tables`` are the files, ``columns`` is the gait map, and ``walk`` holds the signals by curve. ``settings`` are
-    completed with the data of the files. ``signs_from`` is the source of the signs, and ``remarks`` list repaired
-    values.
+    completed with the data of the files. ``remarks`` list repaired values.
     """
 
     tables: Sequence[MotionTable]
     columns: GaitMap
     walk: Mapping[str, Signal]
     settings: ImportSettings
-    signs_from: SignSource
     remarks: tuple[str, ...]
 
 
@@ -199,11 +195,10 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     moved = [column for name, terms in used.items() if name not in LOADS for column in terms]
     tables = [fill_gaps(without_lost_markers(table, moved), names, settings.longest_gap) for table in tables]
     walk = walk_signals(tables, columns, body_mass, settings.stature, named.keys(), wrong)
-    signs_from: SignSource = "columns" if own is None else "map"
     if any(name not in walk for name in REQUIRED):
         # Without a stride, the whole recording still shows the range of the ankle and the sign of its moment.
         curves = {name: signal.values[np.isfinite(signal.values)] for name, signal in walk.items()}
-        whole = MeanStride({name: signal.file for name, signal in walk.items()}, curves, 0.0, 0.0, signs_from)
+        whole = MeanStride({name: signal.file for name, signal in walk.items()}, curves, 0.0, 0.0)
         for check in (check_ankle_alone, check_moment) if settings.body_mass else (check_ankle_alone,):
             with noted_in(wrong):
                 check(whole)
@@ -215,10 +210,10 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         remarks.append(f"not in the gait map, read as the {settings.side} foot by the file format: {shown}")
     if not is_usable:
         raise_noted(wrong)
-    walk, on_plates = _with_loads(walk, tables, convention, settings.body_mass, signs_from, wrong)
+    walk, on_plates = _with_loads(walk, tables, convention, settings.body_mass, wrong)
     remarks += [*on_plates, *convention.remarks, *(remark for _, remark in convention.curve_remarks)]
     remarks += [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
-    return GaitSource(tables, columns, walk, settings, signs_from, (*remarks, *_ends(walk, tables)))
+    return GaitSource(tables, columns, walk, settings, (*remarks, *_ends(walk, tables)))
 
 
 def _read_tables(
@@ -230,7 +225,7 @@ def _read_tables(
     them as arranged. Problems of a table are added to ``wrong``. Raises DataError if a file cannot be read.
     """
     if not files:
-        raise DataError("no file was given; a gait needs at least shank and ankle angles")
+        raise DataError("no file was given")
     start, end = (None, None) if wrong else (settings.start, settings.end)
     read: list[MotionTable] = []
     for path in files:
@@ -242,10 +237,10 @@ def _read_tables(
         read = [mean_stride_table(each, settings.stride_time) if each.problem else each for each in read]
         if not any(each.is_mean_stride or each.problem for each in read):
             given = setting_text("stride_time")
-            wrong.append(DataError(f"{given} is for a file over percent of the stride, in its first column; omit it"))
+            wrong.append(DataError(f"{given} is for a file over percent of the stride, in its first column"))
     if settings.columns is not None and settings.columns.time is not None:
         if not any(each.problem for each in read):
-            wrong.append(DataError("time.rate of the gait map is for files without a time column; omit it"))
+            wrong.append(DataError("time.rate of the gait map is for files without a time column"))
         rate = settings.columns.time.frequency()
         read = [
             cut_table(counted_table(each, rate), settings.longest_gap, start, end) if each.problem else each
@@ -266,7 +261,6 @@ def _with_loads(
     tables: Sequence[MotionTable],
     convention: Convention,
     body_mass: float | None,
-    signs_from: SignSource,
     wrong: list[PpafoError],
 ) -> tuple[dict[str, Signal], list[str]]:
     """Return the signals with loads of a known scale, and remarks on the force plates.
@@ -283,7 +277,7 @@ def _with_loads(
             walk |= {} if force is None else {FORCE: force}
     if FORCE in walk:
         try:
-            check_force_scale(walk[FORCE].file, walk[FORCE].values, signs_from)
+            check_force_scale(walk[FORCE].file, walk[FORCE].values)
         except DataError as error:
             wrong.append(error)
             walk[FORCE] = of_largest_one(walk[FORCE], is_upwards=True)
@@ -311,8 +305,8 @@ def _with_subject(
     if settings.body_mass is None and not masses:
         wrong.append(
             DataError(
-                f"{tables[0].file}: does not state the body mass; give it, such as "
-                f"{setting_text('body_mass', 62.0, '62 kg')} (loads are checked relative to their maximum until then)"
+                f"{tables[0].file}: does not state the body mass, and {setting_text('body_mass')} is not given (loads "
+                "are checked relative to their maximum)"
             )
         )
     elif settings.body_mass is None:

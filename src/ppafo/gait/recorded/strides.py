@@ -102,15 +102,14 @@ def check_enough(strides: StrideSelection, footfalls: Footfalls) -> None:
     if not footfalls.strides:
         where = FORCE if FORCE in walk else SHANK
         events = f"{count_of(len(heel_strikes(where, walk)), 'heel strike')} in {where}; a stride needs two"
-    fewer = f", or accept fewer with {setting_text('least_strides')}" if taken else ""
     # From the last sample before the longest gap to the first one after it.
     longest = max(
         0.0 if signal.lost is None else float(np.max(np.diff(signal.time[~signal.lost]))) for signal in walk.values()
     )
     gap = f"; the longest gap is {longest:.3g} s, and {setting_text('longest_gap')} fills up to {LONGEST_FILLED:g} s"
     raise DataError(
-        f"{walk['shank_angle'].file}: has {count} covered by both angles and events ({events}; {spans}), but at least "
-        f"{least} are needed{gap if longest > 0.0 else ''}; give a longer recording{fewer}"
+        f"{walk['shank_angle'].file}: has {count} covered by both angles and events ({events}; {spans}), but "
+        f"{setting_text('least_strides')} is {least}{gap if longest > 0.0 else ''}"
     )
 
 
@@ -146,8 +145,7 @@ def without_drop_outs(
                     strides = strides.without(
                         [stride for stride in strides.taken if stride.start < end and start < stride.end],
                         f"{what}: a sensor drop-out",
-                        f"{table.file}: {what} while the wearer walks, as by a sensor drop-out; cut the file there and "
-                        "give the longer part",
+                        f"{table.file}: {what} while the wearer walks, as by a sensor drop-out",
                     )
     return strides
 

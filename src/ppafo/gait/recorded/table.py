@@ -123,7 +123,7 @@ def cut_table(
     rejected.
     """
     if table.time.size < 3:
-        raise DataError(f"{table.file}: has only {table.time.size} rows, too few for a stride; give a longer recording")
+        raise DataError(f"{table.file}: has only {table.time.size} rows, too few for a stride")
     low = float(table.time[0] if start is None else start)
     high = float(table.time[-1] if end is None else end)
     steps = np.diff(table.time)
@@ -146,8 +146,8 @@ def cut_table(
     inside = (table.time >= low) & (table.time <= high)
     if not inside.any():
         raise DataError(
-            f"{table.file}: has no samples from {low:g} to {high:g} s; choose {argument_text('start')} and "
-            f"{argument_text('end')} within the recording, {table.time[0]:g} to {table.time[-1]:g} s"
+            f"{table.file}: has no samples from {argument_text('start')} {low:g} to {argument_text('end')} {high:g} s, "
+            f"but from {table.time[0]:g} to {table.time[-1]:g} s"
         )
     columns = {name: values[inside] for name, values in table.columns.items()}
     return replace(table, time=table.time[inside], columns=columns)

@@ -166,7 +166,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
         if abs(np.nanmean(up)) < _LEAST_UPRIGHT * math.hypot(np.nanmean(ahead), np.nanmean(up)):
             raise DataError(
                 f"{shank.file}: shank_angle.vertical = {mapped.vertical!r}, but the line from {mapped.knee!r} to "
-                f"{mapped.ankle!r} is no shank upright along it; correct the axes of shank_angle and ankle_angle"
+                f"{mapped.ankle!r} is no shank upright along it"
             )
     # Radians that are called degrees have no event either, but a unit as a remedy.
     elif low <= np.degrees(travel) <= high:
@@ -174,5 +174,5 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
     if travel < low:
         raise DataError(
             f"{shank.file}: shank_angle has a range of {travel:.2g} deg in the whole recording (walking: at least "
-            f"{low:g} deg): give a recording of walking, or correct the columns or the forward axis of the shank"
+            f"{low:g} deg)"
         )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import DataError
+from ppafo.gait.gait import BODY_MASSES, STATURES
 from ppafo.gait.recorded.delimited import merged, told_apart
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
@@ -95,8 +96,8 @@ def read_c3d(path: str | Path) -> MotionTable:
     stature = None if height is None else height / 1000.0 if height > 100.0 else height
     # An unknown spelling or an implausible value is treated as absent.
     trial = TrialData(
-        mass if mass is not None and 1.0 <= mass <= 500.0 else None,
-        stature if stature is not None and 0.5 <= stature <= 2.5 else None,
+        mass if mass is not None and BODY_MASSES[0] <= mass <= BODY_MASSES[1] else None,
+        stature if stature is not None and STATURES[0] <= stature <= STATURES[1] else None,
         *_events(parameters.get("EVENT", {})),
     )
     time = (first + np.arange(frames)) / rate

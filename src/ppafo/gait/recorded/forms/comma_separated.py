@@ -63,15 +63,12 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     at = next((place for place, name in enumerate(names) if name.lower() in _TIMES), 0)
     at = at if all(name.lower() in COUNTERS for name in names[:at]) else 0
     clock = names[at] if names[at].lower() in _TIMES else ""
-    duration = setting_text("stride_time", 1.1, "1.1 s")
     problem = (
-        f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}; or give one mean "
-        f"stride over 0 to 100 percent with its duration, such as {duration}"
+        f"{path}: the first column must be 'time', not {one_line(names[at])[:_LONGEST_SHOWN]!r}, or 0 to 100 percent "
+        f"of a mean stride with {setting_text('stride_time')}, or frames with time.rate of a gait map"
     )
-    if names[at].lower() in COUNTERS:
-        problem += "; frames of a constant rate need it in a gait map, such as time = { rate = '100 Hz' }"
     if "" in names[at:]:
-        raise DataError(f"{path}: a column has no name; name every column")
+        raise DataError(f"{path}: a column has no name")
     # A decimal comma shows only where commas do not separate the cells.
     has_comma = delimiter != "," and any(re.search(r"\d,\d", line) for line in lines[first + 1 :])
     with refused_as(DataError, str(path), DataError):

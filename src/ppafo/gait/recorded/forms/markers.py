@@ -144,8 +144,7 @@ def _check_forward(table: MotionTable, columns: GaitMap, foot: str, labels: Sequ
         if is_reversed:
             other = axis if sign < 0.0 else f"-{axis}"
             raise DataError(
-                f"{table.file}: {name}.forward = {mapped.forward!r} is reversed: {why}; give {other!r} in the "
-                "gait map, for shank_angle and ankle_angle"
+                f"{table.file}: {name}.forward = {mapped.forward!r} is reversed: {why}; the axis is {other!r}"
             )
 
 
@@ -286,7 +285,7 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
         known = ", ".join(repr(unit) for unit in _FACTORS[kind])
         raise DataError(
             f"{table.file}: column {name!r} reaches {peak:.4g} ({stated or 'no unit'}), which is implausible for a "
-            f"{kind} in walking; give the unit of the column in a gait map: {known}"
+            f"{kind} in walking, in any of {known}"
         )
     was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file states no unit"
     return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'}, from its magnitude: {was}"]

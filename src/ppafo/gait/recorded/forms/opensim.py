@@ -16,7 +16,7 @@ from ppafo.errors import DataError, refused_as
 from ppafo.gait.recorded.delimited import NumberBlock, cells_of, tabbed_lines, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.comma_separated import plain_names, read_plain_csv
-from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map, setting_text
+from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import TIME
 from ppafo.storage.comma_separated import finite_number
@@ -230,8 +230,7 @@ def _turned_forward(table: MotionTable) -> MotionTable:
             table,
             remarks=(
                 *table.remarks,
-                f"the walker turns by {turned:.0f} deg (pelvis_rotation), and angles refer to the mean walking "
-                f"direction; select a straight part with {setting_text('start')} and {setting_text('end')}",
+                f"the walker turns by {turned:.0f} deg (pelvis_rotation); angles refer to the mean walking direction",
             ),
         )
     if abs(facing) <= _ALONG:
