@@ -35,7 +35,7 @@ IDS = [
     "beyond_improved_control",
     "not_published",
 ]
-FIGURES = ("device", "figure-3-identification", "figure-7-step-response", "figure-8-torque-task")
+FIGURES = ("figure-3-identification", "figure-7-step-response", "figure-8-torque-task")
 RECORDINGS = ("step-response", "torque-task-solenoid", "torque-task-proportional")
 
 
@@ -65,7 +65,7 @@ def out(ran: FinishedRun) -> Path:
 
 
 def test_the_folder_holds_report_claims_figures_and_recordings_and_nothing_else(out: Path) -> None:
-    expected = {"report.html", "claims.json", *(f"{name}.csv" for name in RECORDINGS)}
+    expected = {"report.html", "claims.json", "device.svg", *(f"{name}.csv" for name in RECORDINGS)}
     expected |= {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
     assert {entry.name for entry in out.iterdir()} == expected | {"ppafo.json", "claims.txt"}
 

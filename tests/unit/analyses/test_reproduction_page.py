@@ -6,7 +6,6 @@ import re
 import pytest
 
 from ppafo.analyses.reproduce.answer import (
-    DEVICE_FIGURE,
     STEP_FIGURE,
     TORQUE_FIGURE,
     reproduction_page,
@@ -22,7 +21,7 @@ from tests.unit.report.test_width_of_figures import texts_of
 LEVELS = SupplyLevels(480536.0, 101325.0)
 
 
-DRAWN = {DEVICE_FIGURE: b"<svg>device</svg>", STEP_FIGURE: b"<svg>seven</svg>", TORQUE_FIGURE: b"<svg>eight</svg>"}
+DRAWN = {STEP_FIGURE: b"<svg>seven</svg>", TORQUE_FIGURE: b"<svg>eight</svg>"}
 
 
 @pytest.fixture(scope="module")

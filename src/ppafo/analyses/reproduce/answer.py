@@ -3,10 +3,10 @@
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from ppafo.analyses.reproduce.claim import MEANINGS, VERDICTS, Claim, Verdict, count_sentence, verdict_counts
-from ppafo.analyses.reproduce.drawing import device_figure
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.publication import SEED, Studies
 from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED, load_reported
@@ -47,7 +47,8 @@ _RULE = (
     + " Nothing here was measured."
 )
 TEMPLATE = "reproduction.html.jinja"
-DEVICE_FIGURE = "device"
+DEVICE = files("ppafo.analyses.reproduce") / "templates" / "device.svg"
+"""Drawing of the gas circuit with ISO 1219-1 symbols, and of the leg with the device."""
 IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
@@ -168,7 +169,10 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         found=reproduction,
         # A changed device may leave the windows of the paper: that is a result, no failure.
         passed=not missed or bool(reproduction.overrides),
-        files={f"{run.scenario.name}.csv": partial(marked_csv_bytes, run.recording) for run in runs},
+        files={
+            **{f"{run.scenario.name}.csv": partial(marked_csv_bytes, run.recording) for run in runs},
+            DEVICE.name: DEVICE.read_bytes,
+        },
         command="reproduce",
         page=partial(reproduction_page, reproduction),
     )
@@ -184,7 +188,6 @@ def _figures(reproduction: Reproduction) -> list[Section]:
     if isinstance(synthetic, SyntheticEvidence):
         step, tasks = synthetic.step, (synthetic.solenoid, synthetic.proportional)
     drawn: dict[str, Callable[[], Drawing]] = {
-        DEVICE_FIGURE: device_figure,
         STEP_FIGURE: partial(step_response_figure, reproduction.step.recording, levels, reproduction.step_events, step),
         TORQUE_FIGURE: partial(
             torque_task_figure,
@@ -245,7 +248,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "ceiling": f"{holding_torque(solenoid):.1f}",
         "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
         "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
-        "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
+        "device_figure": inline_figure(DEVICE.read_bytes()),
         "step_figure": inline_figure(drawn[STEP_FIGURE]),
         "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
         "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
