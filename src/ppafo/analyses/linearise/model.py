@@ -5,6 +5,7 @@ Read downwards: ``linear_model`` takes a point of a run or the steady state, and
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from importlib.util import find_spec
 from numbers import Real
 from typing import Any, NamedTuple
@@ -75,8 +76,6 @@ _STEADY = 1.0e-9
 """Largest time derivative divided by the size of the state [1/s] that counts as zero."""
 _FIRST_COMMANDS = (0.01, 0.1, 0.003, 0.03, 0.3, 1.0)
 """Magnitudes of the command [-] from which the search for the steady state starts."""
-_MOST_STEPS, _HALVINGS = 60, 20
-"""Largest number of steps of Newton's method, and of halvings of one."""
 _TRIED_COMMANDS = tuple(np.linspace(-0.95, 0.95, 20).tolist())
 """Commands [-] at which a proportional valve moves; a table of openings may be flat at some of them."""
 PID_LAWS = ("pid", "pid_feedforward")
@@ -548,6 +547,8 @@ def _steady(
     plant: LinearisedPlant, values: Mapping[str, float], quantity: ControlledQuantity, level: float | None
 ) -> dict[str, float] | None:
     """Return a steady state at a level of a quantity [SI], or at the present command; None if the search fails."""
+    from scipy.optimize import least_squares
+
     # Where the search begins: at the end of the run, then about the pressures that have the level.
     starts, lowest = [dict(values)], plant.run.plant.atmospheric_pressure
     target = (level or 0.0) - (lowest if quantity.level.unit == "Pa_a" and level is not None else 0.0)
@@ -559,51 +560,31 @@ def _steady(
         starts.append({**values, **start, **dict.fromkeys(_openings_in(values), command)})
     # The unknowns are all states, and the command if a level is given.
     names = [*plant.at(values)[0], *([] if level is None else ["command"])]
+    sizes = np.array([size_of(name) for name in names])
 
-    def imbalance(values: Mapping[str, float]) -> Floats:
+    def imbalance(start: Mapping[str, float], unknowns: Floats) -> Floats:
         """Return time derivatives relative to the size of the states [1/s], and relative error of the level [-]."""
-        rates_by_name, outputs = plant.at(values)
+        tried = {**start, **dict(zip(names, unknowns.tolist(), strict=True))}
+        rates_by_name, outputs = plant.at(tried)
         # So that pascals and openings count alike.
         rates = [rate / size_of(name) for name, rate in rates_by_name.items()]
         if level is None:
             return np.array(rates)
-        reached = quantity.value(values["angle"], values["pressure_1"], values["pressure_2"], outputs["torque"])
+        reached = quantity.value(tried["angle"], tried["pressure_1"], tried["pressure_2"], outputs["torque"])
         return np.array([*rates, (reached - level) / quantity.size])
 
-    roots = (_root(imbalance, names, start) for start in starts)
-    return next((root for root in roots if root is not None), None)
-
-
-def _root(
-    function: Callable[[Mapping[str, float]], Floats], names: Sequence[str], start: Mapping[str, float]
-) -> dict[str, float] | None:
-    """Return a root of a function, found by Newton's method with damped steps; None if the search fails."""
-    sizes, values = np.array([size_of(name) for name in names]), dict(start)
-    residual = function(values)
-    for _ in range(_MOST_STEPS):
-        largest = float(np.max(np.abs(residual)))
-        if largest < _STEADY:
-            return values if abs(values["command"]) <= 1.0 + _STEADY else None
-        slopes = np.array([_slopes(function, name, values, side_of(name, values, None))[0] for name in names]).T
-        if not (np.isfinite(largest) and np.isfinite(slopes).all()):
-            return None
+    least = [
+        -1.0 if name == "command" or name in _OPENINGS else 0.0 if size_of(name) > 1.0 else -np.inf for name in names
+    ]
+    most = [1.0 if name == "command" or name in _OPENINGS else np.inf for name in names]
+    for start in starts:
         # Least squares instead of a solver that refuses: in a dead band the slopes are singular.
-        step = np.linalg.lstsq(slopes * sizes, -residual, rcond=None)[0] * sizes
-        for share in 0.5 ** np.arange(_HALVINGS):
-            # Values after a step, pressures at least half of what they were, the command within -1 to 1.
-            moved = values | {
-                name: values[name] + change for name, change in zip(names, (share * step).tolist(), strict=True)
-            }
-            for name in names:
-                if name.startswith(("pressure", "temperature")):
-                    moved[name] = max(moved[name], 0.5 * values[name])
-            moved["command"] = min(max(moved["command"], -1.0), 1.0)
-            residual = function(moved)
-            if np.isfinite(residual).all() and float(np.max(np.abs(residual))) < largest:
-                break
-        else:
-            return None
-        values = moved
+        first = np.clip([start[name] for name in names], least, most)
+        found = least_squares(
+            partial(imbalance, start), first, bounds=(least, most), x_scale=sizes, ftol=None, gtol=None, xtol=1.0e-15
+        )
+        if np.max(np.abs(found.fun)) < _STEADY:
+            return {**start, **dict(zip(names, found.x.tolist(), strict=True))}
     return None
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from ppafo.analyses.design import search
 from ppafo.analyses.design.problem import choose_knots, json_schema, load_design
-from ppafo.analyses.design.question import design, finding_of, suggestion_sentence
+from ppafo.analyses.design.question import design
 from ppafo.analyses.design.search import (
     OSCILLATES,
     Sizing,
@@ -22,8 +22,10 @@ from ppafo.analyses.design.search import (
     ceiling,
     ceiling_pressure,
     cut_error,
+    finding_of,
     lasting_bottle,
     smallest_bottle,
+    suggestion_sentence,
 )
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
@@ -174,13 +176,13 @@ def test_smaller_gains_are_tried_where_a_valve_follows_with_none_of_the_file_s(f
     assert item.error == pytest.approx(found, rel=1e-3)
 
 
-def test_a_valve_too_late_for_any_gains_is_limited_by_the_control_and_says_its_delay(folder: Path) -> None:
+def test_a_valve_too_late_for_any_gains_is_limited_by_the_control(folder: Path) -> None:
     item = design(with_valve(folder, "late", SMALL, 'delay = "200 ms"')).found.valves[0]
     # For 0.2 s after the start no torque can follow, which rises at 4 N m in 0.3 s: this part of the error alone is
     # the root of (4 / 0.3)^2 (0.2 s)^3 / 3 over the second of the run.
     assert item.error > ((4.0 / 0.3) ** 2 * 0.2**3 / 3.0) ** 0.5 > 0.4
     assert (item.works, item.limit) == (False, "control")
-    assert item.remark.endswith("the valve has delay 0.2 s")
+    assert item.remark.startswith("no gains were found with which the torque loop follows: RMS error ")
 
 
 def test_a_valve_that_needs_pressure_only_because_it_slews_is_not_limited_by_its_flow(folder: Path) -> None:
@@ -404,18 +406,7 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
     assert sizing.choice.margins["torque"] >= -0.3
     # Equation (2): the peak of 5 N m needs 5 N m / 14.51 cm^3 = 344.6 kPa, 50 psi above the atmosphere.
     most = TORQUE_CONSTANT * (sizing.choice.pressure - ATMOSPHERE)
-    said = suggestion_sentence(sizing)
-    assert (
-        f"% of the peak cut off (at most {most:.3g} N m of 5 N m; "
-        "the whole peak statically needs pressure.lowest = '50 psi_g')" in said
-    )
-    # The remedy, in the file, gives the whole peak.
-    file = tmp_path / "brief.toml"
-    file.write_text(file.read_text().replace('"15 psi_g"', '"50 psi_g"'))
-    whole = design(file).found
-    assert whole.choice is not None
-    assert TORQUE_CONSTANT * (whole.choice.pressure - ATMOSPHERE) == pytest.approx(5.0, rel=5e-3)
-    assert "cut off" not in suggestion_sentence(whole)
+    assert f"% of the peak cut off (at most {most:.3g} N m of 5 N m)" in suggestion_sentence(sizing)
 
 
 def recorded_torques(sizing: Sizing) -> list[float]:
@@ -431,7 +422,6 @@ BOTH_SIGNS = (
     .replace('"0.4 N m"', '"0.8 N m"')
 )
 """Torque between 8 N m and -8 N m, whose crests last too briefly for the valve."""
-MORE = "in the simulated run: for more, lower limits.rms_error below '"
 
 
 def test_a_suggested_run_that_stays_below_a_peak_of_either_sign_says_so(tmp_path: Path) -> None:
@@ -440,7 +430,7 @@ def test_a_suggested_run_that_stays_below_a_peak_of_either_sign_says_so(tmp_path
     torques = recorded_torques(both)
     assert 0.0 < max(torques) < 0.95 * 8.0
     assert -0.95 * 8.0 < min(torques) < 0.0
-    reaches = f"; reaches {max(torques):.3g} of 8 N m and {min(torques):.3g} of -8 N m {MORE}"
+    reaches = f"; reaches {max(torques):.3g} of 8 N m and {min(torques):.3g} of -8 N m in the simulated run; "
     assert reaches in suggestion_sentence(both)
 
 
@@ -459,7 +449,7 @@ def test_a_peak_is_reached_from_95_percent_on(
     (tmp_path / "both.toml").write_text(BOTH_SIGNS)
     run = Recording("run", np.array([0.0, 1.0]), {"torque": Channel(np.array([largest, least]), "N m")}, "simulated")
     changed = dataclasses.replace(sizing, problem=load_design(tmp_path / "both.toml"), recording=run)
-    parts = [part.partition(": for")[0] for part in suggestion_sentence(changed).split("; ") if "reaches" in part]
+    parts = [part for part in suggestion_sentence(changed).split("; ") if "reaches" in part]
     assert parts == ([said] if said else [])
 
 
