@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ppafo.analyses.endurance.question import WALK_FILE
+from ppafo.analyses.endurance.discharge import WALK_FILE
 from ppafo.analyses.study_results import load_study_results
 from ppafo.errors import DataError
 from ppafo.report.recording_figure import recording_figure

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.endurance.discharge import Endurance, discharge
+from ppafo.analyses.endurance.discharge import Endurance, discharge, gas_of_recording
 from ppafo.analyses.endurance.question import bottle as endurance
-from ppafo.analyses.endurance.question import gas_of_recording
 from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.signals import Channel, Recording

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 import ppafo
-from ppafo.analyses.endurance.discharge import Endurance
+from ppafo.analyses.endurance.discharge import Endurance, gas_of_walk, largest_flow
 from ppafo.analyses.endurance.question import bottle as endurance
-from ppafo.analyses.endurance.question import gas_of_walk, largest_flow
 from ppafo.cli.main import main
 from ppafo.errors import DataError, ScenarioError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
