@@ -23,7 +23,6 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si
 from ppafo.walking import list_walks, load_walk
-from ppafo.walking.planning import plan_walk
 
 UNITS: Mapping[str, Sequence[str]] = {
     "s": ("s", "ms"),
@@ -182,7 +181,7 @@ def single(name: str, words: Words) -> "Planned | str":
     try:
         if name in list_walks():
             walk = load_walk(name, texts)
-            return planned(batch_of(plan_walk(walk)))
+            return planned(batch_of(plan_run(walk)))
         return planned(batch_of(plan_run(load_scenario(name, texts))))
     except PpafoError as error:
         return str(error)

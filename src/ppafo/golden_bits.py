@@ -15,7 +15,6 @@ from ppafo.simulation.plan import plan_run
 from ppafo.walking import list_walks
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import with_duration
-from ppafo.walking.planning import plan_walk
 
 VARIED = {
     "noisy-sensors": (
@@ -49,7 +48,7 @@ def plain_batch(name: str) -> Batch:
         return batch_of(plan_run(load_scenario(scenario, settings)))
     if name in list_scenarios():
         return batch_of(plan_run(load_scenario(name)))
-    return batch_of(plan_walk(with_duration(load_walk(name), WALKED)))
+    return batch_of(plan_run(with_duration(load_walk(name), WALKED)))
 
 
 def digest(result: BatchResult) -> str:

@@ -13,7 +13,6 @@ from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.walking import load_walk
-from ppafo.walking.planning import plan_walk
 from tests.page_code import block_with, write_package
 from tests.reference.reference_solver import compare_with_reference
 
@@ -58,5 +57,5 @@ def test_a_load_that_is_too_stiff_for_the_steps_of_a_walk_is_refused_with_a_step
         r"effects\.fan: a drag of .* N m s/rad at 5 rad/s needs steps of at most .* ms, .*: set run\.step = 0\.18 ms"
     )
     with pytest.raises(ScenarioError, match=remedy):
-        plan_walk(load_walk("solenoid", (stiff,)))
-    assert plan_walk(load_walk("solenoid", (stiff, "run.step=0.18 ms"))).step < 0.181e-3
+        plan_run(load_walk("solenoid", (stiff,)))
+    assert plan_run(load_walk("solenoid", (stiff, "run.step=0.18 ms"))).step < 0.181e-3

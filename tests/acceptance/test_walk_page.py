@@ -12,9 +12,10 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import main
+from ppafo.simulation.plan import plan_run
 from ppafo.walking import load_walk
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
+from ppafo.walking.planning import gait_sensors_of
 
 pytestmark = pytest.mark.long
 
@@ -74,7 +75,7 @@ def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:
     configuration = load_walk(path)
     assert configuration.controller.push_off_start == pytest.approx(0.42)
     assert gait_sensors_of(configuration).force_noise == pytest.approx(5.0)
-    assert not has_ideal_sensors(configuration)
+    assert not plan_run(configuration).program.ideal_sensors
 
 
 def test_the_bottle_of_the_page_loads(tmp_path: Path) -> None:

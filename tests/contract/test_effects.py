@@ -34,7 +34,6 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.walking import load_walk
-from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import walk
 from tests.built_once import shared_library
 from tests.page_code import with_the_effect_of_the_page
@@ -161,7 +160,7 @@ def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: 
         (tmp_path / file).write_bytes(content)
     source = tmp_path / f"{c_identifier(walked.name)}.c"
     built = ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-Dstatic=", "-Wl,-Bsymbolic", "-w")))
-    batch = batch_of(plan_walk(walked) if is_walk else plan_run(walked))
+    batch = batch_of(plan_run(walked))
     settings = np.array([item.value for item in library.settings])
     # An exported walk has the states of a meter too, which a run in Python does without.
     found, states = np.zeros(len(batch.parameters)), np.zeros(2 * len(batch.states))
@@ -204,7 +203,7 @@ def test_it_walks() -> None:
 
 def test_an_effect_walks_on_a_bottle_and_follows_the_temperature_of_its_gas(monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[dict[str, float]] = []
-    names = list(row_numbers(plan_walk(load_walk("proportional", [LINE, BOTTLE])).program.parameter_rows()))
+    names = list(row_numbers(plan_run(load_walk("proportional", [LINE, BOTTLE])).program.parameter_rows()))
     passed_on = LaneBlock.set_parameters
 
     def watched(self: LaneBlock, rows: Sequence[int], values: Any) -> None:

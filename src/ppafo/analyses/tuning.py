@@ -834,13 +834,13 @@ def _finding(tuned: Tuned) -> Finding[Tuned]:
         end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
         rows.append((gain.path, *map(gain.place.quote, numbers), end))
     # The scenario's file, or the name of one that comes with the package, finds it again.
-    name, motion_kind = scenario.origin.file or scenario.name, scenario.motion.motion_kind
+    name, command = scenario.origin.file or scenario.name, scenario.motion.motion_kind.command
     # Texts of TOML and of Python alike.
     used = usage_text(reloaded(scenario, tuned.lines))
     listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
     pasted = (
         f"# {tuned.verdict}\n\n# on the command line\n{used}\n\n# in a study file\noverrides = [{listed}]\n\n"
-        f"# in Python\n{motion_kind.python_call.format(name=name, overrides=listed)}\n"
+        f"# in Python\nppafo.{command}({name!r}, overrides=[{listed}])\n"
     )
     return Finding(
         name="tune",

@@ -1,5 +1,6 @@
 """``ppafo simulate SCENARIO``: runs a scenario and writes a result folder, with a report that simulates."""
 
+import shlex
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -9,6 +10,7 @@ from ppafo.arguments import Folder, Overrides, Scenario
 from ppafo.cli import output
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, CommandOutput
 from ppafo.documents.json_text import json_text, plain
+from ppafo.simulation.motion_kind import VANE
 from ppafo.units.shown import in_units, shown_in
 
 if TYPE_CHECKING:
@@ -103,7 +105,7 @@ def assessed(result: "Result", check: bool) -> _RunReport:
     # A run that diverged has no result to repeat; its exit code says so already.
     repeatability = result.check() if check and result.status.is_completed else None
     error = None if repeatability is None else repeatability.error
-    if error is None and result.status.is_completed and scenario.motion.motion_kind.is_repeated_for_its_error:
+    if error is None and result.status.is_completed and scenario.motion.motion_kind.layout == VANE:
         error = result.error()
     verdict = tried(scenario, result.tracking)
     return _RunReport(result, repeatability, error, verdict, result.sentences(verdict), gains(scenario))
@@ -150,8 +152,11 @@ def _write(report: _RunReport, folder: Path) -> str:
     write_result(folder, report.result.recording, document, {**page_files(finding_of(report)), **checks})
     written = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", REPORT, *checks]
     scenario = report.result.scenario
-    next_command = scenario.motion.motion_kind.further_command(str(scenario.origin.file))
-    return "\n".join(["", *([next_command] if next_command else []), f"written: {folder} ({', '.join(written)})"])
+    lines = ["", f"written: {folder} ({', '.join(written)})"]
+    if scenario.motion.motion_kind.layout != VANE:
+        command = f"'ppafo walk {shlex.quote(str(scenario.origin.file))}'"
+        lines[1:1] = [f"{command} compares it with a walk without device and a healthy ankle"]
+    return "\n".join(lines)
 
 
 def finding_of(report: _RunReport) -> "Finding[None]":

@@ -1,22 +1,29 @@
 """Motions of a vane alone: locked, free, along a profile, or with the foot of a leg.
 
-Each motion declares its section of a file, and how that section is read and checked against the device's stops. Code
-that only a run or an ensemble needs is imported on use.
+Each declares its section of a file, and how that is read and checked against the stops of the device; for an ensemble,
+all runs are checked at once: numbers that contradict each other, and times.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.kind import ControllerKind
 from ppafo.errors import DataError, ScenarioError
-from ppafo.model import controlled
+from ppafo.metrics.metric import MetricKind
+from ppafo.model.columns import Problem, at
+from ppafo.model.controlled import ANGLE as ANGLE_CONTROLLED
+from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
+from ppafo.signals.meter import LED_SHANK
+from ppafo.signals.meter import WALK as OF_WALK
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, clock_with, time_texts
 from ppafo.simulation.declaration import (
     ANGLE,
     ANGLE_LEVEL,
@@ -31,118 +38,164 @@ from ppafo.simulation.declaration import (
     shank_settings,
 )
 from ppafo.simulation.document import DocumentReader
-from ppafo.simulation.motion_kind import VANE, LawSignals, Measured, MotionSection, ProfileTable, RunTimes
-from ppafo.simulation.profiles import TOLERANCE, profile_problem, read_profile, stops_of
+from ppafo.simulation.leg import measured_leg, on_gait, plan_leg
+from ppafo.simulation.motion_kind import VANE, LawSignals, MotionKind, MotionSection, ProfileTable, RunTimes
+from ppafo.simulation.numbers import path_of_locked_angle
+from ppafo.simulation.plan import plan_vane
+from ppafo.simulation.profiles import (
+    TOLERANCE,
+    Limits,
+    disordered_knots,
+    limits_of,
+    profile_bounds,
+    profile_problem,
+    profiles_of,
+    read_profile,
+    stops_of,
+)
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
+from ppafo.simulation.vane_recording import measured_vane
 from ppafo.units.shown import shown_text
 from ppafo.wording import one_line
-
-if TYPE_CHECKING:
-    from ppafo.engine.lanes import Floats
-    from ppafo.engine.run import Run
-    from ppafo.metrics.metric import MetricKind
-    from ppafo.model.columns import Problem
 
 _PROFILE, _SHANK = "motion.profile", "motion.shank"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class VaneKind:
-    """Type of motion of a vane alone; code that only its runs need is imported on use.
+def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
+    """Problems of a scenario of a vane alone: knots not in order, angle or profile beyond a limit, delay too long."""
+    disordered = tuple(disordered_knots(choice, section) for section, choice in profiles_of(scenario).items())
+    # The bounds of a curve need its knots in order.
+    if any(np.any(is_bad) for is_bad, _ in disordered):
+        return disordered
+    delay, step, device = scenario.sensors.delay, scenario.run.step, scenario.device
+    motion, followed = vane_motion(scenario), CONTROLLED[scenario.controlled]
+    profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
+    stops = stops_of(device)
 
-    Motions differ in their section of the file, in the planning of a run, and in the recorded channels.
+    def angle_line(run: int) -> str:
+        low, high = (shown_text(at(stop, run), "rad") for stop in (stops.lowest, stops.highest))
+        path, angle = path_of_locked_angle(scenario) or LOCKED_ANGLE, shown_text(at(profile.level, run), "rad")
+        return f"{path} = {angle}: must be between the stops of {device.name}, {low} to {high}"
+
+    def delay_line(run: int) -> str:
+        longest = shown_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
+        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
+
+    if profile.kind == "constant":
+        angle_problem: Problem = (_is_beyond(stops, profile), angle_line)
+    else:
+        angle_problem = _beyond(scenario, stops, profile, "motion.profile")
+    problems = [
+        (
+            delay > scenario.run.duration,
+            lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
+        ),
+        (delay / step > MAXIMUM_STEPS_OF_DELAY, delay_line),
+    ]
+    if followed.reach is not None and scenario.follows_reference:
+        problems.insert(0, _beyond(scenario, limits_of(device, followed), scenario.reference, "reference"))
+    return angle_problem, *problems
+
+
+def _is_beyond(limits: Limits, profile: ProfileChoice) -> NDArray[np.bool_]:
+    """Tell for each run (runs,) whether a profile leaves its limits at any time."""
+    lowest, highest = profile_bounds(profile)
+    lower, upper = limits.allowed
+    return np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
+
+
+def _beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section: str) -> Problem:
+    """Problem of a profile that exceeds its limits; ``section`` is the profile's section of the file."""
+    outside = _is_beyond(limits, profile)
+    # The bounds hold for all time; a run that may leave them is checked at its own times.
+    problems: dict[int, str] = {}
+    for run in np.flatnonzero(outside).tolist():
+        settings = {name: at(value, run) for name, value in profile.settings.items()}
+        duration, step = at(scenario.run.duration, run), at(scenario.run.step, run)
+        profile_of_run = ProfileChoice(profile.kind, settings)
+        lowest, highest, room = (at(number, run) for number in (limits.lowest, limits.highest, limits.room))
+        limits_of_run = limits._replace(lowest=lowest, highest=highest, room=room)
+        problems[run] = profile_problem(limits_of_run, profile_of_run, duration, step, section)
+        outside[run] = bool(problems[run])
+    return outside, lambda run: problems[run]
+
+
+def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
+    """Return the run times for columns of times [s] by path, and the problems of contradictory times.
+
+    Times are read as in a file, once for each combination, of which an ensemble has few.
     """
+    texts = time_texts(base)
+    combinations, index_of_run = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
+    index_of_run = index_of_run.reshape(-1)
+    reasons, table = [""] * len(combinations), np.full((len(combinations), 4), np.nan)
+    for index, combination in enumerate(combinations.tolist()):
+        try:
+            run_times = clock_with(base.name, texts, dict(zip(times, combination, strict=True)))
+        except ScenarioError as error:
+            reasons[index] = str(error)
+        else:
+            table[index] = run_times.duration, run_times.step, run_times.output_interval, run_times.period
+    is_refused = np.array([bool(reason) for reason in reasons])[index_of_run]
+    return RunTimes(*table[index_of_run].T.copy()), ((is_refused, lambda run: reasons[index_of_run[run]]),)
 
-    name: str
-    section: MotionSection
-    plan: "Callable[[Scenario], tuple[Run, tuple[Problem, ...]]]"
-    measured: "Callable[[Scenario, Run, Floats, Mapping[str, Floats]], Measured]"
-    places: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    layout: ClassVar[str] = VANE
-    command: ClassVar[str] = "simulate"
-    python_call: ClassVar[str] = "ppafo.simulate({name!r}, [{overrides}])"
-    is_measured_at_once: ClassVar[bool] = False
-    is_repeated_for_its_error: ClassVar[bool] = True
 
-    def contradictory_numbers(self, scenario: Scenario) -> "tuple[Problem, ...]":
-        """Return the problems of contradictory numbers: vane beyond a stop, delay too long."""
-        from ppafo.simulation.ensemble.vane import contradictory_numbers
-
-        return contradictory_numbers(scenario)
-
-    def quantities(self, scenario: Scenario) -> dict[str, Quantity]:
-        """Return the declarations of all numbers of a scenario except those of its device, keyed by path."""
-        profile = self.section.profile
-        moved = {} if profile is None else {profile.name: {"kind": getattr(scenario.motion, profile.name).kind}}
-        document: dict[str, Any] = {
-            "motion": moved,
-            "controller": {"kind": scenario.controller.kind},
-        }
-        # A constant command follows no reference, whatever the scenario has in its place.
-        if self.follows_reference(scenario):
-            document["reference"] = {"kind": scenario.reference.kind, "of": scenario.controlled}
-        document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
-        document |= {} if scenario.supply_line is None else {SUPPLY_LINE: {}}
-        declared = quantities(document, self.section)
-        # Numbers that are not where their path says come last, where those of a vane are listed.
-        return declared | {path: declared.pop(path) for path in self.places if path in declared}
-
-    def clock(self, scenario: Scenario, times: Mapping[str, Any]) -> "tuple[RunTimes, tuple[Problem, ...]]":
-        """Return the clock with other times [s], by path, and the problems of contradictory times."""
-        from ppafo.simulation.ensemble.vane import clock
-
-        return clock(scenario, times)
-
-    def switches(self, scenario: Scenario) -> tuple[Any, ...]:
-        """Return the imperfections of the sensors; in one program each is either 0 for all runs or nonzero for all."""
-        return scenario.sensors.flaws
-
-    def noise(self, scenario: Scenario) -> Any:
-        """Return the sum of the standard deviations of all sensor noise, which is 0 only without noise."""
-        return scenario.sensors.angle_noise + scenario.sensors.pressure_noise
-
-    def law(self, scenario: Scenario) -> ControllerKind:
-        """Return the catalogue entry of the scenario's controller."""
-        return CONTROLLERS[scenario.controller.kind]
-
-    def sees(self, scenario: Scenario) -> LawSignals:
-        """Return the signals that the controller reads, for a joint with or without a foot."""
-        motion = vane_motion(scenario)
-        if scenario.controlled == controlled.ANGLE:
-            return LawSignals(scenario.reference.kind, "reference", has_leg=motion.leg is not None)
-        if self.name == "locked":
-            return LawSignals(is_locked=True)
-        return LawSignals(motion.profile.kind if isinstance(motion, PrescribedMotion) else "", "motion.profile")
-
-    def follows_reference(self, scenario: Scenario) -> bool:
-        """Tell whether the controller follows a reference: False for a constant command."""
-        return not scenario.controller.is_open_loop
-
-    def asks_gradually(self, law: ControllerKind) -> bool:
-        """Tell whether a controller commands partial valve openings to follow a reference."""
-        return law.needs_reference and not law.only_switches
-
-    def lacks(self, scenario: Scenario, metric: "MetricKind") -> str:
-        """Return the reason why a metric does not apply to a scenario; "" if it applies."""
-        from ppafo.simulation.ensemble.vane import lacks
-
-        return lacks(scenario, metric)
-
-    def further_command(self, _file: str) -> str:
-        """Return an empty text: ``simulate`` reports everything about a vane alone."""
+def lacks(scenario: Scenario, kind: MetricKind) -> str:
+    """Return the reason why a metric does not apply to a vane alone; "" if it applies."""
+    if OF_WALK in kind.needs:
+        return "the metric needs a walk"
+    leg = vane_motion(scenario).leg
+    if LED_SHANK in kind.needs and not (leg is not None and leg.gait):
+        return "the metric needs a leg whose shank follows a gait"
+    if not kind.of_reference:
         return ""
+    if not scenario.follows_reference:
+        return "the controller has no reference"
+    controlled = scenario.controlled
+    return "" if kind.of_reference == controlled else f"reference.of is '{controlled}', not '{kind.of_reference}'"
 
 
-def _plan(scenario: Scenario) -> "tuple[Run, tuple[Problem, ...]]":
-    from ppafo.simulation.plan import plan_vane
+def numbers_of_vane(scenario: Scenario) -> dict[str, Quantity]:
+    """Return the declarations of all numbers of a scenario except those of its device, keyed by path."""
+    kind, motion = scenario.motion.motion_kind, scenario.motion
+    profile = None if kind.section is None else kind.section.profile
+    moved = {} if profile is None else {profile.name: {"kind": getattr(motion, profile.name).kind}}
+    document: dict[str, Any] = {"motion": moved, "controller": {"kind": scenario.controller.kind}}
+    # A constant command follows no reference, whatever the scenario has in its place.
+    if scenario.follows_reference:
+        document["reference"] = {"kind": scenario.reference.kind, "of": scenario.controlled}
+    document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
+    document |= {} if scenario.supply_line is None else {SUPPLY_LINE: {}}
+    declared = quantities(document, kind.section)
+    # Numbers that are not where their path says come last, where those of a vane are listed.
+    return declared | {path: declared.pop(path) for path in kind.places if path in declared}
 
-    return plan_vane(scenario)
+
+def signals_seen(scenario: Scenario) -> LawSignals:
+    """Return the signals that the controller reads, for a joint with or without a foot."""
+    motion = vane_motion(scenario)
+    if scenario.controlled == ANGLE_CONTROLLED:
+        return LawSignals(scenario.reference.kind, "reference", has_leg=motion.leg is not None)
+    if scenario.motion.motion_kind.name == "locked":
+        return LawSignals(is_locked=True)
+    return LawSignals(motion.profile.kind if isinstance(motion, PrescribedMotion) else "", "motion.profile")
 
 
-def _measured(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
-    from ppafo.simulation.vane_recording import measured_vane
-
-    return measured_vane(scenario, run, times, rows)
+VaneKind = partial(
+    MotionKind,
+    layout=VANE,
+    plan=plan_vane,
+    measured=measured_vane,
+    contradictory_numbers=contradictory_numbers,
+    quantities=numbers_of_vane,
+    clock=clock,
+    flaws=lambda scenario: scenario.sensors.flaws,
+    law=lambda scenario: CONTROLLERS[scenario.controller.kind],
+    asks_gradually=lambda law: law.needs_reference and not law.only_switches,
+    sees=signals_seen,
+    lacks=lacks,
+)
+"""Motions of a vane alone, which differ in their section of the file, in the plan of a run and in what is recorded."""
 
 
 def _read_angle(reading: DocumentReader, device: Device) -> float:
@@ -160,9 +213,7 @@ def _read_free(reading: DocumentReader, device: Device, _duration: float, _step:
     return FreeMotion(numbers["angle"], numbers["angular_velocity"], numbers["external_torque"])
 
 
-FREE_MOTION = VaneKind(
-    name="free", section=MotionSection("the torques move the vane", FREE, _read_free), plan=_plan, measured=_measured
-)
+FREE_MOTION = VaneKind(name="free", section=MotionSection("the torques move the vane", FREE, _read_free))
 """Free motion by equation (1), with a constant external torque."""
 
 
@@ -175,8 +226,6 @@ def _read_locked(
 LOCKED_MOTION = VaneKind(
     name="locked",
     section=MotionSection("the vane stays at one angle", (ANGLE,), _read_locked),
-    plan=_plan,
-    measured=_measured,
     places={LOCKED_ANGLE: ("motion", "profile", "level")},
 )
 """Vane clamped on a test bench: its profile is constant."""
@@ -204,8 +253,6 @@ PRESCRIBED_MOTION = VaneKind(
             partial(profile_settings, prescribed=ANGLE_LEVEL),
         ),
     ),
-    plan=_plan,
-    measured=_measured,
 )
 """The ankle follows a profile, independent of the device."""
 
@@ -224,27 +271,12 @@ def _read_leg(reading: DocumentReader, device: Device, _duration: float, _step: 
                 f"{_SHANK}.kind", f"this profile has corners where the angular velocity jumps; use {smooth}"
             )
         return FreeMotion(*start, leg=Leg(**numbers, shank=shank))
-    # A vane alone, or on a shank at rest, loads no gaits.
-    from ppafo.simulation.leg import on_gait
-
     name = str(value_at(reading.document, f"{_SHANK}.gait"))
     try:
         leg = on_gait(Leg(**numbers, shank=shank), name, folder)
     except DataError as error:
         raise reading.refusal(f"{_SHANK}.gait", one_line(error)) from error
     return FreeMotion(*start, leg=leg)
-
-
-def _plan_leg(scenario: Scenario) -> "tuple[Run, tuple[Problem, ...]]":
-    from ppafo.simulation.leg import plan_leg
-
-    return plan_leg(scenario)
-
-
-def _measured_leg(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
-    from ppafo.simulation.leg import measured_leg
-
-    return measured_leg(scenario, run, times, rows)
 
 
 LEG_MOTION = VaneKind(
@@ -260,7 +292,7 @@ LEG_MOTION = VaneKind(
             {GAIT_SHANK: {"gait": "name of a gait, or a path relative to this file"}},
         ),
     ),
-    plan=_plan_leg,
-    measured=_measured_leg,
+    plan=plan_leg,
+    measured=measured_leg,
 )
 """Motion with the foot of a leg by equation (11), without ground contact."""

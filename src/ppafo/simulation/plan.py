@@ -5,14 +5,14 @@ them in C.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.control.catalog import PROFILES
+from ppafo.control.kind import ProfileKind
 from ppafo.engine.program import GasPhases, Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
@@ -28,16 +28,14 @@ from ppafo.model.controlled import OF_TORQUE, TORQUE, error_functions
 from ppafo.model.gas import wall_exchange
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass
 from ppafo.model.sensors import SensorParameters
-from ppafo.model.valves.kind import ValveModel
-from ppafo.parameters.device import Device, Gas
+from ppafo.parameters.device import Gas
 from ppafo.parameters.effects import effect_rows, effects_of
-from ppafo.parameters.plant import first_settings, plant_parameters, valve_settings
+from ppafo.parameters.plant import first_settings, plant_parameters, valve_settings, venting_valve
 from ppafo.simulation.profiles import profile_bounds, profile_parameters
-from ppafo.simulation.scenario import GasModel, ProfileChoice, Scenario, vane_motion
+from ppafo.simulation.scenario import GasModel, Scenario, vane_motion
 
 if TYPE_CHECKING:
     from ppafo.engine.led_leg import LedLeg
-    from ppafo.model.regulator import SupplyLines
 
 MAXIMUM_STEPS = 1.0e9
 
@@ -58,31 +56,6 @@ def plan_run(scenario: Scenario) -> Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Components:
-    """Components of a run, for a scenario or a walk; numbers in SI units, which may be arrays (runs,).
-
-    ``path`` None means a free vane, ``controller`` None a command set by the caller, ``thermal`` None isothermal gas,
-    and ``supply_lines`` None constant supply pressures. ``sections`` hold settings of effects outside the device, by
-    section.
-    """
-
-    device: Device
-    valve: ValveModel
-    controller: ControllerKind | None
-    settings: Mapping[str, Any]
-    reference: ProfileChoice
-    path: ProfileChoice | None
-    sensors: SensorParameters
-    has_ideal_sensors: bool
-    thermal: GasModel | None
-    supply_lines: "SupplyLines | None"
-    signal_delay: Any = 0.0
-    sections: Mapping[str, Any] = field(default_factory=dict)
-    leg: "CarriedLeg | None" = None
-    controlled: str = TORQUE
-
-
-@dataclass(frozen=True, slots=True)
 class CarriedLeg:
     """Leg on a free vane: profile of its shank, and a function that adds the leg to a plant.
 
@@ -93,121 +66,124 @@ class CarriedLeg:
     put_on: Callable[[PlantParameters], "tuple[PlantParameters, LedLeg]"]
 
 
-@dataclass(frozen=True, slots=True)
-class TimeGrid:
-    """Step length [s], number of steps, and steps per controller sample and per recorded sample.
+class StepCounts(NamedTuple):
+    """Step length [s], number of steps, and steps per controller sample and per recorded sample [-]."""
 
-    ``needs_parts`` is true if the error control divides steps into parts; ``tolerance`` is the allowed error divided by
-    the default one [-].
-    """
+    step: float
+    step_count: float
+    steps_per_sample: float
+    record_every: float
 
-    step: Any
-    step_count: Any
-    steps_per_sample: Any
-    record_every: Any
-    needs_parts: Any
-    tolerance: Any = 1.0
+
+TimeGrid = tuple[StepCounts, Any, Any]
+"""Step counts, whether error control divides steps into parts, and the allowed error over the default one [-]."""
 
 
 def compose_run(
-    components: Components,
+    scenario: Scenario,
     plant: PlantParameters,
     time_grid_of: Callable[[PlantParameters], TimeGrid],
     initial_state_of: Callable[[PlantParameters], PlantState],
     walk: Walk | None = None,
-) -> Run:
-    """Assemble a run from components; every controller, valve, motion, gas and supply can be combined.
+    leg: CarriedLeg | None = None,
+) -> tuple[Run, tuple[Problem, ...]]:
+    """Assemble the run of a scenario or a walk, with its possible problems.
 
-    ``time_grid_of`` gives the time grid and ``initial_state_of`` the initial state, both of the plant with lines and
-    leg; ``plant`` is the plant without them. ``walk`` is a walking leg; a leg without ground contact is one of the
-    components.
+    Every controller, valve, motion, gas and supply can be combined. ``time_grid_of`` gives the time grid and
+    ``initial_state_of`` the initial state, both of the plant with lines and leg; ``plant`` is the plant without them.
+    ``walk`` is a walking leg, ``leg`` one without ground contact.
     """
-    settings = valve_settings(components.device.valve)
-    delay = components.valve.command_delay(settings)
-    # Lines take back what a chamber pushes out, whether or not their regulators do.
-    plant = plant if components.supply_lines is None else plant._replace(relieving=1.0)
-    plant, leg = (plant, None) if components.leg is None else components.leg.put_on(plant)
-    lines = None
-    if components.supply_lines is not None:
-        from ppafo.model.regulator import lines_at_start  # most scenarios have constant supply pressures
-
-        lines = Lines(components.supply_lines, lines_at_start(plant, components.supply_lines))
+    device, control, supply_lines = scenario.device, scenario.controller, scenario.supply_lines
+    # Where no torque is requested, an object in charge is asked between the steps of a program without a law.
+    law = None if control.is_outside and not control.settings else scenario.motion.motion_kind.law(scenario)
+    numbers: Mapping[str, Any] = control.settings
+    problems: tuple[Problem, ...] = ()
+    # A fixed-point controller has integers, which follow from its gains, its period and the range of its reference.
+    if law is not None and law.plan is not None:
+        bounds = profile_bounds(scenario.reference)
+        numbers, problems = law.plan(numbers, control.period, plant.torque_constant, bounds)
     controller: Any = ()
-    if components.controller is not None:
-        law, settings_by_name = components.controller, components.settings
+    if law is not None:
         # The numbers that a plan made have no settings of their names; they come in the order of the law's parameters.
-        names = settings_by_name if law.plan is not None else [quantity.name for quantity in law.quantities]
-        controller = rebuilt(law.parameters, [settings_by_name[name] for name in names])
-    grid = time_grid_of(plant)
-    return Run(
-        # Of the first run, for all runs of one program have a delay or none has.
-        program=_program(components, grid, walk, has_delay=first(delay) > 0.0),
-        plant=plant,
-        thermal=NoParameters()
-        if components.thermal is None
-        else thermal_gas(components.thermal, components.device.gas),
-        initial=initial_state_of(plant),
-        valve=over_runs(lambda *values: components.valve.prepare(type(settings)(*values)), *settings),
-        controller=controller,
-        reference=profile_parameters(components.reference),
-        path=() if components.path is None else profile_parameters(components.path),
-        sensors=components.sensors,
-        **{name: getattr(grid, name) for name in TimeGrid.__slots__},
-        signal_delay=components.signal_delay,
-        command_delay=delay,
-        walk=walk,
-        lines=lines,
-        effects=effect_rows(components.device, components.sections),
-        leg=leg,
-    )
-
-
-def _gas(components: Components) -> GasPhases:
-    """Return the gas phases of a gas model."""
-    if components.thermal is None:
-        return isothermal
-    from ppafo.engine.step import energy_balance  # most runs keep their temperature
-
-    return energy_balance
-
-
-def _program(components: Components, grid: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
-    """Return the program of a run with these components."""
+        names = numbers if law.plan is not None else [quantity.name for quantity in law.quantities]
+        controller = rebuilt(law.parameters, [numbers[name] for name in names])
+        errors = error_functions(scenario.controlled, device.supply.is_vacuum)
+        if law.controls != (TORQUE,) and errors != OF_TORQUE:
+            law = replace(law, update=made_of(law.update, law.update.__name__, errors))
+    # Lines take back what a chamber pushes out, whether or not their regulators do.
+    plant = plant if supply_lines is None else plant._replace(relieving=1.0)
+    plant, led = (plant, None) if leg is None else leg.put_on(plant)
+    counts, needs_parts, tolerance = time_grid_of(plant)
+    settings, model = valve_settings(device.valve), VALVES[device.valve.kind].choose(first_settings(device.valve))
+    valve = model if walk is None else venting_valve(device.valve)
+    delay, signal_delay = valve.command_delay(settings), scenario.sensors.delay
+    path = None if walk is not None else vane_motion(scenario).profile
+    sections = {} if walk is not None else {"sensors": scenario.sensors}
     feed: ModuleType | None = None
     foot: ModuleType | None = None
-    leg: ModuleType | None = None
-    # Most runs have neither lines nor a leg.
-    if components.supply_lines is not None:
+    walking: ModuleType | None = None
+    gas: GasPhases = isothermal
+    # Most runs have neither lines nor a leg, and keep their temperature.
+    lines = None
+    if supply_lines is not None:
         from ppafo.engine.step import lines as feed
-    if components.leg is not None:
+        from ppafo.model.regulator import lines_at_start
+
+        lines = Lines(supply_lines, lines_at_start(plant, supply_lines))
+    if leg is not None:
         from ppafo.engine.step import foot
     if walk is not None:
-        from ppafo.engine.step import walk as leg
-    law, errors = components.controller, error_functions(components.controlled, components.device.supply.is_vacuum)
-    if law is not None and law.controls != (TORQUE,) and errors != OF_TORQUE:
-        law = replace(law, update=made_of(law.update, law.update.__name__, errors))
-    effects = effects_of(components.device, components.sections)
-    return Program(
-        actuator=ACTUATORS[components.device.actuator.kind].model,
-        valve=components.valve,
-        reference=PROFILES[components.reference.kind],
+        from ppafo.engine.step import walk as walking
+    if scenario.gas_model is not None:
+        from ppafo.engine.step import energy_balance as gas
+    program = Program(
+        actuator=ACTUATORS[device.actuator.kind].model,
+        valve=valve,
+        reference=PROFILES[scenario.reference.kind],
         controller=law,
-        angle=None if components.path is None else PROFILES[components.path.kind],
-        ideal_sensors=components.has_ideal_sensors,
-        late_commands=has_delay,
-        late_signals=first(components.signal_delay) > 0.0,
-        gas=_gas(components),
-        leg=leg,
+        angle=None if path is None else PROFILES[path.kind],
+        # A delay alone leaves the sensors ideal: the lanes then read an earlier state.
+        ideal_sensors=not any(first(flaw) for flaw in scenario.motion.motion_kind.flaws(scenario)[1:]),
+        # Of the first run, for all runs of one program have a delay or none has.
+        late_commands=first(delay) > 0.0,
+        late_signals=first(signal_delay) > 0.0,
+        gas=gas,
+        leg=walking,
         feed=feed,
-        is_adaptive=bool(first(grid.needs_parts)),
+        is_adaptive=bool(first(needs_parts)),
         # A broken number of steps to a sample puts samples inside steps.
-        samples_inside=bool(first(grid.record_every % 1.0)),
-        effects=effects,
-        shank=None if components.leg is None else components.leg.shank,
+        samples_inside=bool(first(counts.record_every % 1.0)),
+        effects=effects_of(device, sections),
+        shank=None if leg is None else leg.shank,
         foot=foot,
-        controlled=components.controlled,
-        has_one_chamber=components.device.actuator.has_one_chamber,
+        controlled=scenario.controlled,
+        has_one_chamber=device.actuator.has_one_chamber,
     )
+    run = Run(
+        program=program,
+        plant=plant,
+        thermal=NoParameters() if scenario.gas_model is None else thermal_gas(scenario.gas_model, device.gas),
+        initial=initial_state_of(plant),
+        valve=over_runs(lambda *values: valve.prepare(type(settings)(*values)), *settings),
+        controller=controller,
+        reference=profile_parameters(scenario.reference),
+        path=() if path is None else profile_parameters(path),
+        # Noise and quantisation of the sensors as the engine takes them.
+        sensors=SensorParameters(*(getattr(scenario.sensors, name) for name in SensorParameters._fields)),
+        step=counts.step,
+        step_count=whole(counts.step_count),
+        steps_per_sample=whole(counts.steps_per_sample),
+        record_every=counts.record_every,
+        signal_delay=signal_delay,
+        command_delay=delay,
+        needs_parts=needs_parts,
+        tolerance=tolerance,
+        walk=walk,
+        lines=lines,
+        effects=effect_rows(device, sections),
+        leg=led,
+    )
+    return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
 
 
 def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, tuple[Problem, ...]]:
@@ -216,40 +192,13 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
     Numbers may be arrays (runs,) of an ensemble of one program: each setting of the valve and the sensors is then
     either 0 for all runs or nonzero for all.
     """
-    device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
-    plant = plant_parameters(device, motion.outside_torque)
-    # The command of a Python object comes from outside the lanes.
-    law = None if control.is_outside else CONTROLLERS[control.kind]
-    settings: Mapping[str, Any] = control.settings
-    problems: tuple[Problem, ...] = ()
-    # A fixed-point controller has integers, which follow from its gains, its period and the range of its reference.
-    if law is not None and law.plan is not None:
-        bounds = profile_bounds(scenario.reference)
-        settings, problems = law.plan(settings, control.period, plant.torque_constant, bounds)
-    components = Components(
-        device=device,
-        valve=VALVES[device.valve.kind].choose(first_settings(device.valve)),
-        controller=law,
-        settings=settings,
-        reference=scenario.reference,
-        path=motion.profile,
-        sensors=sensor_parameters(scenario),
-        # A delay alone leaves the sensors ideal: the lanes then read an earlier state.
-        has_ideal_sensors=not any(first(flaw) for flaw in scenario.sensors.flaws[1:]),
-        thermal=scenario.gas_model,
-        supply_lines=scenario.supply_lines,
-        signal_delay=scenario.sensors.delay,
-        sections={"sensors": scenario.sensors},
-        leg=leg,
-        controlled=scenario.controlled,
-    )
-    run = compose_run(
-        components,
-        plant,
+    return compose_run(
+        scenario,
+        plant_parameters(scenario.device, vane_motion(scenario).outside_torque),
         time_grid_of=lambda whole_plant: time_grid(scenario, whole_plant),
         initial_state_of=lambda whole_plant: initial_state(scenario, whole_plant),
+        leg=leg,
     )
-    return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
 
 
 def time_grid(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
@@ -260,25 +209,16 @@ def time_grid(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
     tolerance = relative_tolerance(scenario.run.tolerance)
     # The error decides about the parts of a step, but for a locked joint whose chambers no pressure widens, and which
     # are slow enough for plain steps.
-    needs_parts: Any = True
     model = ACTUATORS[scenario.device.actuator.kind].model
     is_alone = scenario.supply_lines is None and not model.gives
     angle = vane_motion(scenario).locked_angle if is_alone else None
-    if angle is not None:
-        # A stricter tolerance counts as a longer step; a looser one as the default.
-        step = counts.step / smaller(1.0, tolerance)
-        locked_angle = smaller(larger(angle, plant.angle_min), plant.angle_max)
-        atmosphere = plant.atmospheric_pressure
-        volumes = volumes_of(model, plant, locked_angle, atmosphere, atmosphere)
-        needs_parts = np.logical_not(is_slow(plant, step, *volumes, scenario.stiffness))
-    return TimeGrid(
-        step=counts.step,
-        step_count=whole(counts.step_count),
-        steps_per_sample=whole(counts.steps_per_sample),
-        record_every=counts.record_every,
-        needs_parts=needs_parts,
-        tolerance=tolerance,
-    )
+    if angle is None:
+        return counts, True, tolerance
+    # A stricter tolerance counts as a longer step; a looser one as the default.
+    step = counts.step / smaller(1.0, tolerance)
+    locked_angle = smaller(larger(angle, plant.angle_min), plant.angle_max)
+    volumes = volumes_of(model, plant, locked_angle, plant.atmospheric_pressure, plant.atmospheric_pressure)
+    return counts, np.logical_not(is_slow(plant, step, *volumes, scenario.stiffness)), tolerance
 
 
 def relative_tolerance(tolerance: float) -> float:
@@ -299,11 +239,6 @@ def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
     return step_count > MAXIMUM_STEPS, line
 
 
-def sensor_parameters(scenario: Scenario) -> SensorParameters:
-    """Noise and quantisation of the sensors as the engine takes them."""
-    return SensorParameters(**{name: getattr(scenario.sensors, name) for name in SensorParameters._fields})
-
-
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     """Initial angle, angular velocity and gas."""
     motion = vane_motion(scenario)
@@ -316,15 +251,6 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     pressures = scenario.initial.pressure_1, scenario.initial.pressure_2
     model = ACTUATORS[scenario.device.actuator.kind].model
     return state_with_volumes(plant, angle, rate, *volumes_of(model, plant, angle, *pressures), *pressures)
-
-
-class StepCounts(NamedTuple):
-    """Step length [s], number of steps, and steps per controller sample and per recorded sample [-]."""
-
-    step: float
-    step_count: float
-    steps_per_sample: float
-    record_every: float
 
 
 def step_counts(duration: float, time_step: float, output_interval: float, period: float) -> StepCounts:

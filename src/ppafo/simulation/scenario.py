@@ -104,7 +104,7 @@ class FreeMotion:
         return held(self, name)
 
     @property
-    def motion_kind(self) -> "MotionKind[Scenario]":
+    def motion_kind(self) -> MotionKind:
         """Kind of this motion: its contribution to the runs."""
         return MOTIONS["free" if self.leg is None else "leg"]
 
@@ -146,7 +146,7 @@ class PrescribedMotion:
     stride_time: ClassVar[float] = 0.0
 
     @property
-    def motion_kind(self) -> "MotionKind[Scenario]":
+    def motion_kind(self) -> MotionKind:
         """Kind of this motion: its contribution to the runs."""
         return MOTIONS[self.kind]
 
@@ -173,7 +173,7 @@ class Motion(Protocol):
     """Motion of the ankle: a vane alone, or a walking leg with the device."""
 
     @property
-    def motion_kind(self) -> "MotionKind[Scenario]":
+    def motion_kind(self) -> MotionKind:
         """Kind of this motion: its contribution to the runs."""
 
     @property
@@ -416,7 +416,7 @@ class Scenario:
     @property
     def follows_reference(self) -> bool:
         """True if the controller follows the scenario's reference: False for a constant command and for a walk."""
-        return self.motion.motion_kind.follows_reference(self)
+        return self.motion.motion_kind.layout != WALK and not self.controller.is_open_loop
 
     @property
     def graph(self) -> Graph:
@@ -452,6 +452,13 @@ def vane_motion(scenario: Scenario) -> VaneMotion:
     if isinstance(scenario.motion, FreeMotion | PrescribedMotion):
         return scenario.motion
     raise ScenarioError(f"{scenario.name}: its motion is {scenario.motion.label}, but it must not walk here")
+
+
+def sensor_noise(scenario: Scenario) -> Any:
+    """Sum of all noise levels and lost fractions of the controller's sensors, which is 0 only without noise."""
+    forces = getattr(scenario.motion, "forces", {}).items()
+    own = (number for name, number in forces if name == "force_noise" or name.endswith("lost_share"))
+    return sum(own, scenario.sensors.angle_noise + scenario.sensors.pressure_noise)
 
 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -35,9 +35,6 @@ REMEDY = (
     "and check the inertia, the volumes and the valve area (ppafo sets audit)"
 )
 
-_OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_state.", "controller_state.")
-"""Prefixes of state rows of the time stepping, which no recording of a vane contains."""
-
 
 @dataclass(frozen=True, slots=True)
 class Status:
@@ -54,15 +51,14 @@ class Status:
 
 
 class RunMetrics(NamedTuple):
-    """Channels of a run, metrics by name, and a sentence on the end of a completed run."""
+    """Channels of a run, and metrics by name."""
 
     recording: Recording
     metrics: "Mapping[str, Metric]"
-    ended: str
 
 
 class DeferredResult:
-    """Recording, metrics and end of a run, computed on first use."""
+    """Recording and metrics of a run, computed on first use."""
 
     __slots__ = ("_measured",)
 
@@ -70,7 +66,7 @@ class DeferredResult:
         self._measured = measured
 
     def __call__(self) -> RunMetrics:
-        """Return recording, metrics and end; the same objects at every call."""
+        """Return recording and metrics; the same objects at every call."""
         # What makes them holds all rows of the run, so it is let go once they are made.
         if not isinstance(self._measured, RunMetrics):
             self._measured = self._measured()
@@ -268,23 +264,17 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
     versions = {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
     engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
-    if scenario.motion.motion_kind.is_measured_at_once:
-        measured = _measured(scenario, run, times[:kept], record[:kept], rows)
-        if status.is_completed:
-            status = replace(status, message=measured.ended)
-        return Result(scenario, status, versions, engine, DeferredResult(measured))
-    shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
-    measure = partial(_measured, scenario, run, times[:kept], record[:kept], shown)
+    measure = partial(_measured, scenario, run, times[:kept], record[:kept], rows)
     return Result(scenario, status, versions, engine, DeferredResult(measure))
 
 
 def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> RunMetrics:
-    """Recording, metrics and end of a run, from a record (samples, rows)."""
+    """Recording and metrics of a run, from a record (samples, rows)."""
     from ppafo.metrics.metric import Metrics
 
     by_path = {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
-    recording, metrics, ended = scenario.motion.motion_kind.measured(scenario, run, times, by_path)
-    return RunMetrics(recording, Metrics(metrics), ended)
+    recording, metrics = scenario.motion.motion_kind.measured(scenario, run, times, by_path)
+    return RunMetrics(recording, Metrics(metrics))
 
 
 def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:

@@ -66,7 +66,7 @@ def measured(
             value = followed.value(*of)  # type: ignore[arg-type]
             channels[followed.name] = (np.asarray(value), followed.unit)
     recording = recording_of(scenario.name, run, times, channels | dict(of_leg or {}))
-    return recording, evaluate(recording), "completed"
+    return recording, evaluate(recording)
 
 
 def recording_of(label: str, run: Run, times: Floats, channels: Mapping[str, tuple[Floats, str]]) -> Recording:

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.simulation.numbers import NOISE_SEED
-from ppafo.simulation.scenario import LARGEST_SEED, Scenario
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario, sensor_noise
 from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.study import RandomValue, SamplingPlan
 
@@ -149,8 +149,7 @@ def with_noise(
     closed = [scenario for scenario in scenarios if not scenario.controller.is_open_loop]
     is_noisy = bool(closed) and any(path in _NOISE_LEVELS for path in paths)
     for scenario in closed:
-        level = scenario.motion.motion_kind.noise(scenario)
-        is_noisy = is_noisy or bool(np.any(np.asarray(level) > 0.0))
+        is_noisy = is_noisy or bool(np.any(np.asarray(sensor_noise(scenario)) > 0.0))
     if NOISE_SEED in paths or not is_noisy:
         return drawn, scores
     noise = RandomValue(NOISE_SEED, Distribution("whole_numbers", (0.0, float(LARGEST_SEED))))

@@ -81,14 +81,14 @@ def _evaluated(
 
 
 def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]) -> Measured:
-    """Return recording, metrics and status message of a walk from its rows (samples,) by path, at these times [s]."""
+    """Return recording and metrics of a walk from its rows (samples,) by path, at these times [s]."""
     check_no_bottle(scenario)
     result = _evaluated(scenario, run, time, record, Status("completed", None, "completed"), None)
     # The catalogue lists metrics of plugins by module and object, a recording by the name of the metric.
     kinds = {kind.name: kind for kind in METRICS.values()}
     of_recording = evaluate(result.recording).items()
     available = {name: metric for name, metric in of_recording if not lacks(scenario, kinds[name])}
-    return result.recording, {**available, **result.metrics}, result.status.message
+    return result.recording, {**available, **result.metrics}
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:

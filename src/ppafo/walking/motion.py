@@ -36,7 +36,7 @@ class WalkMotion:
     - ``wearer_origin``: description of the origin of the body mass
     """
 
-    motion_kind: MotionKind[Scenario] = field(compare=False)
+    motion_kind: MotionKind = field(compare=False)
     gait: Gait
     wearer: Wearer
     forces: Mapping[str, Any]

@@ -12,18 +12,17 @@ from ppafo.engine.in_python import in_program
 from ppafo.engine.rows import of_each
 from ppafo.engine.run import Run, Walk, states_at_start
 from ppafo.engine.scheme.actuators import filled_chambers
-from ppafo.errors import ScenarioError
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.columns import Problem, at, first, larger, over_runs, smaller, whole
+from ppafo.model.columns import Problem, at, larger, over_runs, smaller
 from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.gait import gait_at
 from ppafo.model.plant import PlantParameters
 from ppafo.model.ports import load_torque
 from ppafo.model.sensors import GaitSensors
 from ppafo.parameters.device import Device
-from ppafo.parameters.plant import plant_parameters, venting_valve
-from ppafo.simulation.plan import Components, TimeGrid, compose_run, sensor_parameters, too_many_steps
+from ppafo.parameters.plant import plant_parameters
+from ppafo.simulation.plan import TimeGrid, compose_run
 from ppafo.simulation.scenario import ProfileChoice, Scenario
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import gait_series, gait_timing, heel_rocker
@@ -50,60 +49,34 @@ SMALL_TURN = 0.01
 TINY = 1.0e-30
 
 
-def plan_walk(scenario: Scenario) -> Run:
-    """Return the run of a walk that starts with vented chambers at a heel strike.
-
-    Raises ScenarioError if the walk cannot be simulated.
-    """
-    run, problems = walk_of(scenario).motion_kind.plan(scenario)
-    for is_bad, line in problems:
-        if is_bad:
-            raise ScenarioError(f"{scenario.origin.file or scenario.name}: {line(0)}")
-    return run
-
-
 def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
-    """Return the run of a walk and the possible problems of the run; numbers of both may be arrays (runs,).
+    """Return the run of a walk that starts with vented chambers at a heel strike, and its possible problems.
 
-    All runs of an ensemble must need the same program: each of ``flaws`` is 0 for all runs or for none.
+    Numbers of both may be arrays (runs,). All runs of an ensemble must need the same program: each of ``flaws`` is 0
+    for all runs or for none.
     """
-    motion, device = walk_of(scenario), fed_device(scenario)
+    motion, scenario = walk_of(scenario), replace(scenario, device=fed_device(scenario))
+    device = scenario.device
     leg = leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer))
     gait, timing = gait_series(motion.gait), gait_timing(motion.gait)
     bare = plant_parameters(device)
-    sensors = gait_sensors_of(scenario)
-    initial = of_each(lambda leg: walk_from_strike(gait_at(gait, timing, leg, 0.0)), leg)
     walk = Walk(
         leg=leg,
         share=device_share(bare, leg.gravity),
         gait=gait,
         timing=timing,
-        sensors=sensors,
-        initial=initial,
-    )
-    control = scenario.controller
-    components = Components(
-        device=device,
-        valve=venting_valve(device.valve),
-        # Where no torque is requested, an object in charge is asked between the steps of a program without a law.
-        controller=None if control.is_outside and not control.settings else law_of(scenario),
-        settings=control.settings,
-        reference=NO_REFERENCE,
-        path=None,
-        sensors=sensor_parameters(scenario),
-        has_ideal_sensors=has_ideal_sensors(scenario),
-        thermal=scenario.gas_model,
-        supply_lines=scenario.supply_lines,
+        sensors=gait_sensors_of(scenario),
+        initial=of_each(lambda leg: walk_from_strike(gait_at(gait, timing, leg, 0.0)), leg),
     )
     now = walk.initial.now
-    run = compose_run(
-        components,
+    run, problems = compose_run(
+        scenario,
         with_leg(bare, leg),
         lambda plant: walk_steps(scenario, plant),
         lambda plant: vented_state(plant, vented_chambers(device, plant, now.ankle), now.ankle, now.ankle_rate),
         walk,
     )
-    return run, (too_many_steps(scenario, run.step, run.step_count), *stiff_loads(run))
+    return run, (*problems, *stiff_loads(run))
 
 
 def walk_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
@@ -113,14 +86,7 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
     # Lines may be smaller than any chamber, and then fill first.
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
-    counts = walk_step_counts(*times, plant, volume, scenario.stiffness)
-    return TimeGrid(
-        step=counts.step,
-        step_count=whole(counts.step_count),
-        steps_per_sample=whole(counts.steps_per_sample),
-        record_every=whole(counts.record_every),
-        needs_parts=False,
-    )
+    return walk_step_counts(*times, plant, volume, scenario.stiffness), False, 1.0
 
 
 def stiff_loads(run: Run) -> tuple[Problem, ...]:
@@ -183,24 +149,13 @@ def sensor_numbers(scenario: Scenario) -> dict[str, Any]:
 
 
 def flaws(scenario: Scenario) -> tuple[Any, ...]:
-    """Return the imperfections of the sensors of a walk; 0 for an ideal sensor.
+    """Return the delay, and the imperfections of the sensors of a walk; 0 for an ideal sensor.
 
     Each must be 0 for all runs of a program or for none. The bandwidth of the force sensors is not included, because
     every walk has it.
     """
-    return tuple(number for name, number in sensor_numbers(scenario).items() if name != "force_bandwidth")
-
-
-def has_ideal_sensors(scenario: Scenario) -> bool:
-    """Return True if the sensors are ideal except for the bandwidth of the force sensors."""
-    return not any(first(flaw) for flaw in flaws(scenario))
-
-
-def noise(scenario: Scenario) -> Any:
-    """Return the sum of all random effects in the sensors of a walk: noise levels, and fractions of lost samples."""
-    sensors, forces = scenario.sensors, walk_of(scenario).forces
-    own = [number for name, number in forces.items() if name == "force_noise" or name.endswith("lost_share")]
-    return sum(own, sensors.angle_noise + sensors.pressure_noise)
+    numbers = sensor_numbers(scenario).items()
+    return scenario.sensors.delay, *(number for name, number in numbers if name != "force_bandwidth")
 
 
 def law_of(scenario: Scenario) -> ControllerKind:

@@ -19,7 +19,7 @@ from ppafo.parameters.device import Actuator, FootPlate, Friction
 from ppafo.parameters.graph import outside
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.numbers import check_parts
-from ppafo.simulation.plan import MAXIMUM_STEPS
+from ppafo.simulation.plan import MAXIMUM_STEPS, plan_run
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle
@@ -28,7 +28,7 @@ from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.evaluation import result_of_walk
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
-from ppafo.walking.planning import fed_device, plan_walk
+from ppafo.walking.planning import fed_device
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 
@@ -93,7 +93,7 @@ def walk(
     else:
         check_parts(scenario)
     scenario = lasting(scenario, minutes)
-    run, motion, custom = plan_walk(scenario), walk_of(scenario), scenario.controller.custom
+    run, motion, custom = plan_run(scenario), walk_of(scenario), scenario.controller.custom
     if custom is not None:
         check_no_bottle(scenario)
         return result_of_walk(scenario, run, run_sampled(batch_of(run), custom), None)
@@ -125,7 +125,7 @@ def bottle_life(scenario: Scenario, schedule: Schedule) -> BottleLife:
     if scenario.controller.custom is not None:
         check_no_bottle(scenario)
     repeated = _repeated_walk(scenario, schedule.longest)
-    run, device = plan_walk(repeated), fed_device(repeated)
+    run, device = plan_run(repeated), fed_device(repeated)
     return life_on_bottle(run, device, motion.bottle, motion.gait.stride_time, schedule, silent)
 
 
@@ -136,7 +136,7 @@ def _repeated_walk(scenario: Scenario, longest: float) -> Scenario:
     """
     stride_time = walk_of(scenario).gait.stride_time
     minute = replace(scenario, run=replace(scenario.run, duration=60.0, output_interval=60.0))
-    seconds_of_run = 60.0 * (MAXIMUM_STEPS * plan_walk(minute).step // 60.0)
+    seconds_of_run = 60.0 * (MAXIMUM_STEPS * plan_run(minute).step // 60.0)
     seconds = min(math.ceil(longest / stride_time) * stride_time, seconds_of_run)
     return replace(minute, run=replace(minute.run, duration=60.0 * max(1, round(seconds / 60.0))))
 

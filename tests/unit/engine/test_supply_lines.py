@@ -35,11 +35,10 @@ from ppafo.model.plant import (
 from ppafo.model.regulator import LineState, SupplyLines, line_pressures, lines_at_start
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import state_with_volumes
+from ppafo.simulation.plan import plan_run, state_with_volumes
 from ppafo.simulation.scenario import RegulatedLine, SupplyLine
 from ppafo.walking import load_walk
 from ppafo.walking.motion import with_duration
-from ppafo.walking.planning import plan_walk
 
 ANGLE = 1.7
 DURATION = 0.06
@@ -205,7 +204,7 @@ def supply_line(lines: SupplyLines) -> SupplyLine:
 def short_walk(name: str, lines: SupplyLines | None = None, overrides: tuple[str, ...] = ()) -> Run:
     """A few strides of a walk that comes with the package, perhaps with other lines or values."""
     plan = with_duration(load_walk(name, overrides), 5.0)
-    return plan_walk(plan if lines is None else replace(plan, supply_line=supply_line(lines)))
+    return plan_run(plan if lines is None else replace(plan, supply_line=supply_line(lines)))
 
 
 @pytest.mark.parametrize("name", ["solenoid-regulators", "proportional-regulators"])

@@ -18,8 +18,8 @@ from ppafo.errors import ParameterError, ScenarioError
 from ppafo.exports.c_library import walk_library
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import ExportParameter, Library
+from ppafo.simulation.plan import plan_run
 from ppafo.walking import list_walks, load_walk
-from ppafo.walking.planning import plan_walk
 from tests.built_once import shared_library
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -132,7 +132,7 @@ def batches(name: str, overrides: tuple[str, ...]) -> list[tuple[Values, Batch]]
                 walked,
                 run=replace(walked.run, duration=values["run.duration"], output_interval=values["run.output_interval"]),
             )
-            found.append((values, batch_of(plan_walk(plan))))
+            found.append((values, batch_of(plan_run(plan))))
         values = drawn(settings, draw)
     return found
 

@@ -15,12 +15,12 @@ from ppafo.engine.entries import INLINE
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
+from ppafo.simulation.plan import plan_run
 from ppafo.translation.c99 import c_source, program_source
 from ppafo.translation.native_entries import parameters_of
 from ppafo.translation.walk import walk_module
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import with_duration
-from ppafo.walking.planning import plan_walk
 from scripts.bits import digest, drawn_batch, failures, plain_batch
 from scripts.built_programs import build, run_native
 from tests.composed_programs import drawn_programs
@@ -319,7 +319,7 @@ def test_what_c_would_compute_otherwise_is_refused_with_file_and_line(
 @needs_gcc
 @pytest.mark.parametrize("language", ["-std=c99", "-xc++"])
 def test_programs_compile_without_a_warning(language: str, tmp_path: Path) -> None:
-    walk = plan_walk(with_duration(load_walk("solenoid"), 4.0)).program
+    walk = plan_run(with_duration(load_walk("solenoid"), 4.0)).program
     for number, program in enumerate([*drawn_programs(3), walk]):
         written = tmp_path / f"{number}.c"
         written.write_text(program_source(program), encoding="utf-8")

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.gait import load_gait
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
 from ppafo.walking.motion import walk_of, with_duration
-from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import paper_subject
 
 
@@ -45,4 +45,4 @@ def walk_plan() -> Callable[[str], Scenario]:
 
 @pytest.fixture(scope="session")
 def walked() -> Callable[[str], Walked]:
-    return lru_cache(lambda name: Walked(plan_walk(make_plan(name))))
+    return lru_cache(lambda name: Walked(plan_run(make_plan(name))))

@@ -12,10 +12,11 @@ import pytest
 from ppafo.errors import ArgumentError, DataError, ParameterError, ScenarioError
 from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
+from ppafo.simulation.plan import plan_run
 from ppafo.walking import list_walks, load_walk, walk
 from ppafo.walking.declaration import json_schema
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
+from ppafo.walking.planning import gait_sensors_of
 
 MISTAKES = {
     "controller.unload_threshold=80 N": "controller.load_threshold = 60 N",
@@ -51,8 +52,8 @@ def test_bandwidths_are_what_is_left_after_a_sample() -> None:
     slow = load_walk("solenoid", ["sensors.angle_bandwidth=20 Hz", "controller.rate=500 Hz"])
     assert gait_sensors_of(slow).angle_memory == pytest.approx(math.exp(-2.0 * math.pi * 20.0 / 500.0))
     assert gait_sensors_of(slow).pressure_memory == 0.0
-    assert not has_ideal_sensors(slow)
-    assert has_ideal_sensors(load_walk("solenoid", ["sensors.force_bandwidth=10 Hz"]))
+    assert not plan_run(slow).program.ideal_sensors
+    assert plan_run(load_walk("solenoid", ["sensors.force_bandwidth=10 Hz"])).program.ideal_sensors
 
 
 @pytest.mark.parametrize("overrides", PROFILE)

@@ -16,10 +16,10 @@ from ppafo.gait.gait import GaitCurve
 from ppafo.model import contact as ground
 from ppafo.model.gait import gait_at
 from ppafo.model.leg import foot_inertia_about_ankle, passive_torque
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.gait_series import heel_rocker, landing_phase, truncate
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import Wearer, paper_subject
 
 
@@ -105,7 +105,7 @@ def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[
     from scipy.integrate import solve_ivp
 
     plan = worn_by(walk_plan("off"), replace(paper_subject(), residual_share=share))
-    swing = swing_of(plan_walk(plan), walk_of(plan).gait.stance_share, 300)
+    swing = swing_of(plan_run(plan), walk_of(plan).gait.stance_share, 300)
     assert swing.walk is not None
     angle = angles_of(swing)
     judge = AnswerFilter(walk_of(plan).gait, walk_of(plan).wearer, swing.walk.share)
@@ -122,7 +122,7 @@ def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[
 
 def test_a_wearer_with_all_muscles_and_no_device_walks_the_measured_gait(walk_plan: Callable[[str], Any]) -> None:
     plan = worn_by(walk_plan("off"), replace(paper_subject(), residual_share=1.0))
-    run = plan_walk(plan)
+    run = plan_run(plan)
     assert run.walk is not None
     light = replace(run.walk, share=DeviceShare(0.0, 0.0, 0.0))
     bare = run.plant._replace(
@@ -143,7 +143,7 @@ def test_a_wearer_with_all_muscles_and_no_device_walks_the_measured_gait(walk_pl
 
 
 def test_the_ground_under_the_heel_turns_the_toes_down(walk_plan: Callable[[str], Any]) -> None:
-    walk = plan_walk(walk_plan("off")).walk
+    walk = plan_run(walk_plan("off")).walk
     assert walk is not None
     for phase in (0.03, 0.06, 0.2):
         now = gait_at(walk.gait, walk.timing._replace(start=phase), walk.leg, 0.0)
@@ -158,7 +158,7 @@ def test_the_ground_under_the_heel_turns_the_toes_down(walk_plan: Callable[[str]
 
 
 def test_before_the_foot_is_flat_the_ground_gives_what_was_measured(walk_plan: Callable[[str], Any]) -> None:
-    walk = plan_walk(walk_plan("off")).walk
+    walk = plan_run(walk_plan("off")).walk
     assert walk is not None
     for phase in (0.03, 0.05, 0.07):
         now = gait_at(walk.gait, walk.timing._replace(start=phase), walk.leg, 0.0)
@@ -169,7 +169,7 @@ def test_before_the_foot_is_flat_the_ground_gives_what_was_measured(walk_plan: C
 def test_a_loaded_heel_pulls_a_raised_foot_down_harder_than_the_device_can_hold(
     walk_plan: Callable[[str], Any],
 ) -> None:
-    walk = plan_walk(walk_plan("off")).walk
+    walk = plan_run(walk_plan("off")).walk
     assert walk is not None
     level = walk.timing.ground_angle
     for phase in (0.12, 0.15, 0.2):
@@ -197,7 +197,7 @@ def test_the_lever_of_the_ground_is_bounded_by_the_heel_whatever_was_measured(me
 
 
 def test_the_weight_of_the_foot_plate_pulls_the_toes_down(walk_plan: Callable[[str], Any]) -> None:
-    walk = plan_walk(walk_plan("off")).walk
+    walk = plan_run(walk_plan("off")).walk
     assert walk is not None
     # The ankle of a flat foot rests, so the plate weighs as much as it does on a bench.
     now = gait_at(walk.gait, walk.timing._replace(start=0.3), walk.leg, 0.0)
@@ -217,7 +217,7 @@ def test_the_weight_of_the_foot_plate_pulls_the_toes_down(walk_plan: Callable[[s
 
 
 def test_a_foot_plate_is_carried_along_like_a_foot_of_its_mass_and_inertia(walk_plan: Callable[[str], Any]) -> None:
-    walk = plan_walk(walk_plan("off")).walk
+    walk = plan_run(walk_plan("off")).walk
     assert walk is not None
     leg = walk.leg._replace(residual_share=0.0)
     moment = leg.foot_mass * leg.foot_mass_centre

@@ -17,9 +17,9 @@ from ppafo.model.contact import SWING
 from ppafo.model.gait import gait_at
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, foot_load
 from ppafo.signals.recording import Floats
+from ppafo.simulation.plan import plan_run
 from ppafo.walking.gait_series import gait_series, gait_timing
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import paper_subject
 
 NOTHING = (0.0,)
@@ -32,7 +32,7 @@ def constant(level: float) -> GaitCurve:
 def swung(plan: Any, forward: float, up: float) -> tuple[Any, Callable[[str], Floats]]:
     """A free foot without gas, friction, damping and stops after toe-off; the knee accelerates [m/s^2]."""
     gait = replace(walk_of(plan).gait, knee_forward=constant(forward), knee_up=constant(up))
-    run = plan_walk(replace(plan, motion=replace(walk_of(plan), gait=gait)))
+    run = plan_run(replace(plan, motion=replace(walk_of(plan), gait=gait)))
     walk = run.walk
     assert walk is not None
     plant = run.plant._replace(

@@ -9,10 +9,10 @@ import pytest
 from ppafo.engine.step import energy_balance
 from ppafo.errors import ScenarioError
 from ppafo.metrics import evaluate
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import GasModel
 from ppafo.walking import load_walk, walk
 from ppafo.walking.motion import with_duration
-from ppafo.walking.planning import plan_walk
 
 WALLS = ("gas_model.kind=thermal", "gas_model.wall_area_per_volume=100 1/m")
 WARM = (*WALLS, "gas_model.heat_transfer_coefficient=50 W/(m^2 K)")
@@ -33,7 +33,7 @@ def test_a_walk_file_takes_the_gas_model_of_a_scenario(tmp_path: Path) -> None:
 
 
 def test_warm_gas_has_steps_that_follow_the_faster_chambers() -> None:
-    plain, warm = (plan_walk(with_duration(load_walk("solenoid", given), 6.0)) for given in ((), WARM))
+    plain, warm = (plan_run(with_duration(load_walk("solenoid", given), 6.0)) for given in ((), WARM))
     assert warm.program.is_thermal
     assert not plain.program.is_thermal
     assert plain.step / warm.step >= 1.0

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ppafo.model import contact as ground
+from ppafo.simulation.plan import plan_run
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import plan_walk
 
 CONTROLLERS = ("off", "event_on_off", "event_proportional")
 
@@ -84,7 +84,7 @@ def test_metrics_at_one_kilohertz_are_within_two_per_cent(walk_plan: Callable[[s
         found = []
         for step in (1.0e-3, 5.0e-5):
             plan = walk_plan(name)
-            run = plan_walk(replace(plan, run=replace(plan.run, step=step)))
+            run = plan_run(replace(plan, run=replace(plan.run, step=step)))
             rows = state_row_numbers(run)
             states = run_batch(batch_of(run)).states[:, 0]
             names = ("walk.positive_push_off_work", "walk.net_push_off_work", "state.supplied_mass")
@@ -101,7 +101,7 @@ def test_a_dead_time_of_the_valve_delays_the_pressure(walk_plan: Callable[[str],
     for delay in (0.0, 0.0304):
         valve = replace(plan.device.valve, settings={**plan.device.valve.settings, "delay": delay})
         device = replace(plan.device, valve=valve)
-        run = plan_walk(replace(plan, device=device, run=replace(plan.run, duration=3.0)))
+        run = plan_run(replace(plan, device=device, run=replace(plan.run, duration=3.0)))
         rows = state_row_numbers(run)
         record = run_batch(batch_of(run)).record[:, :, 0]
         loaded = record[:, rows["state.supplied_mass"]] > 1e-6
@@ -116,7 +116,7 @@ def test_a_foot_that_comes_first_with_its_toes_loads_them(
     # An equinus foot: stiff tissue that rests in plantarflexion.
     wearer = replace(walk_of(plan).wearer, ankle_stiffness=20.0, ankle_rest_angle=2.2)
     lifted = walked("event_on_off")
-    stiff = type(lifted)(plan_walk(replace(plan, motion=replace(walk_of(plan), wearer=wearer))))
+    stiff = type(lifted)(plan_run(replace(plan, motion=replace(walk_of(plan), wearer=wearer))))
     assert stiff["walk.toe_landings"][-1] >= 6
     assert lifted["walk.toe_landings"][-1] == 0
     early = {walk: (walk["walk.now.phase"] < 0.05) & (walk.time > 2.0) for walk in (stiff, lifted)}

@@ -88,11 +88,10 @@ def walk_library(configuration: Scenario) -> Library:
         rules_of_walk,
     )
     from ppafo.walking.motion import record_interval
-    from ppafo.walking.planning import plan_walk
 
     # Before anything is planned: what cannot be exported should be said at once.
     check_can_be_exported(configuration)
-    program = exported(batch_of(plan_walk(configuration)).program)
+    program = exported(batch_of(plan_run(configuration)).program)
     settings = settings_of(configuration, record_interval(configuration.run.duration))
     links = links_of(configuration, settings, LINKS_OF_WALK)
     of_readings = [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]

@@ -47,7 +47,6 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
 def words_of_walk(walk: Scenario, links: Graph) -> dict[str, str]:
     """Return README texts on this walk; ``links`` has the parameters that follow others."""
     from ppafo.walking.motion import walk_of
-    from ppafo.walking.planning import has_ideal_sensors
 
     gait = walk_of(walk).gait
     fixed = [
@@ -56,7 +55,7 @@ def words_of_walk(walk: Scenario, links: Graph) -> dict[str, str]:
         "the walk: equal strides",
         f"the valve, `{walk.device.valve.kind}`, and the controller, `{walk.controller.kind}`",
         *_fixed_of_device(walk),
-        _at_zero(walk.device, () if has_ideal_sensors(walk) else (1.0,)),
+        _at_zero(walk.device, walk.motion.motion_kind.flaws(walk)),
     ]
     return {
         "fixed": _listed(fixed),

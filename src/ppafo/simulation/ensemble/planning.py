@@ -143,7 +143,7 @@ def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None 
 
 def _groups_of_one_program(scenario: Scenario, runs: int) -> list[Members]:
     """Run indices, grouped by compiled program: equal effects, and zeros in the same settings."""
-    of_motion = scenario.motion.motion_kind.switches(scenario)
+    of_motion = scenario.motion.motion_kind.flaws(scenario)
     settings: tuple[Any, ...] = (*scenario.device.valve.settings.values(), *of_motion)
     varied_settings = [setting > 0.0 for setting in settings if isinstance(setting, np.ndarray)]
     varied_settings += [is_on for is_on in switches_of(scenario.device).values() if isinstance(is_on, np.ndarray)]

@@ -176,7 +176,7 @@ def test_a_scenario_of_a_file_is_pasted_by_its_file(tmp_path: Path) -> None:
     file.write_bytes((Path(ppafo.__file__).parent / "scenarios" / "torque-task-proportional.toml").read_bytes())
     finding = tune(changed(scenario=str(file), effort={"starts": 1, "generations": 1, "candidates_per_gain": 4}))
     pasted = finding.files["overrides.txt"]().decode()
-    assert f"ppafo.simulate({str(file)!r}, [" in pasted
+    assert f"ppafo.simulate({str(file)!r}, overrides=[" in pasted
     assert f"ppafo simulate '{file}' --set" in str(finding)
 
 
