@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.run import batches_of
-from ppafo.exports.c_library import c_library, library_of, scenario_library
+from ppafo.exports.c_library import c_library, library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import c_identifier
 from ppafo.exports.c_library.plant import plant_library
@@ -88,7 +88,7 @@ class Loaded:
 
     def __init__(self, scenario: str, folder: Path, overrides: tuple[str, ...] = ()) -> None:
         self.name = written(folder, scenario, *overrides)
-        self.exported = scenario_library(load_scenario(scenario, overrides))
+        self.exported = library_of(load_scenario(scenario, overrides))
         self.settings = [item.name for item in self.exported.settings]
         library = shared_library(folder / f"{self.name}.c", "-O1", "-ffp-contract=off")
         self.library = ctypes.CDLL(str(library))
@@ -297,7 +297,7 @@ def handed(values: Any) -> Any:
 def drawn(scenario: Scenario) -> tuple[dict[str, Any], Scenario]:
     """Settings of many runs by path, and the scenario that stands for all of them."""
     draw = np.random.default_rng(15)
-    settings = scenario_library(scenario).settings
+    settings = library_of(scenario).settings
     columns = {
         item.path: np.clip(item.value * draw.uniform(*SPREAD, RUNS), item.quantity.minimum, item.quantity.maximum)
         for item in settings

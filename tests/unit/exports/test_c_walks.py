@@ -15,7 +15,7 @@ import pytest
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import ParameterError, ScenarioError
-from ppafo.exports.c_library import walk_library
+from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.library import ExportParameter, Library
 from ppafo.simulation.plan import plan_run
@@ -55,7 +55,7 @@ other actuators."""
 @functools.cache
 def exported(name: str, overrides: tuple[str, ...] = ()) -> tuple[Library, dict[str, bytes]]:
     """The library of a walk, and its files, composed once for all tests."""
-    item = walk_library(load_walk(name, overrides))
+    item = library_of(load_walk(name, overrides))
     return item, library_files(item)
 
 

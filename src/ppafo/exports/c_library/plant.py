@@ -59,7 +59,7 @@ class _Drive:
 
 
 @dataclass(frozen=True, slots=True)
-class _PlantAlone:
+class PlantAlone:
     """Plant with external inputs: its library, its inputs and motion, and the input interval ``step`` [s].
 
     ``hidden`` are the paths of settings without effect, since inputs replace them.
@@ -87,7 +87,7 @@ _PATH = "motion.profile."
 """Prefixes of the paths replaced by inputs: in any plant, and in a plant with an ankle driven by inputs."""
 
 
-def plant_of(scenario: Scenario) -> _PlantAlone:
+def plant_of(scenario: Scenario) -> PlantAlone:
     """Return the plant of a scenario; inputs are a torque for a free joint, angle and rate for a locked joint.
 
     A joint on a path defined by the scenario and a device on a walking leg take only the command.
@@ -104,19 +104,15 @@ def plant_of(scenario: Scenario) -> _PlantAlone:
     references = {kind.reference for kind in CONTROLLED.values()}
     outputs = tuple(name for name in library.program.outputs if name not in input_names | references)
     # Metrics need a whole run, which only the caller sees.
-    program = replace(library.program.program, meters=(), traced=outputs)
     # Where a locked joint may take its steps whole, this one does as long as it stands still.
-    is_turned = "angle" in input_names
+    is_turned, program = "angle" in input_names, library.program.program
     rests_whole = is_turned and program.feed is None and not program.actuator.gives
-    program = replace(program, rests_whole=rests_whole)
+    program = replace(program, meters=(), traced=outputs, rests_whole=rests_whole)
     beginnings = (*_REPLACED, _PATH) if is_turned else _REPLACED
     replaced = {setting.path for setting in library.settings if setting.path.startswith(beginnings)}
-    return _PlantAlone(
-        library=replace(library, program=ExportedProgram(program, ()), rules=(), checking=None),
-        drive=drive,
-        hidden=frozenset(replaced.union(_WITHOUT_EFFECT)),
-        step=plant.controller.period,
-    )
+    library = replace(library, program=ExportedProgram(program, ()), rules=(), checking=None)
+    alone = PlantAlone(library, drive, frozenset(replaced.union(_WITHOUT_EFFECT)), plant.controller.period)
+    return replace(alone, library=replace(library, api=_api_of(alone)))
 
 
 @singledispatch
@@ -183,7 +179,7 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -
 
 def plant_library(scenario: Scenario) -> dict[str, bytes]:
     """Return the C files of the plant by name; ``NAME_step(run, command, ...)`` advances by one step."""
-    library = with_api(plant_of(scenario)).library
+    library = plant_of(scenario).library
     return {**library_files(library), "expected.csv": expected_csv(half_open(scenario), library.program.outputs)}
 
 
@@ -199,8 +195,8 @@ def half_open(scenario: Scenario) -> Scenario:
     return replace(plant, controller=command, run=replace(plant.run, duration=duration))
 
 
-def with_api(alone: _PlantAlone) -> _PlantAlone:
-    """Return the plant with a library API that takes its inputs at each step."""
+def _api_of(alone: PlantAlone) -> LibraryApi:
+    """Return the API of a plant, which takes its inputs at each step."""
     names = [variable.name for variable in alone.inputs]
     by_name = {name: name for name in names}
     # An example whose command does something.
@@ -236,13 +232,12 @@ def with_api(alone: _PlantAlone) -> _PlantAlone:
         "hidden": ", ".join(f"`{c_identifier(path)}`" for path in sorted(alone.hidden)),
         "step": f"{alone.step:g}",
     }
-    api = LibraryApi(
+    return LibraryApi(
         "plant.h", "plant_main.c", "plant_README.md", "plant.c", words, step=c_identifier(STEPS), as_step=_AS_STEPS
     )
-    return replace(alone, library=replace(alone.library, api=api))
 
 
-def follow_lines(alone: _PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
+def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
     """Return C lines that assign the ``inputs``, C expressions by name, to the struct at pointer ``settings``."""
     return "\n".join(
         f"    {settings}->{field} = {expression.format(settings=settings, **inputs)};"

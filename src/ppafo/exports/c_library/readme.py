@@ -9,6 +9,7 @@ from ppafo.metrics import METRICS
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
+from ppafo.simulation.motion_kind import WALK
 from ppafo.simulation.scenario import Scenario, vane_motion
 
 _METRICS_OF_SCENARIO = """\
@@ -19,6 +20,7 @@ _METRICS_OF_WALK = """\
 They are means over the strides from the third on, and counts. In `ppafo walk` the same are computed from the recording,
 whose sums are rounded in another order: they agree to about 15 digits. Not here, since they need the mean stride or the
 healthy one: `healthy_positive_work`, `push_off_share`, `lowest_toes`, `angle_difference`, `dorsiflexor_moment`."""
+_OF_TIMES = "whether `run_output_interval` is a whole number of steps of the engine, and whether the supply is suction"
 _FOLLOWS = """\
 - As in ppafo, these settings depend on others while they equal their default, even if it is given: {followers}."""
 _TRAPS_OF_WALK = """\
@@ -27,40 +29,28 @@ _TRAPS_OF_WALK = """\
 
 
 def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
-    """Return README texts on this scenario; ``links`` has the parameters that follow others."""
-    fixed = [
-        f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.controller.kind}`",
-        f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}",
-        *_fixed_of_device(scenario),
-        _at_zero(scenario.device, scenario.sensors.flaws),
-        "whether `run_output_interval` is a whole number of steps of the engine, and whether the supply is suction",
-    ]
-    left_out = [kind.name for kind in METRICS.values() if kind.traced]
-    return {
-        "fixed": _listed(fixed),
-        "precomputed": "nothing",
-        "traps": _followers(links, numbers_of_second_chamber(scenario)),
-        "metrics_said": _METRICS_OF_SCENARIO.format(left_out=", ".join(f"`{name}`" for name in left_out)),
-    }
-
-
-def words_of_walk(walk: Scenario, links: Graph) -> dict[str, str]:
-    """Return README texts on this walk; ``links`` has the parameters that follow others."""
+    """Return README texts on a scenario or a walk; ``links`` has the parameters that follow others."""
+    kind, device = scenario.motion.motion_kind, scenario.device
+    laws = f"the valve, `{device.valve.kind}`, and the controller, `{scenario.controller.kind}`"
+    of_both = [*_fixed_of_device(scenario), _at_zero(device, kind.flaws(scenario))]
+    followers = _followers(links, numbers_of_second_chamber(scenario))
+    if kind.layout != WALK:
+        motion = f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}"
+        left_out = ", ".join(f"`{kind.name}`" for kind in METRICS.values() if kind.traced)
+        return {
+            "fixed": _listed([laws, motion, *of_both, _OF_TIMES]),
+            "precomputed": "nothing",
+            "traps": followers,
+            "metrics_said": _METRICS_OF_SCENARIO.format(left_out=left_out),
+        }
     from ppafo.walking.motion import walk_of
 
-    gait = walk_of(walk).gait
-    fixed = [
-        f"the gait, `{gait.name}`: its series, its events and its stride of {gait.stride_time:.4g} s are numbers in "
-        f"the source",
-        "the walk: equal strides",
-        f"the valve, `{walk.device.valve.kind}`, and the controller, `{walk.controller.kind}`",
-        *_fixed_of_device(walk),
-        _at_zero(walk.device, walk.motion.motion_kind.flaws(walk)),
-    ]
+    gait = walk_of(scenario).gait
+    series = f"its series, its events and its stride of {gait.stride_time:.4g} s are numbers in the source"
     return {
-        "fixed": _listed(fixed),
+        "fixed": _listed([f"the gait, `{gait.name}`: {series}", "the walk: equal strides", laws, *of_both]),
         "precomputed": "the gait alone",
-        "traps": f"{_followers(links, numbers_of_second_chamber(walk))}\n{_TRAPS_OF_WALK}",
+        "traps": f"{followers}\n{_TRAPS_OF_WALK}",
         "metrics_said": _METRICS_OF_WALK,
     }
 

@@ -29,6 +29,7 @@ _DISPLAY_UNITS = {
     "rad/s": "deg/s",
 }
 """Display unit of each exchanged SI unit: bench units, as in the files of ppafo."""
+_CLOCK = "clock of the controller, ticks every controller.period"
 
 
 def description_of_fmi2(interface: Interface, identifier: str, token: str) -> bytes:
@@ -42,7 +43,7 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
         canNotUseMemoryManagementFunctions="true",
-        canHandleVariableCommunicationStepSize=str(not interface.is_step_fixed).lower(),
+        canHandleVariableCommunicationStepSize=str(interface.plant is None).lower(),
     )
     # One file that takes the others in: tools that build from source need no list.
     Xml.SubElement(Xml.SubElement(kind, "SourceFiles"), "File", name="fmi2.c")
@@ -67,15 +68,15 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
     """Return modelDescription.xml of FMI 3.0; ``identifier`` names the library, ``token`` identifies its sources."""
     variables = variables_of(interface)
     root = Xml.Element("fmiModelDescription", _head("3.0", interface, instantiationToken=token))
-    has_clock = str(interface.clock is not None).lower()
-    internal: dict[str, Any] = {"fixedInternalStepSize": repr(interface.step)} if interface.is_step_fixed else {}
+    has_clock = str(interface.plant is None).lower()
+    internal: dict[str, Any] = {"fixedInternalStepSize": repr(interface.step)} if interface.plant is not None else {}
     Xml.SubElement(
         root,
         "CoSimulation",
         modelIdentifier=identifier,
         canGetAndSetFMUState="true",
         canSerializeFMUState="true",
-        canHandleVariableCommunicationStepSize=str(not interface.is_step_fixed).lower(),
+        canHandleVariableCommunicationStepSize=str(interface.plant is None).lower(),
         hasEventMode=has_clock,
         mightReturnEarlyFromDoStep=has_clock,
         **internal,
@@ -84,8 +85,8 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
     table = Xml.SubElement(root, "ModelVariables")
     # Clock and time get numbers behind all variables of the C.
     first = 1 + max(variable.number for variable in variables)
-    if interface.clock is not None:
-        clock = {"valueReference": str(first), "description": interface.clock, "causality": "output"}
+    if interface.plant is None:
+        clock = {"valueReference": str(first), "description": _CLOCK, "causality": "output"}
         Xml.SubElement(table, "Clock", {"name": "controller.clock", **clock, "intervalVariability": "triggered"})
     time = {"name": "time", "valueReference": str(first + 1), "description": "time", "causality": "independent"}
     Xml.SubElement(table, "Float64", {**time, "variability": "continuous", "unit": "s"})
@@ -94,7 +95,7 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
         Xml.SubElement(table, "Float64", of_variable | of_number)
     structure = Xml.SubElement(root, "ModelStructure")
     outputs = [variable.number for variable in variables if variable.causality == "output"]
-    outputs += [] if interface.clock is None else [first]
+    outputs += [first] if interface.plant is None else []
     for name, known in {"Output": {"dependencies": ""}, "InitialUnknown": {}}.items():
         for number in outputs:
             Xml.SubElement(structure, name, {"valueReference": str(number), **known})

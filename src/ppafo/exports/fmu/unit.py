@@ -19,7 +19,7 @@ from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.files import library_files
-from ppafo.exports.c_library.plant import EXAMPLE
+from ppafo.exports.c_library.plant import EXAMPLE, follow_lines
 from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
 from ppafo.exports.fmu.interface import Interface
 from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, build, host_platform
@@ -37,6 +37,18 @@ _HEADERS = {
 _DESCRIBED = {2: description_of_fmi2, 3: description_of_fmi3}
 _CALLS = {2: ("fmi2.c", "fmi2_steps.c"), 3: ("fmi3.c",)}
 """Templates of the functions of FMI, by version."""
+_LOOP = (
+    "Outputs are samples taken every <code>run.output_interval</code>; the latest one is shown. Any "
+    "communication step is accepted. The run ends at <code>run.duration</code>; set a longer one before the start.",
+    "The controller reads them at its next sample, the plant one engine step later. If the reference changes during "
+    "the run, the metrics of ramp and hold keep the times of the initial reference.",
+)
+_PLANT = (
+    "Inputs are read at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
+    "divides it further where its error asks for that. {motion} There is no stop time.",
+    "They take effect at the next communication step.",
+)
+"""Time stepping of a closed loop and of a plant, and when changed parameters take effect, for the page of the unit."""
 _NAME = b"trial"
 _CO_SIMULATION = 1
 """Instance type fmi2CoSimulation of FMI 2."""
@@ -174,13 +186,15 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     # The token is the hash of the sources before it stands in them.
     sources = {name: content.replace(b"@token@", token.encode()) for name, content in sources.items()}
     main = f"fmi{fmi}.c"
+    plant = interface.plant
+    time, tuning = _LOOP if plant is None else (_PLANT[0].format(motion=plant.drive.motion), _PLANT[1])
     trials = "".join(f"<tr><td>{name}</td><td>{platform.trial}</td></tr>" for name, platform in chosen.items())
     words = {
         "title": html.escape(interface.library.title),
         "description": html.escape(interface.library.description),
         "version": __version__,
-        "time": interface.time,
-        "tuning": interface.tuning,
+        "time": time,
+        "tuning": tuning,
         "binaries": trials or "<tr><td>none</td><td></td></tr>",
         "main": main,
         "flags": " ".join(FLAGS),
@@ -212,9 +226,8 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
 
 def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
     """Return the sources by name, with a placeholder for the token."""
-    library = interface.library
-    name = library.name
-    written = library_files(library)
+    library, plant = interface.library, interface.plant
+    name, written = library.name, library_files(library)
     paths = "\n".join(f'    "{setting.path}",' for setting in library.settings)
     words = {
         "name": name,
@@ -228,11 +241,16 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "first_inputs": ", ".join([*(repr(variable.start) for variable in interface.inputs), "0.0"]),
         "output_changes": "".join(variability_of(name)[0] for name in library.program.outputs),
         "token": "@token@",
-        "has_clock": "true" if interface.clock else "false",
+        "has_clock": "true" if plant is None else "false",
         "checked": "inertia, volumes and areas",
-        **interface.words,
     }
-    unit = "\n".join(filled(template("ppafo.exports.fmu", file), words) for file in ("unit.c", *interface.templates))
+    templates = ["stepped.c", "closed_loop.c"]
+    if plant is not None:
+        templates[1:] = ["plant_inputs.c", "plant.c"]
+        places = {variable.name: f"inputs[{index}]" for index, variable in enumerate(plant.inputs)}
+        words["inputs"], words["follow"] = ", ".join(places.values()), follow_lines(plant, "settings", places)
+        words["checked"] = "the limits of the inputs, inertia, volumes and areas"
+    unit = "\n".join(filled(template("ppafo.exports.fmu", file), words) for file in ("unit.c", *templates))
     headers = files("ppafo.exports.fmu").joinpath("headers")
     return {
         f"{name}.h": written[f"{name}.h"],

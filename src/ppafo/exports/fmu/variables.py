@@ -52,7 +52,7 @@ class FmuVariable:
 
 def tuning_of(interface: Interface, setting: ExportParameter) -> Tuning:
     """Return the access to a setting: hidden if no variable, tunable if changeable during the run, else fixed."""
-    if setting.path in interface.hidden:
+    if interface.plant is not None and setting.path in interface.plant.hidden:
         return "hidden"
     section, _, name = setting.path.rpartition(".")
     if section == "wearer" and name in TUNABLE_OF_WEARER:
