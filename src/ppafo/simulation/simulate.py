@@ -256,42 +256,46 @@ def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> 
 
 def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     """Result of a run from its outcome; a diverged run has the record up to its failure."""
-    rows = state_row_numbers(run)
-    times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
-    record = outcome.record[:, :, 0]
-    status = _status(outcome, record, rows, times)
-    # The first sample stays in any case: a recording is never empty.
-    kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
+    status, times = end_of(run, outcome)
     versions = {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
     engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
-    measure = partial(_measured, scenario, run, times[:kept], record[:kept], rows)
+    measure = partial(_measured, scenario, run, times, outcome.record)
     return Result(scenario, status, versions, engine, DeferredResult(measure))
 
 
-def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> RunMetrics:
-    """Recording and metrics of a run, from a record (samples, rows)."""
+def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats) -> RunMetrics:
+    """Recording and metrics of a run, from its record (samples, rows, 1) at times [s]."""
     from ppafo.metrics.metric import Metrics
 
-    by_path = {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
-    recording, metrics = scenario.motion.motion_kind.measured(scenario, run, times, by_path)
+    kind = scenario.motion.motion_kind
+    recording, metrics = kind.measured(scenario, run, times, rows_by_path(run, record[: times.size]))
     return RunMetrics(recording, Metrics(metrics))
 
 
-def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:
-    """Completed, or diverged with time, last good state and remedy."""
+def rows_by_path(run: Run, record: Floats) -> dict[str, Floats]:
+    """State rows (samples,) of a run by path, from its record (samples, rows, 1)."""
+    return {path: np.ascontiguousarray(record[:, row, 0]) for path, row in state_row_numbers(run).items()}
+
+
+def end_of(run: Run, outcome: BatchResult) -> tuple[Status, Floats]:
+    """Status of a run, with time, last good state and remedy if it diverged; and the times [s] of its samples."""
+    rows, record = state_row_numbers(run), outcome.record[:, :, 0]
+    times: Floats = np.arange(len(record), dtype=np.float64) * (run.step * run.record_every)
     failed = float(outcome.states[rows["result.failure_time"], 0])
     if failed >= NEVER_FAILED and bool(np.isfinite(outcome.states).all()):
-        return Status("completed", None, "completed")
+        return Status("completed", None, "completed"), times
     # Without a time of failure the last sample is the best that is known.
     time = failed if failed < NEVER_FAILED else float(times[-1])
     # The last sample before the failure: the one at it need not be finite.
-    last = record[max(0, int(np.searchsorted(times, time)) - 1)]
+    kept = int(np.searchsorted(times, time))
     state = ", ".join(
-        f"{name.replace('_', ' ')} {last[rows[f'state.{name}']]:.4g} {unit}"
+        f"{name.replace('_', ' ')} {record[max(0, kept - 1), rows[f'state.{name}']]:.4g} {unit}"
         for name, unit in (("angle", "rad"), ("angular_velocity", "rad/s"), ("mass_1", "kg"), ("mass_2", "kg"))
     )
     remedy = TOO_MANY_PARTS if outcome.states[rows["result.too_many_parts"], 0] else REMEDY
-    return Status("diverged", time, f"diverged at t = {time:.6g} s (before that: {state}); {remedy}")
+    message = f"diverged at t = {time:.6g} s (before that: {state}); {remedy}"
+    # The first sample stays in any case: a recording is never empty.
+    return Status("diverged", time, message), times[: max(1, kept)]
 
 
 def compile_models(scenarios: Iterable[Scenario]) -> None:

@@ -1,53 +1,127 @@
 """Evaluation of a simulated walk: status, recording, strides, averages and metrics from the rows of the engine."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ppafo.engine.lanes import BatchResult, Floats
-from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, state_row_numbers
-from ppafo.engine.step.lane import LaneResult
+from ppafo.engine.run import Run
 from ppafo.metrics import METRICS, evaluate
 from ppafo.metrics.metric import MetricKind, Metrics
 from ppafo.metrics.strides import SETTLING
+from ppafo.model.contact import SWING
+from ppafo.model.leg import LegParameters, passive_torque, torque_on_knee
+from ppafo.model.plant import PlantParameters
+from ppafo.signals import Recording
 from ppafo.signals.meter import LED_SHANK, REQUESTED
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import Status
+from ppafo.simulation.simulate import Status, end_of, rows_by_path
+from ppafo.simulation.vane_recording import device_channels, recording_of
 from ppafo.units.shown import in_units
-from ppafo.walking.bottle.course import SupplyCourse
+from ppafo.walking.bottle.course import UNITS, SupplyCourse
 from ppafo.walking.contradictions import check_no_bottle
+from ppafo.walking.gait_series import ankle_path
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of, requests_torque
-from ppafo.walking.recording import recording_of_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import mean_curves, per_stride, stride_starts, walk_metrics
 
-REMEDY = "the time step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
+_PHASE_ROW, _REQUEST_ROW = "controller_state.phase.phase", "controller_state.request.torque"
+"""Paths of the rows for gait phase and requested torque of a controller that has them."""
+
+
+def dorsiflexor_moment(leg: LegParameters, record: Mapping[str, Any]) -> Floats:
+    """Return the dorsiflexor moment [N m], at least 0, with which the wearer follows the measured ankle angle.
+
+    The moment is the ankle moment of the gait (measured in stance, from equation (11) in swing) minus the moment of
+    passive tissue and T_ex. The literature reports the activity of the tibialis anterior instead.
+    """
+    in_swing = record["walk.contact"] == SWING
+    needed = np.where(in_swing, record["walk.now.healthy_torque"], record["walk.now.moment"])
+    tissue = passive_torque(leg, record["walk.now.ankle"])
+    return np.asarray(np.maximum(tissue + record["walk.external_torque"] - needed, 0.0))
+
+
+def swing_knee_torque(leg: LegParameters, time: Floats, record: Mapping[str, Any]) -> Floats:
+    """Return the knee torque T_1 [N m] of equation (11) for the prescribed swing of shank and foot; 0 in stance.
+
+    In stance the torque depends on the horizontal ground reaction, which a gait file does not contain.
+    """
+    shank, rate = record["walk.now.shank"], record["state.angular_velocity"]
+    foot = shank - record["state.angle"] + 0.5 * np.pi
+    directions = np.sin(shank), np.cos(shank), np.sin(foot), np.cos(foot)
+    torque = torque_on_knee(
+        leg,
+        *directions,
+        record["walk.now.shank_rate"],
+        record["walk.now.shank_acceleration"],
+        rate,
+        # A walk that fails at once has one sample, and no acceleration is known of it.
+        np.gradient(rate, time) if len(time) > 1 else np.zeros_like(rate),
+        record["walk.now.knee_forward"],
+        record["walk.now.knee_up"],
+    )
+    return np.where(record["walk.contact"] == SWING, torque, 0.0)
+
+
+def recording_of_walk(
+    scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats], supply: SupplyCourse | None = None
+) -> Recording:
+    """Return the recording of a walk [SI] from its rows (samples,) by path at times [s]; ``supply`` is its bottle."""
+    walk, gait = run.walk, walk_of(scenario).gait
+    assert walk is not None, "a walk has a leg"
+    plant = run.plant if supply is None else _plant_on_bottle(run, time, supply)
+    path = ankle_path(gait, walk.timing, walk_of(scenario).wearer)
+    angle, rate, external = (record[row] for row in ("state.angle", "state.angular_velocity", "walk.external_torque"))
+    channels = device_channels(scenario.device.gas, replace(run, plant=plant), record)
+    channels |= {
+        "shank_angle": (record["walk.now.shank"], "rad"),
+        "healthy_angle": (record["walk.now.ankle"], "rad"),
+        "external_torque": (external, "N m"),
+        "device_power": (external * rate, "W"),
+        "swing_knee_torque": (swing_knee_torque(walk.leg, time, record), "N m"),
+        "toe_height": (path.toe_height(record["walk.now.phase"], record["walk.now.shank"], angle), "m"),
+        "contact": (record["walk.contact"], "-"),
+        "heel_force": (record["walk.heel_force"], "N"),
+        "toe_force": (record["walk.toe_force"], "N"),
+    }
+    if walk.leg.keeps_gait >= 0.5:
+        channels["dorsiflexor_moment"] = (dorsiflexor_moment(walk.leg, record), "N m")
+    if supply is not None:
+        # Interpolated linearly between the exchanges of bottle and device.
+        for name, values in supply.values.items():
+            channels[name] = (np.interp(time, supply.times, values), UNITS[name])
+        channels["bottle_mass"] = (supply.first.mass - record["line_state.regulated_mass"], "kg")
+    if _PHASE_ROW in record:
+        channels["controller_phase"] = (record[_PHASE_ROW], "-")
+    if _REQUEST_ROW in record:
+        channels["reference"] = (record[_REQUEST_ROW], "N m")
+    return recording_of(f"walk, {scenario.name}", run, time, channels)
+
+
+def _plant_on_bottle(run: Run, time: Floats, supply: SupplyCourse) -> PlantParameters:
+    """Return the plant with the gas product R T [J/kg] at each time [s], for the gas temperature of the bottle.
+
+    The temperature is constant between two exchanges of bottle and device.
+    """
+    exchanges = np.searchsorted(supply.times, time + 1.0e-9 * run.step, side="right") - 1
+    latest = np.minimum(np.maximum(exchanges, 0), supply.times.size - 2)
+    temperature = supply.values["gas_temperature"]
+    gas_product: Any = run.plant.gas_product * (temperature / temperature[0])[latest]
+    return run.plant._replace(gas_product=gas_product)
 
 
 def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: SupplyCourse | None) -> WalkResult:
     """Return the result of a walk from the outcome of its run, up to a divergence; ``supply`` is its bottle."""
-    rows = state_row_numbers(run)
-    failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
-    status = status_of_walk(failed, bool(too_many_parts), outcome.states)
+    status, time = end_of(run, outcome)
     if status.is_completed and supply is not None and supply.ending.time < run.step * (run.step_count - 0.5):
         ended, whole = supply.ending, scenario.run.duration
         status = Status("ended early", ended.time, f"ended after {ended.time:.6g} of {whole:.6g} s: {ended.message}")
-    time = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
-    # A recording has at least one sample, also of a walk that fails at once.
-    end = time.size if status.time is None else max(int(np.searchsorted(time, status.time)), 1)
-    record = {name: outcome.record[:end, row, 0] for name, row in rows.items()}
-    return _evaluated(scenario, run, time[:end], record, status, supply)
-
-
-def status_of_walk(failed: float, too_many_parts: bool, states: Floats) -> Status:
-    """Return the status of a walk from its time of failure [s], if any, and its last states."""
-    if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
-        return Status("completed", None, "completed")
-    # A last state that is not finite, without a time of failure, discards the whole walk.
-    time = failed if failed < NEVER_FAILED else 0.0
-    remedy = TOO_MANY_PARTS if too_many_parts else REMEDY
-    return Status("diverged", time, f"diverged at t = {time:.6g} s; {remedy}")
+        time = time[: max(int(np.searchsorted(time, ended.time)), 1)]
+    return _evaluated(scenario, run, time, rows_by_path(run, outcome.record[: time.size]), status, supply)
 
 
 @in_units(lambda scenario, *_: scenario.device.shown)
