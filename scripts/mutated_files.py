@@ -20,7 +20,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import ppafo
-from ppafo.cli.verbs.device import sets_audit
+from ppafo.cli.verbs import sets_audit
 from ppafo.errors import PpafoError
 from ppafo.storage import read_stored
 from ppafo.storage.reading import read_recording

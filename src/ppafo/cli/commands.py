@@ -10,9 +10,8 @@ from ppafo.kinds import Kinds, is_installed, package_of
 from ppafo.plugins import name_modules_in
 from ppafo.wording import known_names
 
-_ANALYSES, _BENCH, _DEVICE = "ppafo.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
-_EXPORTS, _WALKING = "ppafo.cli.verbs.exports", "ppafo.cli.verbs.walking"
-_SETS, _GAITS = f"{_DEVICE}:sets_list", f"{_WALKING}:gait_list"
+_ANALYSES, _VERBS = "ppafo.analyses", "ppafo.cli.verbs"
+_SETS, _GAITS = f"{_VERBS}:sets_list", f"{_VERBS}:gait_list"
 _STUDIES = "ppafo.studies.loading:STUDY_FILES", "ppafo.analyses.study_results:studies_of_the_package"
 
 
@@ -37,9 +36,9 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "sets": CommandGroup(
             "list, show and audit parameter sets",
             {
-                "list": Command(f"{_DEVICE}:sets_list"),
-                "show": Command(f"{_DEVICE}:sets_show", listing=_SETS),
-                "audit": Command(f"{_DEVICE}:sets_audit", listing=_SETS),
+                "list": Command(f"{_VERBS}:sets_list"),
+                "show": Command(f"{_VERBS}:sets_show", listing=_SETS),
+                "audit": Command(f"{_VERBS}:sets_audit", listing=_SETS),
             },
         ),
     },
@@ -47,7 +46,7 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "rig": CommandGroup(
             "record synthetic data on the simulated test bench",
             {
-                "simulate": Command(f"{_BENCH}:rig_simulate", listing=f"{_BENCH}:list_rig", listed="experiment"),
+                "simulate": Command(f"{_VERBS}:rig_simulate", listing=f"{_VERBS}:list_rig", listed="experiment"),
             },
         ),
         "identify": Command(
@@ -102,10 +101,10 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "gait": CommandGroup(
             "list, show and import gaits",
             {
-                "list": Command(f"{_WALKING}:gait_list"),
-                "show": Command(f"{_WALKING}:gait_show", listing=_GAITS),
-                "import": Command(f"{_WALKING}:gait_import"),
-                "record": Command(f"{_WALKING}:gait_record", listing=_GAITS),
+                "list": Command(f"{_VERBS}:gait_list"),
+                "show": Command(f"{_VERBS}:gait_show", listing=_GAITS),
+                "import": Command(f"{_VERBS}:gait_import"),
+                "record": Command(f"{_VERBS}:gait_record", listing=_GAITS),
             },
         ),
         "walk": Command(
@@ -119,9 +118,9 @@ _ALL_HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
         "export": CommandGroup(
             "write a scenario or a walk for other tools: C, an FMU, OpenSim, firmware; figures of a result",
             {
-                "c": _of_scenario(f"{_EXPORTS}:export_c"),
+                "c": _of_scenario(f"{_VERBS}:export_c"),
                 "firmware": _of_scenario("ppafo.processor.commands:export_firmware"),
-                "fmu": _of_scenario(f"{_EXPORTS}:export_fmu"),
+                "fmu": _of_scenario(f"{_VERBS}:export_fmu"),
                 "opensim": Command("ppafo.cli.opensim:export_opensim", library="ppafo.walking.loading:FILE"),
                 "figure": Command("ppafo.cli.figure:export_figure"),
             },

@@ -40,8 +40,7 @@ from ppafo.parameters.parameter_set import (
     with_followers,
 )
 from ppafo.signals.recording import Recording
-from ppafo.simulation.recorded.misread_units import misread_units
-from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit, misread_units
 from ppafo.units import from_si, split_pressure_kind
 from ppafo.units.spelling import molar_mass_in
 from ppafo.wording import known_names, percentage, said_missing

@@ -12,7 +12,7 @@ from ppafo.processor.fixed_point import SETTINGS, ConverterCounts, ConverterLimi
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.processor.torque_laws.on_off import DEAD_ZONE, ON_OFF
 from ppafo.processor.torque_laws.pid import PID
-from ppafo.simulation.nominal import converter_range
+from ppafo.simulation.default_gains import converter_range
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 

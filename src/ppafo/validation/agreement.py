@@ -11,8 +11,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.faults import correlated_noise_of, noise_of, resolution_of
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded.channels import DORSIFLEXION_SUPPLY, SUPPLY
-from ppafo.simulation.recorded.clock import regular_interval
+from ppafo.simulation.recorded.channels import DORSIFLEXION_SUPPLY, SUPPLY, regular_interval
 from ppafo.simulation.recorded.replay import with_fixed_volume
 from ppafo.simulation.recorded.rest import start_of
 from ppafo.units.shown import in_units, shown_text

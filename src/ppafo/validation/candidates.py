@@ -13,12 +13,12 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
-from ppafo.simulation.recorded.misread_units import misread_units
 from ppafo.simulation.recorded.usual_errors import (
     ANGLE_ERRORS,
     PRESSURE_ERRORS,
     SUPPLY_ERROR,
     SensorErrors,
+    misread_units,
     usual_errors,
 )
 from ppafo.units.shown import shown_in, shown_unit, shown_value

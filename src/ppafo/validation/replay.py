@@ -15,8 +15,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
-from ppafo.simulation.recorded.clock import sample_period
+from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY, sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_highest_supply, with_prescribed_angle
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
 from ppafo.simulation.recorded.rest import ReplayStart

@@ -3,7 +3,7 @@
 import pytest
 
 from ppafo.errors import ProgramError
-from ppafo.exports.c_library.expected import expected_csv
+from ppafo.exports.c_library.files import expected_csv
 from ppafo.exports.fmu import unit
 from ppafo.exports.fmu.interface import closed_loop, plant_alone
 from ppafo.exports.fmu.platforms import host_platform

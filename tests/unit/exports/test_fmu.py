@@ -16,10 +16,9 @@ import pytest
 import ppafo.cli
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
-from ppafo.exports.fmu.interface import closed_loop
+from ppafo.exports.fmu.interface import FIXED_NAMES, closed_loop
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
-from ppafo.exports.fmu.variables import FIXED_NAMES
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from scripts.instances import Instance, growth_of

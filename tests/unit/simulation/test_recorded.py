@@ -9,7 +9,7 @@ from ppafo.errors import DataError
 from ppafo.parameters import load_device
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.clock import regular_interval, sample_period
+from ppafo.simulation.recorded.channels import regular_interval, sample_period
 from ppafo.simulation.recorded.inputs import (
     RecordedInputs,
     between_stops,

@@ -8,12 +8,10 @@ from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.conditions import RULES_OF_TIMES, choosing, other_samples, other_supply
 from ppafo.exports.c_library.entries import check_entry, follow_entry, prepare_entry
-from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import exported
-from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.files import expected_csv, library_files
 from ppafo.exports.c_library.library import Library, Switch, c_identifier
-from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation
-from ppafo.exports.c_library.profile_rules import PROFILE_RULES, WALK_RULES, has_rules
+from ppafo.exports.c_library.preparation import PROFILE_RULES, VANE_PREPARATION, WALK_RULES, Preparation, has_rules
 from ppafo.exports.c_library.readme import words_of
 from ppafo.exports.c_library.settings import links_of, relations_of, relations_of_vane, rules_of_table, settings_of
 from ppafo.model.catalog import ordered_effects

@@ -14,8 +14,8 @@ from ppafo.errors import ProgramError
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
 from ppafo.exports.c_library.preparation import Preparation
+from ppafo.exports.c_library.program import given
 from ppafo.exports.c_library.settings import numbers_of_second_chamber
-from ppafo.exports.c_library.structs import given
 from ppafo.model.declaration import PlainFunction
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Link
 from ppafo.simulation.numbers import number_at

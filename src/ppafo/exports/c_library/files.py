@@ -11,7 +11,9 @@ from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.conditions import conditions_of_program, limits_in_c
 from ppafo.exports.c_library.library import Library
 from ppafo.exports.c_library.program import c_text_of_run
+from ppafo.running import simulate
 from ppafo.signals import CHANNELS
+from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
 
 _FOLDER = "ppafo.exports.c_library"
@@ -44,6 +46,24 @@ static bool is_whole(double count)
     return fabs(count - floor(count + 0.5)) <= 1.0e-9 * count;
 }
 """
+MOST_ROWS = 1000
+"""Maximum number of samples in the table; of a longer run every second, third, ... sample and the last."""
+
+
+def expected_csv(scenario: Scenario, channels: Iterable[str], metrics: Iterable[str] = ()) -> bytes:
+    """Return samples of a run as CSV in SI units with 17 digits, then its metrics as ``# name = value``.
+
+    Channels and metrics missing in the recording are left out, as are all metrics of a failed run.
+    """
+    result = simulate(scenario)
+    recording = result.recording
+    names = [name for name in channels if name in recording.names]
+    columns = [recording.time, *(recording[name] for name in names)]
+    last = len(recording) - 1
+    samples = [*range(0, last, math.ceil(last / MOST_ROWS) or 1), last]
+    rows = (",".join(f"{column[sample]:.17g}" for column in columns) for sample in samples)
+    values = (f"# {name} = {result.metrics[name].value:.17g}" for name in metrics if name in result.metrics)
+    return "\n".join([",".join(["time", *names]), *rows, *values, ""]).encode()
 
 
 def library_files(library: Library) -> dict[str, bytes]:

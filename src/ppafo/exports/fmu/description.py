@@ -4,8 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 from xml.etree import ElementTree as Xml
 
-from ppafo.exports.fmu.interface import Interface
-from ppafo.exports.fmu.variables import FmuVariable, variables_of
+from ppafo.exports.fmu.interface import FmuVariable, Interface, variables_of
 from ppafo.units import base_value
 from ppafo.units.spelling import read_unit
 from ppafo.version import __version__

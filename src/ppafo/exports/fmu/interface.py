@@ -1,11 +1,36 @@
-"""Interface of an FMU: the closed loop without inputs, or the plant alone, driven by the importing tool."""
+"""Interface of an FMU, closed loop or plant driven by the importing tool, and its variables."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.library import Library
+from ppafo.exports.c_library.files import OUTPUTS
+from ppafo.exports.c_library.library import ExportParameter, Library
 from ppafo.exports.c_library.plant import Input, PlantAlone, half_open, plant_of
+from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.scenario import Scenario
+
+Tuning = Literal["hidden", "tunable", "fixed"]
+"""Access to a setting: not a variable, a parameter tunable during the run, or a fixed one."""
+Variability = Literal["discrete", "continuous"]
+"""Variability of an output in terms of FMI: discrete between samples, or continuous."""
+
+FIXED_SECTIONS = ("run", "initial", "gas", "actuator", "foot_plate", "wearer", "motion", "motion.profile")
+"""Sections of settings used only at the start of a run, which cannot change during the run."""
+FIXED_NAMES = ("period", "delay", "seed")
+"""Names of further settings that cannot change during a run: they determine step counts or seed the noise."""
+TUNABLE_OF_WEARER = ("residual_share", "ankle_stiffness", "ankle_rest_angle", "ankle_damping")
+"""Settings of the wearer that may change during a run, unlike the weight of a leg."""
+STEPPED = (
+    "command",
+    *(kind.reference for kind in CONTROLLED.values()),
+    "strides",
+    "contact",
+    "controller_phase",
+)
+"""Outputs that change only at samples."""
+_LARGEST_LIMIT = 1.0e308
+"""Magnitude above which a limit counts as no limit, since XML would contain the largest floats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,3 +68,71 @@ def plant_alone(scenario: Scenario) -> Interface:
     """
     plant = plant_of(scenario)
     return Interface(plant.library, half_open(scenario), plant.step, scenario.run.duration, plant)
+
+
+@dataclass(frozen=True, slots=True)
+class FmuVariable:
+    """Variable of an FMU: name, number, unit and meaning; ``causality`` and ``variability`` in terms of FMI.
+
+    ``start`` is None for a calculated variable, ``minimum`` and ``maximum`` None for no limit; all three are in
+    ``unit``.
+    """
+
+    name: str
+    number: int
+    unit: str
+    summary: str
+    causality: str
+    variability: str
+    start: float | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+def tuning_of(interface: Interface, setting: ExportParameter) -> Tuning:
+    """Return the access to a setting: hidden if no variable, tunable if changeable during the run, else fixed."""
+    if interface.plant is not None and setting.path in interface.plant.hidden:
+        return "hidden"
+    section, _, name = setting.path.rpartition(".")
+    if section == "wearer" and name in TUNABLE_OF_WEARER:
+        return "tunable"
+    return "fixed" if section in FIXED_SECTIONS or name in FIXED_NAMES else "tunable"
+
+
+def variability_of(output: str) -> Variability:
+    """Return ``discrete`` for an output that changes only at samples, ``continuous`` for any other."""
+    return "discrete" if output in STEPPED else "continuous"
+
+
+def variables_of(interface: Interface) -> tuple[FmuVariable, ...]:
+    """Return all variables in the order of their numbers: settings, outputs, metrics, inputs.
+
+    The C code uses the same numbers; these also count hidden settings.
+    """
+    library, program = interface.library, interface.library.program
+    variables = []
+    for number, setting in enumerate(library.settings):
+        tuning, quantity = tuning_of(interface, setting), setting.quantity
+        if tuning != "hidden":
+            ends = (quantity.minimum, quantity.maximum)
+            limits = (limit if abs(limit) < _LARGEST_LIMIT else None for limit in ends)
+            meaning = library.worded(quantity.summary or quantity.name)
+            variables.append(
+                FmuVariable(setting.path, number, quantity.unit, meaning, "parameter", tuning, setting.value, *limits)
+            )
+    first_output = len(library.settings)
+    for number, name in enumerate(program.outputs, start=first_output):
+        unit, summary = OUTPUTS[name]
+        variables.append(FmuVariable(name, number, unit, library.worded(summary), "output", variability_of(name)))
+    first_metric = first_output + len(program.outputs)
+    for number, metric in enumerate(program.metrics, start=first_metric):
+        variables.append(
+            FmuVariable(
+                f"metrics.{metric.name}", number, metric.unit, library.worded(metric.summary), "local", "continuous"
+            )
+        )
+    for number, item in enumerate(interface.inputs, start=first_metric + len(program.metrics)):
+        values = item.start, item.minimum, item.maximum
+        meaning = library.worded(item.summary)
+        variables.append(FmuVariable(item.name, number, item.unit, meaning, "input", "continuous", *values))
+    return tuple(variables)

@@ -17,13 +17,11 @@ from typing import Any, final
 
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, template
-from ppafo.exports.c_library.expected import expected_csv
-from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.files import expected_csv, library_files
 from ppafo.exports.c_library.plant import EXAMPLE, follow_lines
 from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
-from ppafo.exports.fmu.interface import Interface
+from ppafo.exports.fmu.interface import Interface, tuning_of, variability_of, variables_of
 from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, build, host_platform
-from ppafo.exports.fmu.variables import tuning_of, variability_of, variables_of
 from ppafo.storage.files import temporary_folder
 from ppafo.version import __version__
 from ppafo.wording import argument_text, known_names

@@ -32,8 +32,9 @@ from ppafo.simulation.recorded.channels import (
     check_absolute,
     check_command,
     check_gaps,
+    regular_interval,
+    sample_period,
 )
-from ppafo.simulation.recorded.clock import regular_interval, sample_period
 from ppafo.simulation.recorded.inputs import between_stops, supply_paths, with_highest_supply
 from ppafo.simulation.recorded.rest import value_at_rest
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit

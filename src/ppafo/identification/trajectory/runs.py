@@ -39,8 +39,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.effects import switches_of
 from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY
-from ppafo.simulation.recorded.clock import sample_period
+from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY, sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_prescribed_angle
 from ppafo.simulation.scenario import FreeMotion, Scenario
 

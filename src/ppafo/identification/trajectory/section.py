@@ -41,8 +41,7 @@ from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.progress import Report
 from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.recorded.channels import ANGLE, COMMAND
-from ppafo.simulation.recorded.clock import LONGEST_STEP
+from ppafo.simulation.recorded.channels import ANGLE, COMMAND, LONGEST_STEP
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_fixed_volume
 from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit

@@ -1,10 +1,11 @@
-"""Channels of a recording that a run takes as inputs, and checks that these inputs are known."""
+"""Channels of a recording that a run takes as inputs, checks that these are known, and the clock of their samples."""
 
 import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.signals import Recording
 from ppafo.signals.faults import longest_gap
+from ppafo.signals.recording import Floats
 
 COMMAND, SUPPLY, EXTERNAL_TORQUE = "command", "supply_pressure", "external_torque"
 """Valve command [-], supply pressure [Pa absolute], external torque on the vane [N m]."""
@@ -17,6 +18,12 @@ PRESSURES = ("pressure_1", "pressure_2", SUPPLY, DORSIFLEXION_SUPPLY)
 
 LONGEST_GAP = 0.05
 """Longest gap without samples [s] for which the inputs count as known."""
+LONGEST_STEP = 1.0e-3
+"""Averaging time of a recorded pressure or torque, and longest step of a replay [s]."""
+SHORTEST_SAMPLE = 1.0e-4
+"""Smallest interval of the grid to which irregular samples are assigned [s]."""
+_IRREGULARITY = 0.02
+"""Largest deviation of a time from a regular grid, as a fraction of the interval; clocks write rounded times."""
 _COMMAND_TOLERANCE = 1.0e-6
 """Command [-] beyond full opening that counts as rounding in a file."""
 _SMALLEST_ABSOLUTE = 0.3
@@ -56,3 +63,16 @@ def check_absolute(recording: Recording, atmosphere: float, file: str) -> None:
                 f"{file}: '{name}' is {recording[name][lowest]:.6g} Pa absolute at {recording.time[lowest]:.6g} s "
                 f"(sample {lowest + 1}), far below atmospheric pressure; is it a gauge pressure ('{name} [psi_g]')?"
             )
+
+
+def regular_interval(time: Floats) -> float | None:
+    """Return the sample interval [s] of regular samples, else None; ``time`` [s] has at least two samples."""
+    interval = float(time[-1] - time[0]) / (time.size - 1)
+    offsets = time - time[0] - interval * np.arange(time.size)
+    return interval if float(np.abs(offsets).max()) < _IRREGULARITY * interval else None
+
+
+def sample_period(time: Floats) -> float:
+    """Return the sample interval [s], or the interval of the grid to which irregular samples are assigned."""
+    shortest = min(max(float(np.diff(time).min()), SHORTEST_SAMPLE), LONGEST_STEP)
+    return regular_interval(time) or shortest

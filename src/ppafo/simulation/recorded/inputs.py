@@ -11,8 +11,14 @@ from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats, between_samples
-from ppafo.simulation.recorded.channels import ANGLE, COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
-from ppafo.simulation.recorded.clock import LONGEST_STEP
+from ppafo.simulation.recorded.channels import (
+    ANGLE,
+    COMMAND,
+    DORSIFLEXION_SUPPLY,
+    EXTERNAL_TORQUE,
+    LONGEST_STEP,
+    SUPPLY,
+)
 
 _BEYOND_STOPS = 0.05
 """Largest excess of a measured angle over a stop, as a fraction of the range; it is then limited to the stop."""

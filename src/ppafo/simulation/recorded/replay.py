@@ -4,8 +4,7 @@ from dataclasses import replace
 
 from ppafo.parameters.device import VANE, Device, Orifice
 from ppafo.signals import Recording
-from ppafo.simulation.recorded.channels import ANGLE
-from ppafo.simulation.recorded.clock import LONGEST_STEP, sample_period
+from ppafo.simulation.recorded.channels import ANGLE, LONGEST_STEP, sample_period
 from ppafo.simulation.recorded.rest import ReplayStart
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,

@@ -1,1 +1,0 @@
-"""Command functions: typed and documented, with implementations imported only when called."""
