@@ -37,8 +37,7 @@ from ppafo.parameters.parameter_set import (
     written_units,
 )
 from ppafo.units import SI, split_number
-from ppafo.units.shown import shown_text
-from ppafo.wording import known_names, name_in_data_sheets, nearest_name, one_line, override_text
+from ppafo.wording import known_names, nearest_name, one_line
 
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]
@@ -245,7 +244,7 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
         allowed = [*declared, SPECIES_PATH, RELIEVING_PATH]
         if override.typed.startswith(CHOSEN_VALVE):
             allowed = [one_path(known, path.split(".")[1]) for known in allowed]
-        hint = _nearest_value(override, allowed) + _as_in_sets(override, allowed)
+        hint = _nearest_value(override, allowed)
         raise ParameterError(f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}")
     with refused_as(ParameterError, f"override '{override}'", UnitError):
         value, unit = split_number(override.text)
@@ -271,23 +270,6 @@ def _nearest_value(override: Override, allowed: Sequence[str]) -> str:
     hint = nearest_name(override.typed.removeprefix(f"{section}."), near).replace("'", f"'{section}.", 1)
     # Nothing is spelt alike: values of the same section stand for what there is.
     return hint or (f"; '{section}' has {', '.join(near)}" if near else nearest_name(override.typed, allowed))
-
-
-def _as_in_sets(override: Override, allowed: Sequence[str]) -> str:
-    """Return a note with the settings equivalent to a number of a valve's data sheet; empty for other values."""
-    section, _, word = override.typed.rpartition(".")
-    name = name_in_data_sheets(word)
-    target = f"{section}.{'area' if name == 'diameter' else 'sonic_conductance'}"
-    if name not in ("cv", "kv", "qn", "c", "diameter") or target not in allowed:
-        return ""
-    from ppafo.parameters.flow_coefficients import USUAL_CRITICAL_RATIO, area_of, conductance_of  # few are given so
-
-    value = area_of(override.text) if name == "diameter" else conductance_of(name, override.text)
-    if value is None or value <= 0.0:
-        return ""
-    forms = [f"{target}={shown_text(value, 'm^2' if name == 'diameter' else 'm^3/(s Pa)', '.4g')}"]
-    forms += [] if name == "diameter" else [f"{section}.critical_ratio={USUAL_CRITICAL_RATIO:g}"]
-    return f": {override_text(forms)}"
 
 
 def _with_species(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
