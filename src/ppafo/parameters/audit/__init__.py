@@ -18,9 +18,8 @@ from ppafo.parameters.audit.chambers import (
 from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.audit.choked_flow import check_choked_flow
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, NamedValue, Severity
-from ppafo.parameters.audit.flow import check_flow, check_sonic_flow
 from ppafo.parameters.audit.inertia import check_inertia
-from ppafo.parameters.audit.orifices import check_bores, check_orifices
+from ppafo.parameters.audit.orifices import check_bores, check_flow, check_orifices
 from ppafo.parameters.audit.torque import check_published_torque, check_torque_ceiling, check_vacuum
 from ppafo.parameters.audit.values import (
     check_contradictions,
@@ -47,7 +46,6 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
     "bores": check_bores,
     "choked flow": check_choked_flow,
     "flow": check_flow,
-    "sonic flow": check_sonic_flow,
     "inertia": check_inertia,
     "virtual work": check_virtual_work,
     "volumes": check_volumes,
@@ -91,7 +89,7 @@ def findings_of(audited: ParameterSet, parent: ParameterSet | None = None) -> li
             id="idle-acceptance",
             severity="warning",
             title=f"the set accepts '{name}', which does not exist",
-            paragraph=f"There is no finding '{name}'. Remove the entry from the set; its reason is: {why}",
+            why=f"Its reason is: {why}",
         )
         for name, why in idle.items()
     ]

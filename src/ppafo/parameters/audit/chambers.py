@@ -32,11 +32,7 @@ def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
             title="torque constant and displacement per radian agree with the stated efficiency",
             values=evidence.values_of(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN, _EFFICIENCY),
             sides=(ComparedNumber("torque constant over displacement per radian", ratio, ""),),
-            paragraph=(
-                f"Energy is balanced: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
-                f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model uses the same ratio when the shaft "
-                "compresses the gas, although a real loss then has the opposite sign."
-            ),
+            why="The rest is the stated loss; where the shaft compresses the gas, the model has its opposite.",
         )
     elif abs(numbers[1] / numbers[0] - 1.0) > _TOLERANCE:
         torque_constant, displacement_per_radian = numbers
@@ -51,15 +47,10 @@ def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("displacement per radian", displacement_per_radian, "m^3/rad"),
                 *gas_sides,
             ),
-            paragraph=(
-                "A vane that turns by dtheta does the work T dtheta = (P1 - P2) dV before friction, so the torque "
-                f"constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
-                f"{1e6 * displacement_per_radian:.4g} cm^3/rad should be equal; the displacement is "
-                f"{displacement_per_radian / torque_constant:.2g} times the torque constant. In the model "
-                f"the shaft gets {100.0 * torque_constant / displacement_per_radian:.3g} % of the work p dV of the "
-                f"gas; the rest is lost without a cause, since friction is modelled separately.{gas_text} Remove "
-                f"{_DISPLACEMENT_PER_RADIAN}, which then follows the torque constant, or measure the volume displaced "
-                "over the range. Until then, energy and gas use are uncertain by the same factor."
+            why=(
+                "By virtual work, T dtheta = (P1 - P2) dV, both are equal. In the model the shaft gets "
+                f"{100.0 * torque_constant / displacement_per_radian:.3g} % of the work p dV of the gas; the rest is "
+                f"lost without a cause; energy and gas use are uncertain by the same factor.{gas_text}"
             ),
         )
 
@@ -76,16 +67,12 @@ def _gas_use(
     used, turn = evidence.number(path) or 0.0, abs(angles[3] - angles[1])
     needed, by_torque, by_volume = used / density, torque_constant * turn, displacement_per_radian * turn
     sides = (
+        ComparedNumber("gas that fills a volume from atmosphere to supply", density, "kg/m^3"),
         ComparedNumber("volume that the gas use needs", needed, "m^3"),
         ComparedNumber("volume swept by the torque constant", by_torque, "m^3"),
         ComparedNumber("volume swept by the displacement per radian", by_volume, "m^3"),
     )
-    text = (
-        f" Filling 1 cm^3 from atmosphere to supply takes {density:.3g} mg of gas, so the "
-        f"{evidence.in_set_unit(path, used)} of one filling occupy {1e6 * needed:.3g} cm^3; over the whole range the "
-        f"vane sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the "
-        "displacement per radian; lines and clearance contain a part of that gas."
-    )
+    text = " Lines and clearance contain a part of the gas of one filling."
     return (path, _SUPPLY, angles[0], angles[2]), sides, text
 
 
@@ -126,12 +113,7 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
             ComparedNumber("smallest sufficient dead volume", -slope * travel, "m^3"),
             ComparedNumber("part of the range with no volume", empty / turn if turn else 1.0, ""),
         ),
-        paragraph=(
-            f"At {end} the volume of chamber {chamber} is {1e6 * smallest:.3g} cm^3; it is not positive over the last "
-            f"{math.degrees(empty):.3g} deg of the range of {math.degrees(turn):.3g} deg. Count the volume from the "
-            f"end of the range ({stop_path} = {end}) with a dead volume for line and clearance, or give a dead volume "
-            f"of more than {-1e6 * slope * travel:.3g} cm^3."
-        ),
+        why=f"The end of the range is {end_path} = {end}.",
     )
 
 
@@ -157,11 +139,7 @@ def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
             ComparedNumber("range of angles", turn, "rad"),
             ComparedNumber("rotation by the designation", rated, "rad"),
         ),
-        paragraph=(
-            f"The range of angles is {math.degrees(turn):.3g} deg, the rated rotation is {math.degrees(rated):.3g} "
-            "deg. Either another actuator or a gear was used, or the angle is not measured at the vane; volumes and "
-            "torque constant then belong to another shaft. Check the designation of the actuator in use."
-        ),
+        why="Another actuator or a gear was used, or the angle is not measured at the vane.",
     )
 
 
@@ -185,12 +163,8 @@ def check_stroke(evidence: Evidence) -> Iterator[AuditFinding]:
         sides=(
             ComparedNumber("distance of the pins at the lower stop", shortest, "m"),
             ComparedNumber("distance of the pins at the upper stop", longest, "m"),
-        ),
-        paragraph=(
-            f"The pins of the cylinder are {1e3 * shortest:.4g} mm apart at the lower stop and {1e3 * longest:.4g} mm "
-            "at the upper stop: the retracted length must not exceed the first distance, and the extended length must "
-            f"reach the second. The lever arm is {1e3 * first_arm:.3g} mm at the lower stop and {1e3 * last_arm:.3g} "
-            "mm at the upper stop."
+            ComparedNumber("lever arm at the lower stop", first_arm, "m"),
+            ComparedNumber("lever arm at the upper stop", last_arm, "m"),
         ),
     )
 
@@ -227,13 +201,7 @@ def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
             ComparedNumber("measured gas", used, "kg"),
             ComparedNumber("volume of chamber 1 in the middle of the range", volume, "m^3"),
         ),
-        paragraph=(
-            f"In the middle of the range chamber 1 has {1e6 * volume:.3g} cm^3, dead volume included, and takes "
-            f"{evidence.in_set_unit(path, filled)} of gas from atmospheric to supply pressure; measured are "
-            f"{evidence.in_set_unit(path, used)}, which include leakage across the vane. The division "
-            "into swept and dead volume does not affect this check."
-            f"{'' if agrees else f' Consistent would be {least}, or a task with several fillings.'}"
-        ),
+        why="" if agrees else f"Consistent would be {least}, or a task with several fillings.",
     )
 
 
@@ -253,7 +221,7 @@ def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
 
     rounding = rounding_of_table(path)
     if rounding.move > 0.0:
-        digit, move, share = 1e6 * rounding.resolution, 1e6 * rounding.move, 2.0 * rounding.torque_error
+        share = 2.0 * rounding.torque_error
         yield AuditFinding(
             id="rounded-table",
             severity="note" if rounding.torque_error < _FELT_TORQUE else "warning",
@@ -263,10 +231,5 @@ def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("last digit", rounding.resolution, "m^3"),
                 ComparedNumber("relative standard deviation of the torque", rounding.torque_error, "1"),
             ),
-            paragraph=(
-                f"The volumes of {parameter_set.actuator_file} are rounded to {digit:.2g} mL. Half a digit "
-                f"either way leaves up to {share:.1%} of the largest torque unknown (two standard deviations). They "
-                f"were moved by {move:.2g} mL at most, to curves that are smooth, nowhere negative, and grow with the "
-                "pressure. Give more digits to avoid this."
-            ),
+            why="Half a digit either way leaves the torque unknown by two standard deviations; the volumes were moved.",
         )

@@ -43,8 +43,6 @@ def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
             continue
         agrees = digits.low * (1.0 - _ROUNDING) <= value <= digits.high * (1.0 + _ROUNDING)
         quantity = evidence.declared[path]
-        verdict = "agree to the reported digits" if agrees else f"differ by {100.0 * (reported / value - 1.0):+.2g} %"
-        remedy = "" if agrees else f" Use {value:.5g}, or other gas data."
         yield AuditFinding(
             id=path.rpartition(".")[2].replace("_", "-"),
             severity="note" if agrees else "error",
@@ -53,11 +51,6 @@ def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
             sides=(
                 ComparedNumber("reported", reported, quantity.unit),
                 ComparedNumber("from the gas data", value, quantity.unit),
-            ),
-            paragraph=(
-                f"The reported value is {evidence.in_set_unit(path, reported)}; the gas data give {value:.5g} "
-                f"{quantity.unit}".rstrip()
-                + f". The two {verdict}.{remedy}"
             ),
         )
     yield from _exponent(evidence, gas)
@@ -76,26 +69,18 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
     title = "the reported exponent in C1 is not the exponent of choked flow"
     if exponent is None:
         text = f"The formula '{formula}' is not an arithmetic expression in k; the correct exponent is (k + 1)/(k - 1)."
-        yield AuditFinding(id="choked-flow-exponent", severity="warning", title=title, values=values, paragraph=text)
+        yield AuditFinding(id="choked-flow-exponent", severity="warning", title=title, values=values, why=text)
         return
     # C1 contains the square root of the power, hence half the difference of the exponents.
     literal = correct * (2.0 / (k + 1.0)) ** (0.5 * (exponent - expected))
-    reported, agreement = evidence.number(_C1), ""
-    if reported is not None:
-        nearer = "second" if abs(reported - correct) < abs(reported - literal) else "first"
-        agreement = f", and the reported C1 of {reported:.4g} s/m is closer to the {nearer} value"
     yield AuditFinding(
         id="choked-flow-exponent",
         title=title,
         values=values,
         sides=(
+            ComparedNumber(f"reported exponent {formula}", exponent, ""),
             ComparedNumber("C1 with the reported exponent", literal, "s/m"),
             ComparedNumber("C1 with (k+1)/(k-1)", correct, "s/m"),
-        ),
-        paragraph=(
-            f"The reported exponent {formula} is {exponent:.4g} and gives C1 = {literal:.4g} s/m; the exponent "
-            f"(k + 1)/(k - 1) = {expected:.4g} gives {correct:.4g} s/m{agreement}. "
-            "Use the exponent (k + 1)/(k - 1)."
         ),
     )
 

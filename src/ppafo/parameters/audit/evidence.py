@@ -12,7 +12,7 @@ from ppafo.errors import UnitError
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import chamber_1_volume
-from ppafo.parameters.declaration import alternatives, is_within
+from ppafo.parameters.declaration import alternatives, fits, is_within
 from ppafo.parameters.device import Gas
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
@@ -46,8 +46,9 @@ class ComparedNumber:
 class AuditFinding:
     """Finding of an audit: a contradiction (error), a caveat for users of results (warning), or a passed check (note).
 
-    ``paragraph`` says in words what was compared and what would be consistent. ``accepted`` is the reason why the
-    author of the set keeps a contradiction; it lowers an error to a warning and is empty otherwise.
+    ``sides`` are the numbers compared and those that would be consistent, ``why`` says in words what they leave open.
+    ``accepted`` is the reason why the author of the set keeps a contradiction; it lowers an error to a warning and is
+    empty otherwise.
     """
 
     id: str
@@ -55,12 +56,23 @@ class AuditFinding:
     title: str
     values: tuple[NamedValue, ...] = ()
     sides: tuple[ComparedNumber, ...] = ()
-    paragraph: str
+    why: str = ""
     accepted: str = ""
+
+    @property
+    def paragraph(self) -> str:
+        """The compared numbers in words, in units of the values where they fit, and the reason."""
+        units = [value.unit for value in self.values]
+        numbers = []
+        for side in (side for side in self.sides if math.isfinite(side.value)):
+            unit = next((unit for unit in units if fits(unit, side.unit)), shown_unit(side.unit))
+            unit = "" if unit == "1" else unit
+            numbers.append(f"{side.label}: {from_si(side.value, unit, side.unit):.4g} {unit}".rstrip())
+        return " ".join(filter(None, (f"{'; '.join(numbers)}." if numbers else "", self.why)))
 
     def document(self) -> dict[str, Any]:
         """Return the finding as plain data for JSON; infinite numbers become null."""
-        plain = asdict(self)
+        plain = {**asdict(self), "paragraph": self.paragraph}
         for side in plain["sides"]:
             side["value"] = side["value"] if math.isfinite(side["value"]) else None
         return plain

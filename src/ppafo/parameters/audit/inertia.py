@@ -33,7 +33,7 @@ def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
         inertias.append(reported.over(rate))
         stated, number = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
         expected, needed = stated * _middle(rate), number / _middle(rate)
-        ratio, unit = evidence.values_of(rate_path)[0], evidence.declared[product].unit
+        unit = evidence.declared[product].unit
         yield AuditFinding(
             id=f"{name.replace(' ', '-')}-against-inertia",
             title=f"{name} is not the product of inertia and the reported ratio",
@@ -42,13 +42,6 @@ def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber(f"reported {name}", number, unit),
                 ComparedNumber("inertia times ratio", expected, unit),
                 ComparedNumber("inertia that would agree", needed, "kg m^2"),
-            ),
-            paragraph=(
-                f"Inertia {evidence.in_set_unit(_INERTIA, stated)} times {abs(float(ratio.value)):g} {ratio.unit} is "
-                f"{evidence.in_set_unit(product, expected)}, but the reported {name} is "
-                f"{evidence.in_set_unit(product, number)}: a factor of {number / expected:.3g}. Consistent would be an "
-                f"inertia of {evidence.in_set_unit(_INERTIA, needed)}, or a {name} of "
-                f"{evidence.in_set_unit(product, expected)}."
             ),
         )
     # Only if both products disagree with the reported inertia.
@@ -84,17 +77,10 @@ def _one_inertia(
     shifted = [reported * 10.0**shift for shift in _SHIFTS if common.low <= reported * 10.0**shift <= common.high]
     # A moved decimal point is the most likely error; otherwise the middle of the common range.
     reconciling = shifted[0] if shifted else _middle(common)
-    reconciling_text = evidence.in_set_unit(_INERTIA, reconciling)
-    slip = (
-        f" {reconciling_text} is the reported {evidence.in_set_unit(_INERTIA, reported)} with a shifted decimal point: "
-        "either the inertia or both products are wrong; measure the inertia to decide."
-        if shifted
-        else ""
-    )
     yield AuditFinding(
         id="one-inertia-for-both",
         severity="note",
-        title=f"damping and dynamic friction both agree with an inertia of {reconciling_text}",
+        title=f"damping and friction both agree with an inertia of {evidence.in_set_unit(_INERTIA, reconciling)}",
         values=evidence.values_of(_INERTIA, _DAMPING, _FRICTION, decay_path, _DECELERATION),
         sides=(
             ComparedNumber("reported inertia", reported, "kg m^2"),
@@ -102,8 +88,5 @@ def _one_inertia(
             ComparedNumber("lowest that agrees", common.low, "kg m^2"),
             ComparedNumber("highest that agrees", common.high, "kg m^2"),
         ),
-        paragraph=(
-            f"Within the reported digits, both products agree with any inertia from "
-            f"{evidence.in_set_unit(_INERTIA, common.low)} to {evidence.in_set_unit(_INERTIA, common.high)}.{slip}"
-        ),
+        why="The reported inertia with a shifted decimal point reconciles both." if shifted else "",
     )

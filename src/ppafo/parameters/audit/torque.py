@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from typing import cast
 
 from ppafo.errors import ParameterError
 from ppafo.model.gas import choked_flow_constant
@@ -29,36 +30,67 @@ _INTERVALS = 200
 """Number of pressure intervals in the integration of a filling time."""
 _ANGLES = 40
 """Number of angle intervals between the stops for an actuator's torque."""
-_LIMIT = "No valve or controller can follow a reference above this torque."
 
 
 def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield the torque ceiling for each supply: a note, a warning below the demand, an error below static friction."""
-    constant = evidence.number(_TORQUE_CONSTANT)
+    constant, atmosphere = evidence.number(_TORQUE_CONSTANT), evidence.atmosphere()
     supplies = {path: value for path in _SUPPLIES if (value := evidence.number(path)) is not None}
     if supplies and evidence.parameter_set.actuator_kind != VANE:
-        yield from _ceiling_by_angle(evidence)
-    if constant is None or constant <= 0.0 or not supplies:
+        sides, why = _ceilings_by_angle(evidence)
+    elif constant is not None and constant > 0.0:
+        ceilings = {path: constant * abs(value - atmosphere) for path, value in supplies.items()}
+        sides, why = tuple(ComparedNumber(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()), []
+    else:
         return
-    ceilings = {path: constant * abs(value - evidence.atmosphere()) for path, value in supplies.items()}
-    severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
-    # Torque constants are quoted per psi in the field, or per bar where the set has bar.
-    with shown_in(evidence.parameter_set.shown):
-        unit = shown_unit("Pa_d")
-    per_unit = evidence.torque(constant * to_si(1.0, unit, "Pa_d"), "#.3g")
-    pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
-    torques = (f"{evidence.torque(ceilings[path], '#.3g')} at {pressures[path]} ({path})" for path in supplies)
+    if not sides:
+        return
+    ceiling, needed = max(side.value for side in sides), 0.0
+    severity: Severity = "note"
+    for path, verdict in ((_DEMAND, "warning"), (_STATIC, "error")):
+        torque = evidence.number(path)
+        if torque is not None and (torque >= ceiling if path == _STATIC else torque > ceiling):
+            severity, needed = cast("Severity", verdict), torque
+    if constant:
+        # Torque constants are quoted per psi in the field, or per bar where the set has bar.
+        with shown_in(evidence.parameter_set.shown):
+            unit = shown_unit("Pa_d").removesuffix("_d")
+        why.append(
+            f"The torque constant is {evidence.torque(constant * to_si(1.0, f'{unit}_d', 'Pa_d'), '#.3g')}/{unit}."
+        )
+        if needed:
+            why.append(
+                f"{evidence.torque(needed)} need {from_si(needed / constant, f'{unit}_d', 'Pa_d'):.4g} {unit}_g."
+            )
     yield AuditFinding(
         id="torque-ceiling",
         severity=severity,
-        title=f"the supply allows at most {evidence.torque(max(ceilings.values()), '#.3g')}",
+        title=f"the supply allows at most {evidence.torque(ceiling, '#.3g')}",
         values=evidence.values_of(_TORQUE_CONSTANT, *supplies, _DEMAND, _STATIC),
-        sides=tuple(ComparedNumber(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()),
-        paragraph=(
-            f"The torque constant is {per_unit}/{unit.removesuffix('_d')}. With one chamber at supply and "
-            f"the other at atmosphere the vane gives {', '.join(torques)}, before friction.{verdict}"
-        ),
+        sides=sides,
+        why=" ".join(why),
     )
+
+
+def _ceilings_by_angle(evidence: Evidence) -> tuple[tuple[ComparedNumber, ...], list[str]]:
+    """Return the largest and least torques up and down between the stops, and the angles of the largest."""
+    from ppafo.parameters.building import build_device
+
+    try:
+        device = build_device(evidence.parameter_set)
+    except ParameterError:
+        return (), []
+    lowest, highest = float(device.actuator.angle_min), float(device.actuator.angle_max)
+    angles = [lowest + (highest - lowest) * number / _ANGLES for number in range(_ANGLES + 1)]
+    downward, upward = zip(*(torque_reach(device, angle) for angle in angles), strict=True)
+    torques = {"up": [*upward], "down": [-torque for torque in downward]}
+    sides = tuple(
+        ComparedNumber(f"{word} {direction}", torque, "N m")
+        for direction, found in torques.items()
+        for word, torque in (("most", max(found)), ("least", min(found)))
+    )
+    at = (f"{way} at {math.degrees(angles[found.index(max(found))]):.3g} deg" for way, found in torques.items())
+    return sides, [f"Most {' and '.join(at)}."]
 
 
 def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -68,74 +100,14 @@ def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
         if entry is None or pressure is None or not 0.0 < pressure < evidence.atmosphere():
             continue
         depth, chamber = evidence.atmosphere() - pressure, 1 if path == _SUPPLIES[0] else 2
-        effect = "lowers" if chamber == 1 else "raises"
-        doubt = f" If {entry.value:g} {entry.unit} was read from a gauge, write '_g' instead of '_a'."
         yield AuditFinding(
             id=f"vacuum-{chamber}",
             severity="warning" if entry.unit.endswith("_a") else "note",
             title=f"{path} is a vacuum, {depth / 1e3:.3g} kPa below the atmosphere",
             values=evidence.values_of(path, ATMOSPHERE_PATH),
             sides=(ComparedNumber("depth of the vacuum", depth, "Pa"),),
-            paragraph=(
-                f"A valve that connects chamber {chamber} to this supply evacuates the chamber, and ambient air "
-                f"refills the chamber: evacuation {effect} the torque.{doubt if entry.unit.endswith('_a') else ''}"
-            ),
+            why="Read from a gauge, it would have '_g' instead of '_a'." if entry.unit.endswith("_a") else "",
         )
-
-
-def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
-    """Yield the torque ceiling of an actuator with angle-dependent torque: maximum and minimum between the stops."""
-    from ppafo.parameters.building import build_device
-
-    try:
-        device = build_device(evidence.parameter_set)
-    except ParameterError:
-        return
-    chambers = "the chamber at supply or" if device.actuator.has_one_chamber else "one chamber at supply and the other"
-    lowest, highest = float(device.actuator.angle_min), float(device.actuator.angle_max)
-    angles = [lowest + (highest - lowest) * number / _ANGLES for number in range(_ANGLES + 1)]
-    downward, upward = zip(*(torque_reach(device, angle) for angle in angles), strict=True)
-    texts, sides = [], []
-    for direction, torques in (("up", list(upward)), ("down", [-torque for torque in downward])):
-        largest = max(torques)
-        angle = math.degrees(angles[torques.index(largest)])
-        texts.append(
-            f"{evidence.torque(largest, '#.3g')} {direction} at {angle:.3g} deg (at other angles less, down to "
-            f"{evidence.torque(min(torques), '#.3g')})"
-        )
-        sides.append(ComparedNumber(f"most {direction}", largest, "N m"))
-    ceiling = max(side.value for side in sides)
-    static = evidence.number(_STATIC)
-    sticks = static is not None and static >= ceiling
-    yield AuditFinding(
-        id="torque-ceiling",
-        severity="error" if sticks else "note",
-        title="the actuator gives at most "
-        + " and ".join(f"{evidence.torque(side.value, '#.3g')} {side.label.removeprefix('most ')}" for side in sides),
-        values=evidence.values_of(*_SUPPLIES, _STATIC),
-        sides=tuple(sides),
-        paragraph=(
-            f"With {chambers} at atmosphere the actuator gives {' and '.join(texts)}, before friction. "
-            f"{'Static friction is larger: the joint cannot move.' if sticks else _LIMIT}"
-        ),
-    )
-
-
-def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Severity, str]:
-    """Return severity and sentence on a torque ceiling [N m] of a vane with a torque constant [N m/Pa]."""
-    static, demand = evidence.number(_STATIC), evidence.number(_DEMAND)
-    with shown_in(evidence.parameter_set.shown):
-        unit = shown_unit("Pa_d")
-    if static is not None and static >= ceiling:
-        needed = f"{from_si(static / constant, unit, 'Pa_d'):.4g} {unit}"
-        return "error", f" Static friction of {evidence.torque(static)} is larger: the vane cannot move below {needed}."
-    if demand is not None and demand > ceiling:
-        needed = f"{from_si(demand / constant, unit, 'Pa_d'):.4g} {unit.removesuffix('_d')}_g"
-        return "warning", (
-            f" The required {evidence.torque(demand)} exceed this ceiling, so every valve and controller leaves an "
-            f"error of {evidence.torque(demand - ceiling)}; raise the supply to {needed}, or require less torque."
-        )
-    return "note", f" {_LIMIT}"
 
 
 def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
@@ -161,11 +133,7 @@ def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("torque constant times pressure", at_rest, "N m"),
                 ComparedNumber("published", torque, "N m"),
             ),
-            paragraph=(
-                f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {evidence.torque(at_rest)}; the "
-                f"published torque is {evidence.torque(torque)}. This checks only the torque constant, since the "
-                f"volume has no influence at rest. {note}"
-            ).rstrip(),
+            why=note,
         )
         if name == "walking":
             yield from _while_walking(evidence, numbers[1], numbers[2])
@@ -191,12 +159,7 @@ def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterat
                 "actuator.displacement_per_radian", "actuator.dead_volume_1", *sizes, "reported.walking_torque_pressure"
             ),
             sides=(ComparedNumber("time to fill", time, "s"), ComparedNumber("time of push-off", _PUSH_OFF, "s")),
-            paragraph=(
-                f"At toe-off chamber 1 has {1e6 * volume:.3g} cm^3. Through the open valve '{valve}', "
-                f"{100.0 * _REACHED:.0f} % of the published walking torque of {evidence.torque(torque)} is reached in "
-                f"{1e3 * time:.0f} ms; push-off lasts about {1e3 * _PUSH_OFF:.0f} ms. The published walks may have "
-                "used other valves."
-            ),
+            why=f"{100.0 * _REACHED:.0f} % of the published walking torque are reached, with the volume at toe-off.",
         )
 
 

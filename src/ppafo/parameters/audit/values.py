@@ -33,10 +33,9 @@ def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
             id=f"{path.replace('.', '-').replace('_', '-')}-against-statement",
             title=f"{path} differs from the statement '{entry.key}'",
             values=evidence.values_of(path),
-            paragraph=(
-                f"{path} is {entry_text(entry)} and refers to '{entry.key}', which has {stated_number}. Give that "
-                "number, or the key of another statement ('ppafo reproduce --list'); for a value of another origin, "
-                f"delete the line 'key' of [{path}] and change origin and source."
+            why=(
+                f"{path} is {entry_text(entry)} and refers to '{entry.key}', which has {stated_number}: for a value of "
+                f"another origin, delete the line 'key' of [{path}]."
             ),
         )
 
@@ -77,7 +76,7 @@ def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
             id="template-sources",
             severity="warning",
             title=f"the source of {count_of(len(placeholders), 'value')} is the template's",
-            paragraph=f"Measure, look up or estimate, and say where it comes from: {', '.join(placeholders)}.",
+            why=f"{', '.join(placeholders)}.",
         )
     if parameter_set.completed_by:
         return
@@ -88,15 +87,11 @@ def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
             missing += missing_values(parameter_set, valve)
     if missing:
         paths = tuple(dict.fromkeys(missing))
-        are, them = ("is", "it") if len(paths) == 1 else ("are", "them")
         yield AuditFinding(
             id="missing-values",
             severity="warning",
-            title=f"incomplete device: {count_of(len(paths), 'value')} {are} missing",
-            paragraph=(
-                f"Missing for a device: {', '.join(paths)}. Add {them} to the file or as overrides. "
-                "Checks that need missing values were skipped."
-            ),
+            title=f"incomplete device: {count_of(len(paths), 'value')} missing",
+            why=f"Missing for a device: {', '.join(paths)}. Checks that need missing values were skipped.",
         )
     ideal = [name for name in parameter_set.valve_kinds if f"valves.{name}.opening_delay" in evidence.declared]
     ideal = [name for name in ideal if f"valves.{name}.opening_delay" not in parameter_set.numbers]
@@ -106,10 +101,7 @@ def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
             severity="warning",
             title=f"{', '.join(ideal)}: no opening_delay, so that a coil opens its valve at once",
             values=evidence.values_of(*(f"valves.{name}.{key}" for name in ideal for key in _SWITCHING)),
-            paragraph=(
-                f"Without valves.{ideal[0]}.opening_delay gas flows as soon as the coil has current, and the dead time "
-                "of a loop counts closing_delay and switching_interval alone. Give the switch-on time."
-            ),
+            why="The dead time of a loop then counts closing_delay and switching_interval alone.",
         )
 
 
@@ -129,7 +121,7 @@ def check_contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
             id=paths[0].replace(".", "-").replace("_", "-"),
             title="contradictory values prevent a run",
             values=evidence.values_of(*paths),
-            paragraph=f"No run is possible: {line}.",
+            why=f"No run is possible: {line}.",
         )
 
 
@@ -163,28 +155,18 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("as reported", value, inverse_unit),
                 ComparedNumber("taken literally", 1.0 / value, quantity.unit),
             ),
-            paragraph=(
-                f"{path} = {entry_text(entry)} is declared as: {quantity.summary} [{quantity.unit}]. The reported "
-                f"unit {entry.unit} belongs to the reciprocal. Invert the ratio and keep the number: "
-                f"taken literally, the value would be {1.0 / value:.3g} {quantity.unit}."
-            ),
+            why=f"{path} is declared as: {quantity.summary} [{quantity.unit}].",
         )
     if foreign:
-        numbers, declared = evidence.parameter_set.numbers, evidence.declared
+        declared = evidence.declared
         described = "; ".join(
-            f"{path} = {entry_text(numbers[path])} must have the unit {declared[path].unit or '-'} "
-            f"({declared[path].summary})"
-            for path in foreign
+            f"{path} must have the unit {declared[path].unit or '-'} ({declared[path].summary})" for path in foreign
         )
         yield AuditFinding(
             id="dimensions",
             title="values with a unit that does not fit the equation",
             values=evidence.values_of(*foreign),
-            sides=tuple(ComparedNumber(path, evidence.number(path) or 0.0, "as given, base units") for path in foreign),
-            paragraph=(
-                f"{described}. If only the unit was misreported, give the same number in the required unit; "
-                "the other checks use the number unchanged."
-            ),
+            why=f"{described}. The other checks use the number unchanged.",
         )
 
 
@@ -193,7 +175,7 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
 
 def check_ranges(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each value outside its declared range."""
-    for path, entry in evidence.parameter_set.numbers.items():
+    for path in evidence.parameter_set.numbers:
         quantity, value = evidence.declared[path], number_in_si(evidence.parameter_set, path)
         if value is None or is_within(value, quantity):
             continue
@@ -206,11 +188,7 @@ def check_ranges(evidence: Evidence) -> Iterator[AuditFinding]:
                 ComparedNumber("lower limit", quantity.minimum, quantity.unit),
                 ComparedNumber("upper limit", quantity.maximum, quantity.unit),
             ),
-            paragraph=(
-                f"{path} = {entry_text(entry)}: {quantity.summary} must lie between {quantity.minimum:g} and "
-                f"{quantity.maximum:g} {quantity.unit}".rstrip()
-                + ". Give a value in that range."
-            ),
+            why=f"{quantity.summary[:1].upper()}{quantity.summary[1:]}.",
         )
 
 
@@ -230,7 +208,7 @@ def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
             id="gas-species",
             title=f"no data for the gas '{name}'",
             values=evidence.values_of("gas.species"),
-            paragraph=f"The gas '{name}' is unknown; available: {', '.join(SPECIES)}.",
+            why=f"Available: {', '.join(SPECIES)}.",
         )
         return
     tabulated = {"gas.molar_mass": species.molar_mass, "gas.heat_capacity_ratio": species.heat_capacity_ratio}
@@ -243,11 +221,7 @@ def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
                 title=f"{path} does not belong to the named gas",
                 values=evidence.values_of("gas.species", path),
                 sides=(ComparedNumber("in the set", value, unit), ComparedNumber("of the gas", expected, unit)),
-                paragraph=(
-                    f"{path} is {evidence.in_set_unit(path, value)}, but {evidence.text('gas.species')} has "
-                    f"{evidence.in_set_unit(path, expected)} ({species.source}). "
-                    "Give this value, or name the gas that is used."
-                ),
+                why=f"Source: {species.source}.",
             )
 
 
@@ -282,10 +256,5 @@ def check_ideal_gas(evidence: Evidence) -> Iterator[AuditFinding]:
             ComparedNumber("real-gas factor, ideal", 1.0, ""),
             ComparedNumber("real-gas factor, real", compressibility, ""),
         ),
-        paragraph=(
-            f"With the second virial coefficient {1e6 * virial:.3g} cm^3/mol the real-gas factor at "
-            f"{evidence.in_set_unit(_SUPPLY, pressure)} is {compressibility:.4f}: the ideal gas law {counts} the mass "
-            f"in a full chamber by {100.0 * abs(error):.2g} %. Use a real-gas factor in equation (3) if "
-            "gas use is needed more precisely."
-        ),
+        why=f"The second virial coefficient is {1e6 * virial:.3g} cm^3/mol.",
     )

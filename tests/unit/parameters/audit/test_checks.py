@@ -129,7 +129,7 @@ def test_a_reason_for_nothing_is_a_warning() -> None:
 def test_a_value_that_no_device_can_have_is_an_error() -> None:
     finding = findings("actuator.restitution=1.5")["range-of-actuator-restitution"]
     assert finding.severity == "error"
-    assert "must lie between 0 and 1" in finding.paragraph
+    assert "lower limit: 0; upper limit: 1" in finding.paragraph
 
 
 def test_a_solenoid_without_an_opening_delay_is_named_and_one_with_it_is_not() -> None:
