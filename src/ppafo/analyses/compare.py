@@ -660,7 +660,6 @@ def _tables(found: ComparisonResult, task: str) -> list[Section]:
 
 def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: ComparedCase) -> list[Column]:
     """Return the columns of a table with a row for each metric: change, mean difference, probability of improvement."""
-    from ppafo.report.display_units import display_difference
     from ppafo.report.finding import columns_of
     from ppafo.report.kind import Kind, of_metric
     from ppafo.studies.intervals import fraction_text
@@ -670,8 +669,8 @@ def _paired(found: ComparisonResult, cases: Sequence[ComparedCase], case: Compar
     for metric, pair in case.pairs.items():
         kind, low, high = of_metric(metric, "+.3g"), _percent(pair.change_low), _percent(pair.change_high)
         # Nothing is a percentage of what is zero within the accuracy of a run.
-        scale = abs(display_difference(base.value(metric), kind.quantity))
-        away = display_difference(case.value(metric) - base.value(metric), kind.quantity)
+        scale = abs(kind.shown_change(base.value(metric)))
+        away = kind.shown_change(case.value(metric) - base.value(metric))
         better = "-" if pair.better is None else Kind(form=".4g").interval(pair.better)
         row = (
             metric,

@@ -123,14 +123,12 @@ class Validation:
 
 def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
     """Return the errors of a channel as plain data in SI, and the RMS error in the unit that people are shown."""
-    from ppafo.report.display_units import display_value
-
     kind = _kind_of(channel)
     return {
         **fields_of(channel, *_OF_CHANNEL),
         "rms_share": channel.fraction,
         "limit_share": channel.limit,
-        "shown": {"unit": kind.shown_unit, "rms": display_value(channel.rms, kind.quantity)},
+        "shown": {"unit": kind.shown_unit, "rms": kind.shown(channel.rms)},
     }
 
 
@@ -338,7 +336,6 @@ def _finding_of(validation: Validation) -> Finding[Validation]:
 
 def _part(name: str, agreement: RecordingAgreement) -> Section:
     """Return the section of one recording: table of errors, and panels. ``name`` is the stem of its files."""
-    from ppafo.report.display_units import display_value
     from ppafo.report.finding import Section, columns_of
 
     def number(value: float) -> str:
@@ -347,7 +344,7 @@ def _part(name: str, agreement: RecordingAgreement) -> Section:
     def cells(channel: ChannelAgreement) -> tuple[str, ...]:
         kind = _kind_of(channel)
         rms, variation, bias, largest = (
-            f"{number(display_value(value, kind.quantity))} {kind.shown_unit}"
+            f"{number(kind.shown(value))} {kind.shown_unit}"
             for value in (channel.rms, channel.variation, channel.bias, channel.largest)
         )
         shares = [f"{number(100 * share)} %" for share in (channel.fraction, channel.limit)]

@@ -113,7 +113,7 @@ def assessed(result: "Result", check: bool) -> _RunReport:
 
 def _text(report: _RunReport) -> str:
     """Format status, tracking, metrics, repeatability and gains of a run."""
-    from ppafo.report.display_units import metrics_lines
+    from ppafo.report.kind import metrics_lines
     from ppafo.simulation.tracking.pair_step import coarse_pair
 
     # The result's own text has a verdict whose remedies were not tried.
@@ -161,8 +161,8 @@ def _write(report: _RunReport, folder: Path) -> str:
 
 def finding_of(report: _RunReport) -> "Finding[None]":
     """Return the content of the report page: metrics and figure."""
-    from ppafo.report.display_units import metric_text, metric_words
     from ppafo.report.finding import Finding, Section, columns_of
+    from ppafo.report.kind import metric_text, metric_words
 
     result, check = report.result, report.check
     scenario, status = result.scenario, result.status

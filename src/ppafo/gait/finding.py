@@ -13,7 +13,6 @@ from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.curves import PHASES
 from ppafo.gait.recorded.importing import ImportedGait
-from ppafo.report.display_units import display_unit, display_value, display_values
 from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel
@@ -142,18 +141,18 @@ def _plus_minus(deviation: float) -> str:
 
 
 def _row(gait: Gait, name: str, imported: ImportedGait | None) -> tuple[str | None, ...]:
-    quantity = quantity_of_unit(CURVES[name])
+    kind = Kind(unit=plain_unit(CURVES[name]), quantity=quantity_of_unit(CURVES[name]))
     curve = gait.curves[name]
     is_ankle = name == "ankle_angle"
     series = curve.values_at(PHASES)
-    values = display_values(clinical_angle(series) if is_ankle else series, quantity)
-    left = 0.0 if imported is None else display_value(imported.fit_errors[name].root_mean_square, quantity)
+    values = kind.values(clinical_angle(series) if is_ankle else series)
+    left = 0.0 if imported is None else kind.shown(imported.fit_errors[name].root_mean_square)
     return (
         f"{name} (0 neutral, dorsiflexion positive)" if is_ankle else name,
         f"{values.min():.3g}",
         f"{values.max():.3g}",
-        display_unit(quantity) or plain_unit(CURVES[name]),
-        f"{display_value(curve.deviation, quantity):.2g}" if curve.deviation else None,
+        kind.shown_unit,
+        f"{kind.shown(curve.deviation):.2g}" if curve.deviation else None,
         f"{left:.2g}" if left > _NOISE else None,
     )
 

@@ -34,7 +34,7 @@ from ppafo.loading import load_scenario
 from ppafo.model.controlled import CONTROLLED
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.report.display_units import metric_quantity, metric_words
+from ppafo.report.kind import metric_quantity, metric_words
 from ppafo.report.setting_names import label_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Recording

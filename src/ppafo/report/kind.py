@@ -1,30 +1,29 @@
-"""Kind of a number: label, SI unit and number format, declared once for text, tables and axes."""
+"""Kind of a number: label, SI unit and number format, declared once for text, tables and axes, and its display unit."""
 
+import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ppafo.errors import ArgumentError
-from ppafo.metrics import METRICS
+from ppafo.metrics import METRICS, Metric
 from ppafo.parameters.graph import fixed_zero
-from ppafo.report.display_units import (
-    axis_unit,
-    change_unit,
-    display_difference,
-    display_unit,
-    display_value,
-    display_values,
-    metric_quantity,
-    metric_words,
-)
 from ppafo.report.setting_names import label_of
 from ppafo.signals.recording import Floats
-from ppafo.units.shown import QUANTITIES, quantity_of_unit
+from ppafo.units.shown import QUANTITIES, quantity_of_unit, shown_value, unit_of
 from ppafo.wording import known_names, without_exponent
 
+_OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
+"""Quantity of a metric by SI unit, where the unit alone is ambiguous: masses among the metrics are gas masses."""
+_ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
+"""Forms of display units on the axes of figures, where these differ from the form in tables."""
+_PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
+"""Words for the suffixes of pressure units on the axes of figures."""
+_METRIC = ".4g"
+"""Number format of a metric."""
 _FORM = re.compile(r"[-+]?\d*(\.\d+)?[efgd]")
 """Pattern of a number format, which somebody may give as the quantity."""
 YES_OR_NO = "; 1: yes, 0: no"
@@ -70,14 +69,16 @@ class Kind:
     @property
     def shown_unit(self) -> str:
         """Display unit; empty for a dimensionless number."""
-        if self.given:
-            return self.given.removesuffix("_d")
-        return display_unit(self.quantity) if self.quantity else self.unit.removeprefix("-")
+        if self.given or self.quantity:
+            return (self.given or unit_of(self.quantity)).removesuffix("_d")
+        return self.unit.removeprefix("-")
 
     @property
     def shown_change_unit(self) -> str:
         """Display unit of a difference of two values."""
-        return change_unit(self.quantity, self.given) if self.quantity else self.shown_unit
+        unit = self.given if self.given and self.quantity else self.shown_unit
+        # A difference of pressures is neither gauge nor absolute.
+        return unit[:-2] if self.quantity == "pressure" and unit.endswith(("_g", "_a")) else unit
 
     @property
     def title(self) -> str:
@@ -92,17 +93,37 @@ class Kind:
 
     @property
     def axis_unit(self) -> str:
-        """Display unit in the form for an axis; empty for a dimensionless number."""
-        unit = axis_unit(self.quantity, self.given) if self.quantity else self.shown_unit
-        return "" if unit == "1" else unit
+        """Display unit in the form for an axis, with raised exponents; empty for a dimensionless number."""
+        unit = self.shown_unit
+        if not self.quantity or unit in _ON_AXES:
+            return _ON_AXES[unit] if self.quantity else "" if unit == "1" else unit
+        if self.quantity == "pressure":
+            unit = f"{unit[:-2]}{_PRESSURE_KINDS.get(unit[-2:], unit[-2:])}"
+        return "" if unit == "1" else unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$")
+
+    def shown(self, value: float) -> float:
+        """Return a value given in SI in the display unit; one that is zero within the accuracy of a run is 0."""
+        if not self.quantity or not math.isfinite(value):
+            return float(value)
+        units = QUANTITIES[self.quantity]
+        return shown_value(value, units.si, self.given or unit_of(self.quantity), self.zero, units.zero)
+
+    def shown_change(self, value: float) -> float:
+        """Return a difference of two values, given in SI, in the display unit."""
+        # The zero of gauge pressures and of degrees Celsius falls out.
+        level = replace(self, zero=None)
+        return level.shown(value) - level.shown(0.0)
 
     def values(self, values: ArrayLike) -> Floats:
         """Return values given in SI in the display unit."""
-        return display_values(np.asarray(values, dtype=np.float64), self.quantity, self.zero, self.given)
+        # Units are affine, so that two values decide all.
+        zero, one = (self.shown(number) for number in (0.0, 1.0))
+        given = np.asarray(values, dtype=np.float64)
+        return given if (zero, one) == (0.0, 1.0) else zero + (one - zero) * given
 
     def number(self, value: float, form: str = "") -> str:
         """Return a value given in SI as text in the display unit, without the unit."""
-        return without_exponent(display_value(value, self.quantity, self.zero, self.given), form or self.form)
+        return without_exponent(self.shown(value), form or self.form)
 
     def text(self, value: float, form: str = "") -> str:
         """Return a value given in SI as text in the display unit, with the unit."""
@@ -114,7 +135,7 @@ class Kind:
 
     def change_number(self, value: float, form: str = ".3g") -> str:
         """Return a difference of two values, given in SI, as text in the display unit, without the unit."""
-        return without_exponent(display_difference(value, self.quantity, self.given), form)
+        return without_exponent(self.shown_change(value), form)
 
     def interval(self, interval: ConfidenceInterval) -> str:
         """Return an estimate with the limits of its confidence interval, given in SI, as text without unit."""
@@ -164,3 +185,51 @@ def of_path(path: str, unit: str, form: str = ".6g", given: str = "") -> Kind:
 def duration_kind(longest: float) -> Kind:
     """Return the kind of durations up to the longest [s]: in seconds, or in minutes above two minutes."""
     return Kind("Time", "s", "duration") if longest > _LONG else TIME
+
+
+def metric_quantity(si_unit: str) -> str:
+    """Return the quantity of a metric or channel by its SI unit; empty for a dimensionless number."""
+    return _OF_GAS.get(si_unit) or quantity_of_unit(si_unit)
+
+
+def metric_words(name: str) -> str:
+    """Return the name of a metric in words, for example ``RMS error``."""
+    words = name.replace("_", " ").replace("rms", "RMS")
+    return words[:1].upper() + words[1:]
+
+
+def metric_level(value: float, si_unit: str) -> tuple[float, str]:
+    """Convert the value of a metric or channel from SI; returns number and display unit."""
+    kind = of_stored_metric("", si_unit)
+    return kind.shown(value), kind.shown_unit or si_unit.removeprefix("-")
+
+
+def metric_change(value: float, si_unit: str) -> tuple[float, str]:
+    """Convert a difference of two values of a metric or channel from SI; returns number and display unit."""
+    kind = of_stored_metric("", si_unit)
+    # A difference of temperatures counts in kelvin.
+    unit = {"degC": "K"}.get(kind.shown_change_unit, kind.shown_change_unit)
+    return kind.shown_change(value), unit or si_unit.removeprefix("-")
+
+
+def metric_text(value: float, si_unit: str) -> str:
+    """Format the value of a metric or channel, given in SI, as number and display unit."""
+    shown, unit = metric_level(value, si_unit)
+    return f"{without_exponent(shown, _METRIC)} {unit}".rstrip()
+
+
+def metrics_lines(metrics: Mapping[str, Metric]) -> list[str]:
+    """Return a line of text for each metric: name, value, display unit and meaning."""
+    levels = [metric_level(metric.value, metric.unit) for metric in metrics.values()]
+    values, units = [without_exponent(value, _METRIC) for value, _ in levels], [unit for _, unit in levels]
+    name_width, value_width, unit_width = (max(map(len, texts), default=0) for texts in (metrics, values, units))
+    return [
+        f"{name:<{name_width}}  {value:>{value_width}} {unit:<{unit_width}}  {metric.summary}"
+        for (name, metric), value, unit in zip(metrics.items(), values, units, strict=True)
+    ]
+
+
+def name_lines(metrics: Mapping[str, Metric]) -> list[str]:
+    """Return a short line of text for each metric, for ``repr``: name, value and display unit."""
+    width = max(map(len, metrics), default=0)
+    return [f"  {name:<{width}}  {metric_text(metric.value, metric.unit)}" for name, metric in metrics.items()]

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ppafo.metrics import Metric
-from ppafo.report.display_units import metric_text, metric_words
+from ppafo.report.kind import metric_text, metric_words
 from ppafo.report.style import render_figure
 
 if TYPE_CHECKING:

@@ -11,7 +11,6 @@ import numpy as np
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError
 from ppafo.parameters.joint import ANKLE, JointNames
-from ppafo.report.display_units import display_difference
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import (
@@ -134,7 +133,7 @@ def _panel(recording: Recording, quantity: _Quantity, valve: str, joint: JointNa
         marks.append(Mark("line", recording.time, recording[channel], (), label, look.colour, style))
     ends = (float(recording.time[0]), float(recording.time[-1])) if recording.duration > 0.0 else None
     always_shown = (gauge_zero(),) if kind.quantity == "pressure" else quantity.always_shown
-    smallest_span = display_difference(quantity.smallest_span, kind.quantity)
+    smallest_span = kind.shown_change(quantity.smallest_span)
     if kind is _COMMAND and float(np.abs(recording["command"]).max()) < _SMALL_COMMAND:
         always_shown, smallest_span = (0.0,), _SMALL_COMMAND
     then = partial(_set_limits, ends, smallest_span, tuple(kind.values(always_shown)))

@@ -14,7 +14,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError
 from ppafo.metrics.metric import Metric, Metrics
 from ppafo.parameters.joint import ANKLE, JointNames
-from ppafo.report.display_units import metrics_lines
+from ppafo.report.kind import metrics_lines
 from ppafo.report.notebook import shown
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.style import drawn_at

@@ -95,7 +95,7 @@ class ErrorEstimate:
     @_in_own_units
     def sentence(self) -> str:
         """Errors of angle, pressures, temperatures and metrics in display units."""
-        from ppafo.report.display_units import metric_change
+        from ppafo.report.kind import metric_change
 
         errors = {"rad": self.angle, "Pa": self.pressure, "K": self.temperature}
         in_display_units = [metric_change(error, unit) for unit, error in errors.items() if error is not None]
@@ -199,7 +199,7 @@ class Check:
     @_in_own_units
     def __repr__(self) -> str:
         """Return the table of all changes in display units, and the sentence."""
-        from ppafo.report.display_units import metric_change, metric_level
+        from ppafo.report.kind import metric_change, metric_level
         from ppafo.report.writing import align_columns
 
         names = list(self.metrics[0].changes) if self.metrics else []

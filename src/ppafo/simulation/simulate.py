@@ -138,7 +138,7 @@ class Result:
     @_in_own_units
     def __repr__(self) -> str:
         """Return name, status, duration and one line per metric, in display units."""
-        from ppafo.report.display_units import name_lines
+        from ppafo.report.kind import name_lines
 
         scenario, status = self.scenario, self.status
         head = f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}"
@@ -147,7 +147,7 @@ class Result:
     @_in_own_units
     def __str__(self) -> str:
         """Return the output of ``ppafo simulate``: status, verdict, warnings and metrics in the units of the device."""
-        from ppafo.report.display_units import metrics_lines
+        from ppafo.report.kind import metrics_lines
 
         head = [f"{self.scenario.name}: {self.status.kind}", *self.to_dict()["verdict"]]
         return "\n".join([*head, "", *metrics_lines(self.metrics)])

@@ -82,7 +82,7 @@ class WalkResult:
     @_in_own_units
     def __repr__(self) -> str:
         """Return name, status, duration and a line for each metric, in display units."""
-        from ppafo.report.display_units import name_lines
+        from ppafo.report.kind import name_lines
 
         head = f"Walk '{self.scenario.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
         return "\n".join([head, *name_lines(self.metrics)])
@@ -90,7 +90,7 @@ class WalkResult:
     @_in_own_units
     def __str__(self) -> str:
         """Return status, verdict and metrics in display units, as printed by ``ppafo simulate``."""
-        from ppafo.report.display_units import metrics_lines
+        from ppafo.report.kind import metrics_lines
 
         head = [f"{self.scenario.name}: {self.status.message}", self.scenario.origin.replaced]
         head.append(changed_text(changes_in(self.scenario)))

@@ -3,8 +3,7 @@
 import pytest
 
 from ppafo.metrics import Metric
-from ppafo.report.display_units import display_value, metric_change, metric_text, metrics_lines
-from ppafo.report.kind import ConfidenceInterval, of_metric
+from ppafo.report.kind import ConfidenceInterval, Kind, metric_change, metric_text, metrics_lines, of_metric
 from ppafo.simulation.check import ErrorEstimate
 from ppafo.units.shown import shown_in
 
@@ -33,7 +32,7 @@ def test_a_pressure_at_the_atmosphere_is_0_in_the_units_of_a_set() -> None:
     with shown_in({"Pa_a": "bar_g", "Pa_d": "bar_d"}):
         assert metric_text(101325.0 + 6.6e-7, "Pa_a") == "0 bar_g"
         assert metric_change(6.6378e-7, "Pa_d") == (0.0, "bar")
-        assert display_value(101326.0, "pressure") == pytest.approx(1.0e-5)
+        assert Kind("", "Pa_a", "pressure").shown(101326.0) == pytest.approx(1.0e-5)
 
 
 def test_zero_has_neither_sign_nor_exponent() -> None:

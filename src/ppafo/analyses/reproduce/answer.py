@@ -27,8 +27,8 @@ from ppafo.documents.json_text import fields_of
 from ppafo.identification.bench.law import figure_3
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.publications.publication import paper_entries
-from ppafo.report.display_units import metric_level
 from ppafo.report.finding import Cell, Finding, Section, columns_of
+from ppafo.report.kind import metric_level
 from ppafo.report.writing import inline_figure, quantity, render_page, sentence
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.wording import override_text

@@ -14,7 +14,6 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
 from ppafo.parameters.bottles.fluid import list_fluids
 from ppafo.remedy_trials import tried
-from ppafo.report.display_units import display_unit, display_value
 from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.gains import gains_of
@@ -331,17 +330,16 @@ def comparison_table(comparison: WalkComparison) -> list[Column]:
     for name, (title, quantity, digits) in _NUMBERS.items():
         numbers = [values.get(name) for _, values in columns]
         if any(number is not None for number in numbers):
-            unit = display_unit(quantity)
-            cells = (_cell(number, quantity, digits) for number in numbers)
-            rows.append((f"{title} ({unit})" if unit else title, *cells))
+            kind = Kind(title, quantity=quantity)
+            rows.append((kind.title, *(_cell(number, kind, digits) for number in numbers)))
     return columns_of(["", *(head for head, _ in columns)], rows)
 
 
-def _cell(number: float | str | None, quantity: str, digits: int) -> str | None:
+def _cell(number: float | str | None, kind: Kind, digits: int) -> str | None:
     """Return a number [SI] as text in the unit in which a quantity is shown; texts and None are returned unchanged."""
     if number is None or isinstance(number, str):
         return number
-    text = f"{display_value(number, quantity):.{digits}f}"
+    text = f"{kind.shown(number):.{digits}f}"
     # Without the sign of what is rounded to zero.
     return text.removeprefix("-") if float(text) == 0.0 else text
 

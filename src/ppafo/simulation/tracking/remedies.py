@@ -11,7 +11,7 @@ from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import SonicOrifice
 from ppafo.parameters.overrides import read_overrides
-from ppafo.report.display_units import metric_change, metric_level
+from ppafo.report.kind import metric_change, metric_level
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS, default_links
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers

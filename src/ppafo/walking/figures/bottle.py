@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind, duration_kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
@@ -102,6 +101,6 @@ def _panel(end: float, ended: Mark, kind: Kind, marks: Sequence[Mark], largest: 
         axes.set_xlim(0.0, 1.005 * float(axis.values(end)))
         axes.locator_params(axis="y", nbins=5)
         if largest is not None:
-            axes.set_ylim(0.0, 1.08 * display_value(largest, kind.quantity))
+            axes.set_ylim(0.0, 1.08 * kind.shown(largest))
 
     return Panel(axis, kind, [*marks, ended], then=set_limits, shares_x=True)
