@@ -402,10 +402,6 @@ class ValveMapProblem(FlowProcedure):
         """Identify the flow of the valve over command from recordings."""
         gas = context.gas(self, sources)
         path = context.valve_path(self.valve)
-        if self.nodes and [*context.parameter_set.valve_kinds.values()].count("proportional") > 1:
-            raise IdentificationError(
-                f"{context.label}: nodes: a set with a table of openings has one proportional valve"
-            )
         result = valve_map(sources, gas, path, self.confidence, context.tolerances, self.nodes)
         coefficient = number_in_si(context.parameter_set, f"{path}.discharge_coefficient")
         if not (self.nodes and coefficient and result.estimates[0].is_usable):

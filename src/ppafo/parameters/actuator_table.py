@@ -9,7 +9,7 @@ comment. Without a column ``volume_2`` the actuator has one chamber, and chamber
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import pairwise, product
@@ -19,14 +19,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.documents.toml_text import label
 from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.actuators.table import BENDS, MOST_ANGLES, MOST_PRESSURES, RISES, Curve, Rise, Table, TabulatedChamber
+from ppafo.parameters.number_table import LONGEST, NumberedLine, lines_of_table, numbers_of_table
 from ppafo.signals.recording import Floats
 from ppafo.units import to_si
 from ppafo.units.shown import counted_from, shown_in, shown_text
-from ppafo.wording import nearest_name, number_text, one_line, reason, said_missing
+from ppafo.wording import nearest_name, number_text, one_line, said_missing
 
 _POWERS = 4
 """Number of coefficients of the cubic polynomial in the first intervals of a spline."""
@@ -67,8 +67,6 @@ _STEPS = (1, 2, 5, 10, 20, 50, 100)
 """Possible rounding steps of readings, in units of the last digit."""
 _TELLING = 10
 """Number of different values from which a common step is no coincidence."""
-_LONGEST = 40
-"""Maximum length of a cell in characters, in messages and as a number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,14 +88,11 @@ class MeasuredVolumes:
 def read_measured_volumes(path: Path) -> MeasuredVolumes:
     """Read the volume table of a measured actuator. Raises ParameterError with file and line of a fault."""
     file = label(str(path))
-    try:
-        text = decoded(read_regular_file(path, MAXIMUM_BYTES_TYPED))
-    except UnicodeDecodeError as error:
-        raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start} is invalid)") from error
-    except (OSError, ValueError) as error:
-        raise ParameterError(f"{file}: cannot be read: {reason(error)}") from error
-    columns, digits, units = _columns(text, file)
-    angles, pressures = np.unique(columns["angle"]), np.unique(columns["pressure"])
+    (_, header), *rows = lines_of_table(path, file, "angle [deg],pressure [kPa_g],volume_1 [mL]")
+    units = _units(header, file)
+    columns, digits = _columns(rows, units, file)
+    angles = np.unique(columns["angle"])
+    pressures = np.unique(columns["pressure"])
     # Refusals are in the units of the table.
     with shown_in(counted_from({COLUMNS[name].unit: unit for name, unit in units.items()}, 0.0)):
         _check_grid(columns["angle"], columns["pressure"], file)
@@ -119,21 +114,11 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
     )
 
 
-def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float], dict[str, str]]:
-    """Return the columns of a file by name, each (lines,), their rounding steps, in SI units, and their units.
-
-    Pressures are gauge pressures.
-    """
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
-    if not lines:
-        raise ParameterError(f"{file}: is empty; its first line must be 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
-    if "," not in lines[0][1] and any(mark in lines[0][1] for mark in ";\t"):
-        raise ParameterError(f"{file}: columns must be separated by commas")
-    (_, header), *below = ((number, [cell.strip().strip('"') for cell in line.split(",")]) for number, line in lines)
-    units = _units(header, file)
-    rows = [_numbers(cells, tuple(units), f"{file}, line {number}") for number, cells in below]
-    if not rows:
-        raise ParameterError(f"{file}: has a header but no rows of numbers")
+def _columns(
+    lines: Sequence[NumberedLine], units: Mapping[str, str], file: str
+) -> tuple[dict[str, Floats], dict[str, float]]:
+    """Return the columns of a file by name, each (lines,), and their rounding steps [SI]; pressures are gauge."""
+    rows = numbers_of_table(lines, tuple(units), file)
     columns: dict[str, Floats] = {}
     digits: dict[str, float] = {}
     for index, (name, unit) in enumerate(units.items()):
@@ -143,13 +128,13 @@ def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float],
         worst = int(np.argmax(np.abs(column)))
         if abs(column[worst]) > declared.largest:
             raise ParameterError(
-                f"{file}, line {below[worst][0]}: {name} = {rows[worst][index]:g} {unit} exceeds "
+                f"{file}, line {lines[worst][0]}: {name} = {rows[worst][index]:g} {unit} exceeds "
                 f"{declared.largest:g} {declared.unit.removesuffix('_a')}"
             )
         columns[name] = column
-        step = _step([Decimal(number_text(cells[index])) for _, cells in below])
+        step = _step([Decimal(number_text(cells[index])) for _, cells in lines])
         digits[name] = abs(to_si(step, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
-    return columns, digits, units
+    return columns, digits
 
 
 def _step(numbers: Sequence[Decimal]) -> float:
@@ -167,7 +152,7 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
     for cell in header:
         name, bracket, unit = (part.strip() for part in cell.strip().removesuffix("]").partition("["))
         if name not in COLUMNS:
-            shown, hint = one_line(name)[:_LONGEST], nearest_name(name, COLUMNS)
+            shown, hint = one_line(name)[:LONGEST], nearest_name(name, COLUMNS)
             hint = "; how volumes follow from torques is in docs/how-to/extend.md" if "torque" in name.lower() else hint
             raise ParameterError(f"{file}: unknown column '{shown}'{hint}; allowed: {', '.join(COLUMNS)}")
         if name in units:
@@ -176,7 +161,7 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
             example = f"{name} [{COLUMNS[name].example}]"
             raise ParameterError(f"{file}: column '{name}' has no unit; write for example '{example}'")
         if name == "pressure" and not unit.endswith("_g"):
-            shown = one_line(unit)[:_LONGEST]
+            shown = one_line(unit)[:LONGEST]
             raise ParameterError(f"{file}: column 'pressure' must be in a gauge unit such as kPa_g, not '{shown}'")
         with refused_as(ParameterError, f"{file}: column '{name}'", UnitError):
             to_si(1.0, unit, COLUMNS[name].unit, 0.0)
@@ -185,23 +170,6 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
     if missing:
         raise ParameterError(f"{file}: column{'s' * (len(missing) > 1)} {said_missing(missing)}")
     return units
-
-
-def _numbers(cells: Sequence[str], names: Sequence[str], line: str) -> list[float]:
-    """Parse the numbers of a line in the order of the columns ``names``."""
-    if len(cells) != len(names):
-        raise ParameterError(f"{line}: has {len(cells)} values, the header has {len(names)}")
-    numbers = []
-    for name, cell in zip(names, cells, strict=True):
-        try:
-            number = float(number_text(cell)) if len(cell) <= _LONGEST else math.nan
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            shown = one_line(cell)[:_LONGEST]
-            raise ParameterError(f"{line}: {name} = '{shown}' is not a finite number")
-        numbers.append(number)
-    return numbers
 
 
 def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:

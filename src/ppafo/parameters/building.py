@@ -148,6 +148,13 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
             f"{declaration.RELIEVING_PATH} = false: a supply below atmospheric pressure takes gas from the chambers; "
             f"set {declaration.RELIEVING_PATH} to true or omit the key",
         )
+    valves = [name for name, kind in parameter_set.valve_kinds.items() if kind == "proportional"]
+    if "opening" in device.effects and len(valves) > 1:
+        # The table acts on the valve that is chosen: of two it would be of both.
+        yield (
+            (f"{SECTION}.opening",),
+            f"{SECTION}.opening: a set with a table has one proportional valve, not {' and '.join(valves)}",
+        )
     if actuator.kind != VANE and is_ordered and not problem:
         is_bad, line = growth_and_problem(device)[1]
         if is_bad:

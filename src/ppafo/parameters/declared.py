@@ -76,7 +76,7 @@ class Many:
     summary: str = ""
     required: bool = False
     least: int = 0
-    most: int = 10**9
+    most: float = math.inf
 
 
 Field = Quantity | Words | InnerTable | Many
@@ -251,7 +251,7 @@ class FieldLayout:
             what = (
                 "numbers" if isinstance(of, Quantity) else "texts" if isinstance(of, Words) else f"tables, [[{path}]]"
             )
-            most = f", at most {field.most}" * isinstance(of, Quantity)
+            most = f", at most {field.most:g}" * math.isfinite(field.most)
             yield path, f"{path} = {quote(value)} must be a list of {count}{what}{most}"
         elif fault := self._of_value(path, field, value):
             yield path, fault

@@ -200,9 +200,6 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
             texts[path] = TextEntry(**table)
     for name, valve in document["valves"].items():
         if "opening" in valve:
-            # The table acts on the valve that is chosen: of two it would be of both.
-            if [each["kind"] for each in document["valves"].values()].count("proportional") > 1:
-                raise ParameterError(f"{file}: valves.{name}.opening: a set with a table has one proportional valve")
             numbers |= entries_of_opening(valve["opening"], folder, f"{file}: valves.{name}.opening")
             find_effects(numbers)
     actuator = _table(document, "actuator")

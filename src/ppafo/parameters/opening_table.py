@@ -13,15 +13,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.documents.toml_text import label
-from ppafo.errors import ParameterError
+from ppafo.errors import ParameterError, PpafoError, raise_noted
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.opening import NODES
 from ppafo.parameters.declared import Field, InnerTable, Many, Words
+from ppafo.parameters.number_table import lines_of_table, numbers_of_table
 from ppafo.parameters.parameter_set import TEXT_ENTRY, Entry
-from ppafo.wording import one_line, reason
+from ppafo.wording import one_line
 
 COLUMNS = ("command", "opening")
 _SIZE = Quantity("", "", "size", None, 0.0, 1.0, plain=True)
@@ -41,48 +41,41 @@ def fields_of_opening(valve: str) -> dict[str, Field]:
 def entries_of_opening(table: Mapping[str, Any], folder: Path, where: str) -> dict[str, Entry]:
     """Return the numbers of a table by path; ``where`` names it in messages. Raises ParameterError for a bad table."""
     lists = [list(table.get(name, ())) for name in COLUMNS]
+    places = [f"row {number}" for number in range(1, len(lists[0]) + 1)]
     if "file" in table:
         if any(lists):
             raise ParameterError(f"{where} has a file and numbers; give one of them")
         where = label(str(folder / table["file"]))
-        lists = _read(folder / table["file"], where)
+        (_, header), *lines = lines_of_table(folder / table["file"], where, ",".join(COLUMNS))
+        if sorted(header) != sorted(COLUMNS):
+            raise ParameterError(f"{where}: must begin with 'command,opening', not '{one_line(','.join(header))}'")
+        rows = numbers_of_table(lines, header, where)
+        lists = [[row[header.index(name)] for row in rows] for name in COLUMNS]
+        places = [f"line {number}" for number, _ in lines]
     if len(lists[0]) != len(lists[1]):
         raise ParameterError(f"{where}: {len(lists[0])} commands and {len(lists[1])} openings; give as many of both")
-    rows = [(float(command), float(opening)) for command, opening in zip(*lists, strict=True)]
-    inner = [row for row in rows if row not in ((0.0, 0.0), (1.0, 1.0))]
+    nodes = [
+        (place, float(command), float(opening))
+        for place, command, opening in zip(places, *lists, strict=True)
+        if (command, opening) not in ((0.0, 0.0), (1.0, 1.0))
+    ]
+    wrong: list[PpafoError] = []
     before = (0.0, 0.0)
-    for number, (command, opening) in enumerate([*inner, (1.0, 1.0)], 1):
-        if not (command > before[0] and before[1] <= opening <= 1.0):
-            raise ParameterError(
-                f"{where}: row {number}, command {command:g} with opening {opening:g}, must have a command above "
-                f"{before[0]:g} and an opening from {before[1]:g} to 1; at command 1 it is 1, the valve's area"
+    for place, command, opening in nodes:
+        if not (before[0] < command < 1.0 and before[1] <= opening <= 1.0):
+            wrong.append(
+                ParameterError(
+                    f"{where}: {place}, command {command:g} with opening {opening:g}, must have a command above "
+                    f"{before[0]:g} and an opening from {before[1]:g} to 1; at command 1 it is 1, the valve's area"
+                )
             )
         before = command, opening
-    if not 0 < len(inner) <= NODES:
-        raise ParameterError(f"{where}: {len(inner)} rows between (0, 0) and (1, 1); must be from 1 to {NODES}")
+    if not 0 < len(nodes) <= NODES:
+        wrong.append(ParameterError(f"{where}: {len(nodes)} rows between (0, 0) and (1, 1); must be from 1 to {NODES}"))
+    raise_noted(wrong)
     known = {name: table[name] for name in ("origin", "source", "note") if name in table}
     return {
         f"{SECTION}.opening.{name}_{number:02}": Entry(value, "", **known)
-        for number, row in enumerate(inner, 1)
-        for name, value in zip(COLUMNS, row, strict=True)
+        for number, (_, *node) in enumerate(nodes, 1)
+        for name, value in zip(COLUMNS, node, strict=True)
     }
-
-
-def _read(path: Path, where: str) -> list[list[float]]:
-    """Return the columns command and opening of a CSV file; ParameterError names file and line of a fault."""
-    try:
-        text = decoded(read_regular_file(path, MAXIMUM_BYTES_TYPED))
-    except (OSError, ValueError) as error:
-        raise ParameterError(f"{where}: cannot be read: {reason(error)}") from error
-    lines = [[cell.strip() for cell in line.split(",")] for line in text.splitlines() if line.strip()]
-    header = lines[0] if lines else []
-    if sorted(header) != sorted(COLUMNS):
-        raise ParameterError(f"{where}: must begin with 'command,opening', not '{one_line(','.join(header))}'")
-    columns: list[list[float]] = [[], []]
-    for number, cells in enumerate(lines[1:], 2):
-        for cell, name in zip(cells, header, strict=False):
-            try:
-                columns[COLUMNS.index(name)].append(float(cell))
-            except ValueError:
-                raise ParameterError(f"{where}, line {number}: {name} = '{one_line(cell)}': must be a number") from None
-    return columns
