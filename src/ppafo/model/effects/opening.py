@@ -13,38 +13,54 @@ SHARPNESS = 0.0078125
 """Opening [-] within which an inverted table passes the range of commands at which the valve stays closed."""
 
 
-class OpeningNode(NamedTuple):
-    """Node of the table: size of the command [-] and of the opening [-]; a command of 0 for an unused node."""
+class OpeningPiece(NamedTuple):
+    """Straight piece of the table from one node to the next, of no width behind an unused node.
 
-    command: float
-    opening: float
+    Attributes:
+        start, end: sizes of the command [-]
+        rate: change of the opening over that of the command [-]
+        closed, opened: openings at both ends [-]
+        widening: change of the command over that of the opening [-], 0 where the opening stays
+        flat: change of the command [-] where the opening stays below full opening, else 0
+    """
+
+    start: float
+    end: float
+    rate: float
+    closed: float
+    opened: float
+    widening: float
+    flat: float
 
 
 class OpeningTable(NamedTuple):
-    """Nodes between (0, 0) and (1, 1), in the order of their commands; the opening nowhere falls."""
+    """Pieces from (0, 0) to (1, 1), in the order of their commands; the opening nowhere falls.
 
-    nodes: Annotated[tuple[OpeningNode, ...], NODES]
+    ``edge`` is the size of the command [-] up to which the valve stays closed.
+    """
+
+    edge: float
+    pieces: Annotated[tuple[OpeningPiece, ...], NODES + 1]
+
+
+# Sums over all pieces, each of which adds what lies within it: a search for the piece would take several times as long.
 
 
 def opening_of_size(size: float, table: OpeningTable) -> float:
     """Opening [-] for the size of a command from 0 to 1 [-], on the straight line between two nodes."""
-    lower, upper = OpeningNode(0.0, 0.0), OpeningNode(1.0, 1.0)
-    for node in table.nodes:
-        lower = node if node.command <= size and node.command > lower.command else lower
-        upper = node if node.command > size and node.command < upper.command else upper
-    rate = (upper.opening - lower.opening) / (upper.command - lower.command)
-    return lower.opening + rate * (size - lower.command)
+    opening = 0.0
+    for piece in table.pieces:
+        opening = opening + piece.rate * (max(piece.start, min(size, piece.end)) - piece.start)
+    return opening
 
 
 def size_of_opening(opening: float, table: OpeningTable) -> float:
     """Size of the command [-] for an opening from 0 to 1 [-]; where the table is flat, the far end of the flat."""
-    lower, upper = OpeningNode(0.0, 0.0), OpeningNode(1.0, 1.0)
-    for node in table.nodes:
-        is_used = node.command > lower.command
-        lower = node if is_used and node.opening <= opening and node.opening < 1.0 else lower
-        upper = node if node.opening > opening and node.command < upper.command else upper
-    rate = (upper.command - lower.command) / max(upper.opening - lower.opening, 1.0e-12)
-    return lower.command + rate * (min(opening, 1.0) - lower.opening)
+    size = 0.0
+    for piece in table.pieces:
+        within = max(piece.closed, min(opening, piece.opened)) - piece.closed
+        size = size + (piece.widening * within + (piece.flat if opening >= piece.closed else 0.0))
+    return size
 
 
 def opened(command: float, opening: OpeningTable) -> float:
@@ -60,30 +76,50 @@ def inverted(command: float, opening: OpeningTable) -> float:
     wanted = sent_command(command)
     size = min(abs(wanted), 1.0)
     # As beyond_dead_band: around 0 the command runs through the flat, and does not jump.
-    edge = size_of_opening(0.0, opening)
-    found = size_of_opening(size, opening) - edge * (1.0 - min(size / SHARPNESS, 1.0))
+    found = size_of_opening(size, opening) - opening.edge * (1.0 - min(size / SHARPNESS, 1.0))
     signed = found if wanted >= 0.0 else -found
     return wanted if wanted > VENTS_ABOVE else signed
 
 
-def prepare(settings: Any, _device: Any) -> OpeningTable:
-    """Table of the settings, which are numbers of their own."""
-    return OpeningTable(
-        (
-            OpeningNode(settings.command_01, settings.opening_01),
-            OpeningNode(settings.command_02, settings.opening_02),
-            OpeningNode(settings.command_03, settings.opening_03),
-            OpeningNode(settings.command_04, settings.opening_04),
-            OpeningNode(settings.command_05, settings.opening_05),
-            OpeningNode(settings.command_06, settings.opening_06),
-            OpeningNode(settings.command_07, settings.opening_07),
-            OpeningNode(settings.command_08, settings.opening_08),
-            OpeningNode(settings.command_09, settings.opening_09),
-            OpeningNode(settings.command_10, settings.opening_10),
-            OpeningNode(settings.command_11, settings.opening_11),
-            OpeningNode(settings.command_12, settings.opening_12),
-        )
+def piece_after(before: OpeningPiece, command: float, opening: float) -> OpeningPiece:
+    """Piece up to a node of a command and an opening [-]; without width where the node is not ahead."""
+    is_ahead = command > before.end
+    end = command if is_ahead else before.end
+    opened = opening if is_ahead else before.opened
+    width = end - before.end
+    rise = opened - before.opened
+    return OpeningPiece(
+        start=before.end,
+        end=end,
+        rate=rise / width if is_ahead else 0.0,
+        closed=before.opened,
+        opened=opened,
+        widening=width / rise if rise > 0.0 else 0.0,
+        flat=width if rise <= 0.0 and opened < 1.0 else 0.0,
     )
+
+
+def prepare(settings: Any, _device: Any) -> OpeningTable:
+    """Pieces of the table of the settings, and its edge."""
+    to_00 = OpeningPiece(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    to_01 = piece_after(to_00, settings.command_01, settings.opening_01)
+    to_02 = piece_after(to_01, settings.command_02, settings.opening_02)
+    to_03 = piece_after(to_02, settings.command_03, settings.opening_03)
+    to_04 = piece_after(to_03, settings.command_04, settings.opening_04)
+    to_05 = piece_after(to_04, settings.command_05, settings.opening_05)
+    to_06 = piece_after(to_05, settings.command_06, settings.opening_06)
+    to_07 = piece_after(to_06, settings.command_07, settings.opening_07)
+    to_08 = piece_after(to_07, settings.command_08, settings.opening_08)
+    to_09 = piece_after(to_08, settings.command_09, settings.opening_09)
+    to_10 = piece_after(to_09, settings.command_10, settings.opening_10)
+    to_11 = piece_after(to_10, settings.command_11, settings.opening_11)
+    to_12 = piece_after(to_11, settings.command_12, settings.opening_12)
+    to_13 = piece_after(to_12, 1.0, 1.0)
+    pieces = (to_01, to_02, to_03, to_04, to_05, to_06, to_07, to_08, to_09, to_10, to_11, to_12, to_13)
+    edge = 0.0
+    for piece in pieces:
+        edge = edge + (piece.flat if piece.closed <= 0.0 else 0.0)
+    return OpeningTable(edge, pieces)
 
 
 def _numbers() -> dict[str, Any]:

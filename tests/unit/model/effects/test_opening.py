@@ -7,7 +7,7 @@ import pytest
 
 import ppafo
 from ppafo.errors import ParameterError
-from ppafo.model.effects.opening import NODES, OpeningNode, OpeningTable, opening_of_size, size_of_opening
+from ppafo.model.effects.opening import EFFECT, NODES, OpeningTable, opening_of_size, prepare, size_of_opening
 from ppafo.parameters import load_device
 from ppafo.simulation.ensemble import run_ensemble
 
@@ -21,8 +21,7 @@ OF_A_SPOOL = tuple(
 
 
 def table_of(rows: list[tuple[float, float]]) -> OpeningTable:
-    padded = [*rows, *[(0.0, 0.0)] * (NODES - len(rows))]
-    return OpeningTable(tuple(OpeningNode(*row) for row in padded))
+    return prepare(EFFECT.settings(*np.resize([*np.ravel(rows), *[0.0] * 2 * NODES], 2 * NODES).tolist()), None)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -75,6 +74,7 @@ def test_rows_and_a_file_are_the_same_numbers_and_a_wrong_table_says_its_row(tmp
         path.write_text(text.replace("[valves.solenoid]", said + "[valves.solenoid]", 1), encoding="utf-8")
         return dict(load_device(path).effects["opening"])
 
+    (tmp_path / "wrong.csv").write_text("command,opening\n\n0.1,0\n\n0.3,0.4,9\n0.5,x\n", encoding="utf-8")
     (tmp_path / "o.csv").write_text("opening,command\n0,0\n0,0.05\n0.4,0.5\n1,1\n", encoding="utf-8")
     rows = effects("command = [0.05, 0.5]\nopening = [0.0, 0.4]")
     assert rows == effects('file = "o.csv"')
@@ -83,6 +83,9 @@ def test_rows_and_a_file_are_the_same_numbers_and_a_wrong_table_says_its_row(tmp
         ("command = [0.2, 0.5]\nopening = [0.3, 0.1]", r"row 2, command 0.5 with opening 0.1, .* from 0.3 to 1"),
         ("command = [0.2]\nopening = [0.3, 0.1]", "1 commands and 2 openings"),
         ("command = [0.5, 1.0]\nopening = [0.3, 0.9]", "at command 1 it is 1"),
+        ("command = 0.5\nopening = [0.3]", r"command = 0.5 must be a list of numbers$"),
+        ("command = [0.5, 0.4, 0.3]\nopening = [0.3, 0.4, 0.5]", r"^2 things are wrong: .* row 2, .* row 3,"),
+        ('file = "wrong.csv"', r"^2 .*line 5: has 3 values, the header has 2; .*line 6: opening = 'x' is not a finite"),
         ('file = "absent.csv"', r"absent\.csv: cannot be read"),
     ):
         with pytest.raises(ParameterError, match=said):
