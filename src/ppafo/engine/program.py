@@ -29,7 +29,6 @@ from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import LED_SHANK, REQUESTED, WALK, MeterKind, ReferenceSummary
 
 if TYPE_CHECKING:
-    from ppafo.engine.scheme.thermal_gas import WarmFunctions
     from ppafo.engine.step.lane import Lane
 
 
@@ -149,13 +148,6 @@ class Program:
     def functions(self) -> ActuatorFunctions:
         """Functions of the actuator."""
         return functions_of_actuator(self.actuator)
-
-    @property
-    def warm_functions(self) -> "WarmFunctions":
-        """Functions of the actuator for chambers with an energy balance."""
-        from ppafo.engine.scheme.warm_actuators import warm_functions
-
-        return warm_functions(self.actuator)
 
     @property
     def has_vane(self) -> bool:

@@ -21,7 +21,7 @@ from ppafo.engine.scheme.pneumatics import (
     linearise,
     pressure_that_matters,
 )
-from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas, WarmFunctions, begin_thermal_stage, transport
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas, begin_thermal_stage, chambers_at_begin, transport
 from ppafo.model.plant import (
     ActuatorFunctions,
     PlantParameters,
@@ -171,10 +171,10 @@ def begin_fed_thermal_gas(
     flowing: SlopedFlows,
     step: float,
     *,
-    parts: WarmFunctions,
+    parts: ActuatorFunctions,
 ) -> FedThermalGas:
     """First stage of one step [s] as ``begin_fed_gas``, for gas with an energy balance."""
-    at_begin = parts.chambers_at_begin(plant, state, next_angle, step)
+    at_begin = chambers_at_begin(plant, state, next_angle, step, parts=parts)
     start, heat_ratio = at_begin.chambers, thermal.heat_capacity_ratio
     # A compliant chamber takes more gas for a rise of its pressure.
     ratio_1 = start.volume_1 * (1.0 + heat_ratio * start.give_1) / lines.volume_1

@@ -21,7 +21,6 @@ A rigid chamber has ``x`` 0 (docs/equations.md).
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import (
@@ -32,16 +31,15 @@ from ppafo.engine.scheme.pneumatics import (
     SlopedFlows,
     pressure_that_matters,
 )
+from ppafo.model.actuators.kind import Chambers
 from ppafo.model.gas import enthalpy_flow_ratio, mass_flow_ratio
 from ppafo.model.plant import (
+    ActuatorFunctions,
     PlantParameters,
     PlantState,
     ThermalParameters,
     ThermalState,
     admitted_flow,
-    chamber_pressures,
-    chamber_volumes,
-    pressures_per_mass,
 )
 
 
@@ -397,15 +395,6 @@ def solve_thermal_stage(matrix: _ThermalMatrix, right: ThermalFlows) -> ThermalF
     )
 
 
-class WarmFunctions(NamedTuple):
-    """Functions of an actuator for chambers with an energy balance."""
-
-    chambers_at_begin: Callable[..., ThermalBegin]
-    chambers_at_end: Callable[..., WarmChambers]
-    after_motion: Callable[..., PlantState]
-    with_work: Callable[..., ThermalState]
-
-
 def begin_thermal_gas(
     plant: PlantParameters,
     thermal: ThermalParameters,
@@ -415,35 +404,57 @@ def begin_thermal_gas(
     flowing: SlopedFlows,
     step: float,
     *,
-    parts: WarmFunctions,
+    parts: ActuatorFunctions,
 ) -> ThermalGas:
     """First stage of one step [s] with an energy balance; volumes change linearly up to ``next_angle`` [rad]."""
-    at_begin = parts.chambers_at_begin(plant, state, next_angle, step)
+    at_begin = chambers_at_begin(plant, state, next_angle, step, parts=parts)
     return begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step, parts=parts)
 
 
-def chambers_at_begin(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
-    """Both chambers at the start of a step [s] with volumes that change up to ``next_angle`` [rad]. Equation (3)."""
-    volume_1, volume_2 = chamber_volumes(plant, state.angle)
-    next_1, _ = chamber_volumes(plant, next_angle)
-    # The chambers of a vane are opposite: what one gains in volume the other loses.
-    growth = (next_1 - volume_1) / max(step, SHORTEST)
-    per_content_1, per_content_2 = pressures_per_mass(plant, state.angle)
+def widening(
+    now: Chambers, here: Chambers, ahead: Chambers, pressure_1: float, pressure_2: float, step: float
+) -> WarmChambers:
+    """Chamber volumes and compliances at ``now``, growing by ``ahead`` minus ``here`` in a step [s]; pressures [Pa]."""
+    duration = max(step, SHORTEST)
+    return WarmChambers(
+        volume_1=now.volume_1,
+        volume_2=now.volume_2,
+        growth_1=(ahead.volume_1 - here.volume_1) / duration,
+        growth_2=(ahead.volume_2 - here.volume_2) / duration,
+        give_1=pressure_1 * now.compliance_1 / now.volume_1,
+        give_2=pressure_2 * now.compliance_2 / now.volume_2,
+    )
+
+
+def chambers_at_begin(
+    plant: PlantParameters, state: PlantState, next_angle: float, step: float, *, parts: ActuatorFunctions
+) -> ThermalBegin:
+    """Both chambers at the start of a step [s] that ends at ``next_angle`` [rad]."""
+    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
+    # Volumes at both angles at one pressure: their difference is what the angle alone does.
+    here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
+    ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
     return ThermalBegin(
-        chambers=WarmChambers(
-            volume_1=volume_1, volume_2=volume_2, growth_1=growth, growth_2=-growth, give_1=0.0, give_2=0.0
-        ),
-        per_content_1=per_content_1,
-        per_content_2=per_content_2,
+        chambers=widening(here, here, ahead, pressure_1, pressure_2, step),
+        per_content_1=plant.gas_product / (here.volume_1 + pressure_1 * here.compliance_1),
+        per_content_2=plant.gas_product / (here.volume_2 + pressure_2 * here.compliance_2),
     )
 
 
 def chambers_at_end(
-    plant: PlantParameters, begun: WarmChambers, _state: PlantState, _end: PlantState, next_angle: float, _step: float
+    plant: PlantParameters,
+    state: PlantState,
+    end: PlantState,
+    next_angle: float,
+    step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> WarmChambers:
-    """Both chambers at the end of a step [s] at ``next_angle`` [rad], with the rates of ``begun``. Equation (3)."""
-    volume_1, volume_2 = chamber_volumes(plant, next_angle)
-    return begun._replace(volume_1=volume_1, volume_2=volume_2)
+    """Both chambers at ``next_angle`` [rad] with the contents after the first stage of a step [s]."""
+    pressure_1, pressure_2 = parts.pressures(plant, next_angle, end.mass_1, end.mass_2)
+    here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
+    ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
+    return widening(ahead, here, ahead, pressure_1, pressure_2, step)
 
 
 def begin_thermal_stage(
@@ -456,7 +467,7 @@ def begin_thermal_stage(
     flowing: SlopedFlows,
     step: float,
     *,
-    parts: WarmFunctions,
+    parts: ActuatorFunctions,
 ) -> ThermalGas:
     """First stage of one step [s] that ends at ``next_angle`` [rad], from all flows with their derivatives."""
     at = at_begin.chambers
@@ -481,7 +492,7 @@ def begin_thermal_stage(
         drift=drift,
         end=end,
         end_masses=end_masses,
-        ended=parts.chambers_at_end(plant, at, state, end, next_angle, step),
+        ended=chambers_at_end(plant, state, end, next_angle, step, parts=parts),
     )
 
 
@@ -560,15 +571,30 @@ def over_allowed(plant: PlantParameters, begun: ThermalGas, rate_1: float, rate_
 
 
 def after_motion(
-    plant: PlantParameters, thermal: ThermalParameters, state: PlantState, assumed_angle: float, angle: float
+    plant: PlantParameters,
+    thermal: ThermalParameters,
+    state: PlantState,
+    assumed_angle: float,
+    angle: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> PlantState:
     """State after isentropic correction of the gas from the assumed angle [rad] to the angle reached [rad]."""
-    assumed_1, assumed_2 = chamber_volumes(plant, assumed_angle)
-    volume_1, volume_2 = chamber_volumes(plant, angle)
-    half = 0.5 * (thermal.heat_capacity_ratio - 1.0)
-    mean_1, mean_2 = 0.5 * (volume_1 + assumed_1), 0.5 * (volume_2 + assumed_2)
-    work_1, work_2 = half * (volume_1 - assumed_1), half * (volume_2 - assumed_2)
-    # The isentrope between two near volumes, to third order in their difference.
+    ratio = thermal.heat_capacity_ratio
+    pressure_1, pressure_2 = parts.pressures(plant, assumed_angle, state.mass_1, state.mass_2)
+    assumed = parts.chambers(plant, assumed_angle, pressure_1, pressure_2)
+    turned = parts.chambers(plant, angle, pressure_1, pressure_2)
+    # The isentrope k P dV = -V dP, of which the wall's part goes with the pressure: the pressure there, then the work.
+    reached_1 = pressure_1 - ratio * pressure_1 * (turned.volume_1 - assumed.volume_1) / (
+        assumed.volume_1 + ratio * pressure_1 * assumed.compliance_1
+    )
+    reached_2 = pressure_2 - ratio * pressure_2 * (turned.volume_2 - assumed.volume_2) / (
+        assumed.volume_2 + ratio * pressure_2 * assumed.compliance_2
+    )
+    reached = parts.chambers(plant, angle, reached_1, reached_2)
+    half = 0.5 * (ratio - 1.0)
+    mean_1, mean_2 = 0.5 * (reached.volume_1 + assumed.volume_1), 0.5 * (reached.volume_2 + assumed.volume_2)
+    work_1, work_2 = half * (reached.volume_1 - assumed.volume_1), half * (reached.volume_2 - assumed.volume_2)
     return state._replace(
         mass_1=state.mass_1 * (mean_1 - work_1) / (mean_1 + work_1),
         mass_2=state.mass_2 * (mean_2 - work_2) / (mean_2 + work_2),
@@ -596,14 +622,18 @@ def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlo
     )
 
 
-def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, after: PlantState) -> ThermalState:
-    """Gas masses and energy totals, updated by the gas work on the vane between two states."""
-    before_1, before_2 = chamber_pressures(plant, before.angle, before.mass_1, before.mass_2)
-    after_1, after_2 = chamber_pressures(plant, after.angle, after.mass_1, after.mass_2)
-    # The mean of the pressures at both ends, over the motion that happened: the trapezoidal rule, as for the vane.
-    difference = 0.5 * (before_1 - before_2 + after_1 - after_2)
-    work = difference * plant.displacement_per_radian * (after.angle - before.angle)
-    return masses._replace(gas_work=masses.gas_work + work)
+def with_work(
+    plant: PlantParameters, masses: ThermalState, before: PlantState, after: PlantState, *, parts: ActuatorFunctions
+) -> ThermalState:
+    """Gas masses and energy totals, updated by the gas work on shaft and expanding walls between two states."""
+    before_1, before_2 = parts.pressures(plant, before.angle, before.mass_1, before.mass_2)
+    after_1, after_2 = parts.pressures(plant, after.angle, after.mass_1, after.mass_2)
+    first = parts.chambers(plant, before.angle, before_1, before_2)
+    last = parts.chambers(plant, after.angle, after_1, after_2)
+    # The trapezoidal rule over the volumes: exact along a wall that gives in proportion to the pressure.
+    work_1 = 0.5 * (before_1 + after_1) * (last.volume_1 - first.volume_1)
+    work_2 = 0.5 * (before_2 + after_2) * (last.volume_2 - first.volume_2)
+    return masses._replace(gas_work=masses.gas_work + work_1 + work_2)
 
 
 def masses_at_start(initial: PlantState) -> ThermalState:

@@ -31,7 +31,7 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
         next_angle,
         lane.flowing,
         length,
-        parts=parts.warm_functions,
+        parts=parts.functions,
     )
 
 
@@ -75,10 +75,10 @@ def add(parts: Program, lane: Lane) -> None:
 
 def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
     """Return the state with the work of the gas up to the angle reached [rad] instead of the assumed angle [rad]."""
-    return parts.warm_functions.after_motion(lane.plant, lane.thermal, state, assumed, reached)
+    return thermal_gas.after_motion(lane.plant, lane.thermal, state, assumed, reached, parts=parts.functions)
 
 
 def work(parts: Program, lane: Lane) -> None:
     """Add the work of the gas on shaft and walls; a locked joint with rigid chambers does no work."""
     if not parts.is_locked or parts.actuator.gives:
-        lane.warmed = parts.warm_functions.with_work(lane.plant, lane.warmed, lane.state, lane.after)
+        lane.warmed = thermal_gas.with_work(lane.plant, lane.warmed, lane.state, lane.after, parts=parts.functions)

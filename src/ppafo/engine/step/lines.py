@@ -47,7 +47,7 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
             next_angle,
             lane.flowing,
             length,
-            parts=parts.warm_functions,
+            parts=parts.functions,
         )
     else:
         lane.fed_gas = supply_lines.begin_fed_gas(
