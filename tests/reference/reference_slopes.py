@@ -103,8 +103,9 @@ def slope_lines(program: Program, collector: SourceCollector) -> list[str]:
         f"openings = {add(program.valve.instant)}(valve, valve_state, command)",
         f"pressure_1, pressure_2 = {add(program.actuator.pressures)}(plant, angle, y[2], y[3])",
         *gas_lines(program, add),
-        "vented = gas.supplied - gas.mass_1 - gas.mass_2",
-        "slopes[4] = gas.supplied",
+        "supplied = gas.supplied_1 + gas.supplied_2",
+        "vented = supplied - gas.mass_1 - gas.mass_2",
+        "slopes[4] = supplied",
         "slopes[5] = vented",
         "slopes[6] = abs(gas.leaked)",
     ]
@@ -116,7 +117,7 @@ def slope_lines(program: Program, collector: SourceCollector) -> list[str]:
         lines += ["slopes[0] = 0.0", "slopes[1] = 0.0"]
     lines += [f"valve_state_moves = {add(program.valve.rates)}(valve, valve_state, command)"]
     if program.stated:
-        seen = "angle, rate, pressure_1, pressure_2, gas.supplied, vented, command"
+        seen = "angle, rate, pressure_1, pressure_2, supplied, vented, command"
         lines.append(f"now = {add(PlantSnapshot)}({seen})")
     for name, kind in program.stated.items():
         lines.append(f"{name}_state_moves = {add(kind.slopes)}({name}, {name}_state, now)")

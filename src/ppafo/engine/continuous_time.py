@@ -88,8 +88,12 @@ def gas_rates(
     flowing = flows_at(plant, openings, pressure_1, pressure_2)
     if thermal is None:
         flows = flow_rates(flowing)
-        gained_1, gained_2, supplied, warming_1, warming_2 = flows.mass_1, flows.mass_2, flows.supplied, 0.0, 0.0
+        gained_1 = flows.mass_1
+        gained_2 = flows.mass_2
+        supplied = flows.supplied_1 + flows.supplied_2
         vented = supplied - gained_1 - gained_2
+        warming_1 = 0.0
+        warming_2 = 0.0
     else:
         content_1 = chamber_mass(pressure_1, at.volume_1, product)
         content_2 = chamber_mass(pressure_2, at.volume_2, product)
@@ -99,7 +103,9 @@ def gas_rates(
         state = PlantState(*[0.0] * len(PlantState._fields))._replace(mass_1=content_1, mass_2=content_2)
         masses = ThermalState(*[0.0] * len(ThermalState._fields))._replace(mass_1=mass_1, mass_2=mass_2)
         found = thermal_flows(thermal, state, masses, at, flowing)
-        gained_1, gained_2, supplied = found.content_1, found.content_2, found.supplied
+        gained_1 = found.content_1
+        gained_2 = found.content_2
+        supplied = found.supplied_1 + found.supplied_2
         vented = supplied - found.mass_1 - found.mass_2
         # A temperature is the walls' times content over mass.
         warming_1 = temperatures[0] * (gained_1 / content_1 - found.mass_1 / mass_1)

@@ -29,6 +29,8 @@ from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import LED_SHANK, REQUESTED, WALK, MeterKind, ReferenceSummary
 
 if TYPE_CHECKING:
+    from ppafo.engine.scheme.pneumatics import Flows
+    from ppafo.engine.scheme.thermal_gas import ThermalFlows
     from ppafo.engine.step.lane import Lane
 
 
@@ -52,8 +54,11 @@ class GasPhases(Protocol):
     def ends(self, parts: "Program", lane: "Lane") -> tuple[float, float]:
         """Return the pressures [Pa] of both chambers after the first stage."""
 
-    def first_flows(self, parts: "Program", lane: "Lane") -> tuple[float, float, float]:
-        """Return the flows [kg/s] of the first stage: from the supplies, and into both chambers."""
+    def first(self, parts: "Program", lane: "Lane") -> "Flows | ThermalFlows":
+        """Return the rates of the first stage [kg/s]."""
+
+    def changes(self, parts: "Program", lane: "Lane") -> "Flows | ThermalFlows":
+        """Return the changes in the step [kg]."""
 
     def change(self, parts: "Program", lane: "Lane", length: float) -> None:
         """Set the second stage, and the changes from both stages."""

@@ -46,7 +46,8 @@ def change(parts: Program, lane: Any, length: float) -> None:
     isothermal.change(parts, lane, length)
     lane.halved = 0.5 * lane.mine.share
     share = lane.halved + lane.halved
-    lane.change = lane.change._replace(mass_1=share * lane.change.mass_1, supplied=share * lane.change.supplied)
+    supplied_1, supplied_2 = share * lane.change.supplied_1, share * lane.change.supplied_2
+    lane.change = lane.change._replace(mass_1=share * lane.change.mass_1, supplied_1=supplied_1, supplied_2=supplied_2)
 
 
 def gas_of_mine(of_plant: PlainFunction | None) -> Any:

@@ -12,17 +12,15 @@ from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
-    GasChange,
-    MovingGas,
+    Flows,
+    GasStage,
     SlopedFlows,
     begin_moving_gas,
+    gas_change,
     gas_flows,
-    held_chambers,
-    linearise,
-    moving_change,
-    second_moving_stage,
+    second_stage,
 )
-from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, plant_at_line_pressures
+from ppafo.engine.scheme.supply_lines import lines_after, plant_at_line_pressures, with_lines
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import (
     PlantParameters,
@@ -71,10 +69,10 @@ def flowing_now(plant: PlantParameters, state: PlantState, ports: tuple[SinglePo
     return gas_flows(plant, *pressures, *ports, single_port_flow)
 
 
-def end_of(plant: PlantParameters, begun: MovingGas, ports: tuple[SinglePort, SinglePort], step: float) -> GasChange:
+def end_of(plant: PlantParameters, begun: GasStage, ports: tuple[SinglePort, SinglePort], step: float) -> Flows:
     """What a step [s] adds [kg], from its first stage."""
-    flowing = gas_flows(plant, begun.still.end_1, begun.still.end_2, *ports, single_port_flow).flows
-    return moving_change(plant, begun.still, second_moving_stage(begun, flowing), step)
+    flowing = gas_flows(plant, begun.end_1, begun.end_2, *ports, single_port_flow).flows
+    return gas_change(plant, begun, second_stage(begun, begun.drift, flowing), step)
 
 
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
@@ -87,13 +85,13 @@ def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     )
     for _ in range(round(DURATION / step)):
         ports = open_ports(plant_at_line_pressures(plant, lines, gas))
-        begun = begin_fed_gas(
-            plant, lines, gas, state, ANGLE, flowing_now(plant, state, ports), step, parts=VANE_FUNCTIONS
-        )
-        ports = open_ports(plant_at_line_pressures(plant, lines, begun.lines.after))
-        change = end_of(plant, begun.chambers, ports, step)
-        from_2 = single_port_flow(begun.chambers.still.end_2, ports[1], plant.valve_curve)[0].from_source
-        gas = end_lines(plant, lines, gas, begun, change, from_2, step)
+        flowing = with_lines(plant, lines, state, flowing_now(plant, state, ports), 1.0, parts=VANE_FUNCTIONS)
+        begun = begin_moving_gas(plant, state, ANGLE, flowing, step, parts=VANE_FUNCTIONS)
+        drawn = (step * begun.first.supplied_1, step * begun.first.supplied_2)
+        between = lines_after(plant, lines, gas, *drawn, 0.0, step)
+        change = end_of(plant, begun, open_ports(plant_at_line_pressures(plant, lines, between.after)), step)
+        drawn = (change.supplied_1, change.supplied_2)
+        gas = lines_after(plant, lines, gas, *drawn, between.inlet_rise, step).after
         state = with_gas(state, change)
     return Filled(state, gas)
 
@@ -180,9 +178,8 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
         ),
     )
     for _ in range(round(DURATION / step)):
-        held, flowing = held_chambers(plant, ANGLE, parts=VANE_FUNCTIONS), flowing_now(plant, state, ports)
-        linear = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
-        begun = begin_moving_gas(plant, state, held, ANGLE, linear, flowing.flows, step, parts=VANE_FUNCTIONS)
+        flowing = flowing_now(plant, state, ports)
+        begun = begin_moving_gas(plant, state, ANGLE, flowing, step, parts=VANE_FUNCTIONS)
         state = with_gas(state, end_of(plant, begun, ports, step))
     ideal = np.array(chamber_pressures(plant, ANGLE, state.mass_1, state.mass_2))
     away = []

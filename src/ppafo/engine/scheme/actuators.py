@@ -6,19 +6,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.scheme.pneumatics import (
-    SHORTEST,
-    HeldChambers,
-    MovingGas,
-    SlopedFlows,
-    StillGas,
-    added_flows,
-    flow_rates,
-    held_pressures,
-    linearise,
-    response,
-    solve_stage,
-)
+from ppafo.engine.scheme.pneumatics import HeldChambers, held_pressures
 from ppafo.model.actuators.kind import ActuatorModel, Chambers
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.actuators.vane import chambers
@@ -54,39 +42,6 @@ def pressures_held(
 ) -> tuple[float, float]:
     """Absolute chamber pressures [Pa] at the angle stored in ``held``, for chambers that may expand under pressure."""
     return parts.pressures(plant, held.angle, state.mass_1, state.mass_2)
-
-
-def begin_shaped_gas(
-    plant: PlantParameters,
-    state: PlantState,
-    next_angle: float,
-    flowing: SlopedFlows,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> MovingGas:
-    """First stage of one step [s] as ``begin_moving_gas``, for chambers that expand under pressure.
-
-    Mass responds to pressure in proportion to ``V + p dV/dp``: a compliant chamber takes up more gas.
-    """
-    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
-    # Volumes at both angles at one pressure: the drift is what the angle alone does.
-    here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
-    ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
-    per_mass_1 = plant.gas_product / (here.volume_1 + pressure_1 * here.compliance_1)
-    per_mass_2 = plant.gas_product / (here.volume_2 + pressure_2 * here.compliance_2)
-    linear = linearise(per_mass_1, per_mass_2, flowing, step)
-    per_duration = 1.0 / (plant.gas_product * max(step, SHORTEST))
-    drift = response(
-        linear,
-        pressure_1 * (here.volume_1 - ahead.volume_1) * per_duration,
-        pressure_2 * (here.volume_2 - ahead.volume_2) * per_duration,
-    )
-    first = solve_stage(linear, added_flows(flow_rates(flowing.flows), drift))
-    end_1, end_2 = parts.pressures(
-        plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
-    )
-    return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
 
 
 VANE_FUNCTIONS = ActuatorFunctions(

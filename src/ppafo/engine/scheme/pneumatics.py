@@ -5,7 +5,7 @@ the exact Jacobian and the time derivative due to the moving volumes, which chan
 are integrated by the same method as further unknowns, so that mass is conserved to rounding.
 
 Order of a step: the flows at the start with their derivatives (``gas_flows``), the first stage (``begin_still_gas``,
-``begin_moving_gas``, ``begin_shaped_gas``), the flows at the pressures after the first stage, the second stage, and the
+``begin_moving_gas``), the flows at the pressures after the first stage, the second stage, and the
 changes by both stages. The flows of many runs are computed in short loops of their own, because a division or a square
 root has a long latency and the processor overlaps several runs meanwhile. The first stage alone is a step of first
 order, and the contribution of the second stage is the error estimate.
@@ -69,21 +69,16 @@ MINIMUM_PRESSURE = 0.02
 """Lowest reference pressure for errors, as a fraction of the atmospheric pressure [-]."""
 
 
-class GasChange(NamedTuple):
-    """Changes over one step [kg]: both chamber masses, gas drawn from the source, vane leakage from chamber 1 to 2."""
-
-    mass_1: float
-    mass_2: float
-    supplied: float
-    leaked: float
-
-
 class Flows(NamedTuple):
-    """Rates of both chamber masses, of the supplied mass and of the leaked mass [kg/s]."""
+    """Rates of both chamber masses, of both supplied masses and of the leaked mass [kg/s]; over a step, changes [kg].
+
+    The leak is the flow across the vane from chamber 1 to 2.
+    """
 
     mass_1: float
     mass_2: float
-    supplied: float
+    supplied_1: float
+    supplied_2: float
     leaked: float
 
 
@@ -91,17 +86,21 @@ def flow_rates(flowing: GasFlows) -> Flows:
     """Rates of all masses [kg/s] from the flows through ports and leakage. Equation (9)."""
     in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
     return Flows(
-        mass_1=in_1.total - leak, mass_2=in_2.total + leak, supplied=in_1.from_source + in_2.from_source, leaked=leak
+        mass_1=in_1.total - leak,
+        mass_2=in_2.total + leak,
+        supplied_1=in_1.from_source,
+        supplied_2=in_2.from_source,
+        leaked=leak,
     )
 
 
 class Linearisation(NamedTuple):
-    """Linearised flows of a step: the matrix ``1 - gamma h J`` of both masses, and the derivatives of the supply flow.
+    """Linearised flows of a step: the matrix ``1 - gamma h J`` of both masses, and the derivatives of the supply flows.
 
     Attributes:
         a, b, c, d: matrix elements by rows [-]
         scale: 1 divided by the determinant [-]
-        supplied_by_1, supplied_by_2: gamma h times the derivatives of the supply flow with respect to both masses [-]
+        supplied_by_1, supplied_by_2: gamma h times the derivatives of both supply flows, each by its chamber's mass [-]
 
     The leakage needs no elements of its own: gamma h times its derivatives are ``-c`` and ``b``.
     """
@@ -115,13 +114,21 @@ class Linearisation(NamedTuple):
     supplied_by_2: float
 
 
-class StillGas(NamedTuple):
-    """First stage of a step with fixed volumes: linearised flows, stage slopes [kg/s], final pressures [Pa]."""
+class GasStage(NamedTuple):
+    """First stage of a step: linearised flows, stage slopes [kg/s], and absolute pressures [Pa] after the stage.
+
+    ``drift`` is gamma h times the time derivative of all flows between moving volumes [kg/s].
+    """
 
     linear: Linearisation
     first: Flows
+    drift: Flows
     end_1: float
     end_2: float
+
+
+STILL = Flows(0.0, 0.0, 0.0, 0.0, 0.0)
+"""Time derivative of the flows between fixed volumes [kg/s]."""
 
 
 class HeldChambers(NamedTuple):
@@ -147,19 +154,13 @@ def held_pressures(_plant: PlantParameters, held: HeldChambers, state: PlantStat
     return state.mass_1 * held.per_mass_1, state.mass_2 * held.per_mass_2
 
 
-class MovingGas(NamedTuple):
-    """First stage with moving volumes: as ``StillGas``, with gamma h times the time derivative of all flows [kg/s]."""
-
-    still: StillGas
-    drift: Flows
-
-
 def response(linear: Linearisation, rate_1: float, rate_2: float) -> Flows:
     """Gamma h times the rate of change of all flows [kg/s], for given rates of change of both masses [kg/s]."""
     return Flows(
         mass_1=(1.0 - linear.a) * rate_1 - linear.b * rate_2,
         mass_2=(1.0 - linear.d) * rate_2 - linear.c * rate_1,
-        supplied=linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
+        supplied_1=linear.supplied_by_1 * rate_1,
+        supplied_2=linear.supplied_by_2 * rate_2,
         leaked=linear.b * rate_2 - linear.c * rate_1,
     )
 
@@ -169,7 +170,8 @@ def added_flows(one: Flows, other: Flows) -> Flows:
     return Flows(
         mass_1=one.mass_1 + other.mass_1,
         mass_2=one.mass_2 + other.mass_2,
-        supplied=one.supplied + other.supplied,
+        supplied_1=one.supplied_1 + other.supplied_1,
+        supplied_2=one.supplied_2 + other.supplied_2,
         leaked=one.leaked + other.leaked,
     )
 
@@ -184,7 +186,8 @@ def solve_stage(linear: Linearisation, right: Flows) -> Flows:
     return Flows(
         mass_1=rate_1,
         mass_2=rate_2,
-        supplied=right.supplied + linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
+        supplied_1=right.supplied_1 + linear.supplied_by_1 * rate_1,
+        supplied_2=right.supplied_2 + linear.supplied_by_2 * rate_2,
         leaked=right.leaked + linear.b * rate_2 - linear.c * rate_1,
     )
 
@@ -220,112 +223,98 @@ def begin_still_gas(
     step: float,
     *,
     parts: ActuatorFunctions,
-) -> StillGas:
+) -> GasStage:
     """First stage of one step [s] with a vane at rest."""
     linear = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
     first = solve_stage(linear, flow_rates(flowing.flows))
     # Pressures as in a step with moving volumes: a locked joint has the bits of an exported plant at rest.
     ended = state._replace(mass_1=state.mass_1 + step * first.mass_1, mass_2=state.mass_2 + step * first.mass_2)
     end_1, end_2 = parts.held_pressures(plant, held, ended)
-    return StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2)
+    return GasStage(linear=linear, first=first, drift=STILL, end_1=end_1, end_2=end_2)
 
 
 def begin_moving_gas(
     plant: PlantParameters,
     state: PlantState,
-    held: HeldChambers,
     next_angle: float,
-    linear: Linearisation,
-    flowing: GasFlows,
+    flowing: SlopedFlows,
     step: float,
     *,
     parts: ActuatorFunctions,
-) -> MovingGas:
-    """First stage of one step [s] with volumes that change linearly up to ``next_angle`` [rad]."""
-    volumes = parts.rest_volumes(plant, state.angle)
-    next_volumes = parts.rest_volumes(plant, next_angle)
+) -> GasStage:
+    """First stage of one step [s] with volumes that change linearly up to ``next_angle`` [rad].
+
+    Mass responds to pressure in proportion to ``V + p dV/dp``: a compliant chamber takes up more gas.
+    """
+    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
+    # Volumes at both angles at one pressure: the drift is what the angle alone does.
+    here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
+    ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
+    room_1 = here.volume_1 + pressure_1 * here.compliance_1
+    room_2 = here.volume_2 + pressure_2 * here.compliance_2
+    # One division, as in ``pressures_per_mass``.
+    per_rooms = plant.gas_product / (room_1 * room_2)
+    linear = linearise(room_2 * per_rooms, room_1 * per_rooms, flowing, step)
     # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
     per_duration = 1.0 / (plant.gas_product * max(step, SHORTEST))
     drift = response(
         linear,
-        state.mass_1 * held.per_mass_1 * (volumes[0] - next_volumes[0]) * per_duration,
-        state.mass_2 * held.per_mass_2 * (volumes[1] - next_volumes[1]) * per_duration,
+        pressure_1 * (here.volume_1 - ahead.volume_1) * per_duration,
+        pressure_2 * (here.volume_2 - ahead.volume_2) * per_duration,
     )
-    first = solve_stage(linear, added_flows(flow_rates(flowing), drift))
+    first = solve_stage(linear, added_flows(flow_rates(flowing.flows), drift))
     end_1, end_2 = parts.pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
-    return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
+    return GasStage(linear=linear, first=first, drift=drift, end_1=end_1, end_2=end_2)
 
 
-def second_right_sides(first: Flows, flowing: GasFlows) -> Flows:
-    """Right-hand sides of the second stage [kg/s] with fixed volumes, from the flows after the first."""
+def second_stage(begun: GasStage, drift: Flows, flowing: GasFlows) -> Flows:
+    """Slopes of the second stage [kg/s], from the flows after the first."""
     flows = flow_rates(flowing)
-    return Flows(
-        mass_1=flows.mass_1 - 2.0 * first.mass_1,
-        mass_2=flows.mass_2 - 2.0 * first.mass_2,
-        supplied=flows.supplied - 2.0 * first.supplied,
-        leaked=flows.leaked - 2.0 * first.leaked,
+    first = begun.first
+    right = Flows(
+        mass_1=flows.mass_1 - 2.0 * first.mass_1 - drift.mass_1,
+        mass_2=flows.mass_2 - 2.0 * first.mass_2 - drift.mass_2,
+        supplied_1=flows.supplied_1 - 2.0 * first.supplied_1 - drift.supplied_1,
+        supplied_2=flows.supplied_2 - 2.0 * first.supplied_2 - drift.supplied_2,
+        leaked=flows.leaked - 2.0 * first.leaked - drift.leaked,
     )
+    return solve_stage(begun.linear, right)
 
 
-def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
-    """Mass changes [kg] in a step of ``step`` [s], from the weighted sum of both stages."""
-    return GasChange(
-        # Weights of the method: 3/2 of the first stage and 1/2 of the second.
-        mass_1=step * (1.5 * first.mass_1 + 0.5 * second.mass_1),
-        mass_2=step * (1.5 * first.mass_2 + 0.5 * second.mass_2),
-        supplied=step * (1.5 * first.supplied + 0.5 * second.supplied),
-        leaked=step * (1.5 * first.leaked + 0.5 * second.leaked),
-    )
+def of_both_stages(first: float, second: float, step: float) -> float:
+    """Change in a step [s] from the rates of both stages, with the weights of the method."""
+    return step * (1.5 * first + 0.5 * second)
 
 
-def second_still_stage(begun: StillGas, flowing: GasFlows) -> Flows:
-    """Slopes of the second stage [kg/s] for a step with a vane at rest."""
-    return solve_stage(begun.linear, second_right_sides(begun.first, flowing))
+def refused_backflow(plant: PlantParameters, supplied: float) -> float:
+    """Gas [kg or kg/s] that a supply without relief does not take back, and which stays in its chamber.
 
-
-def second_moving_stage(begun: MovingGas, flowing: GasFlows) -> Flows:
-    """Slopes of the second stage [kg/s] for a step with moving volumes."""
-    right, drift = second_right_sides(begun.still.first, flowing), begun.drift
-    return solve_stage(
-        begun.still.linear,
-        Flows(
-            mass_1=right.mass_1 - drift.mass_1,
-            mass_2=right.mass_2 - drift.mass_2,
-            supplied=right.supplied - drift.supplied,
-            leaked=right.leaked - drift.leaked,
-        ),
-    )
-
-
-def still_change(plant: PlantParameters, begun: StillGas, second: Flows, step: float) -> GasChange:
-    """Mass changes [kg] in one step [s] with a vane at rest, from both stages."""
-    change = both_stages(begun.first, second, step)
-    # Only a leak can push gas towards the source here, hardly any: what would go back counts as vented.
-    supplied = admitted_flow(change.supplied, plant.relieving)
-    return GasChange(mass_1=change.mass_1, mass_2=change.mass_2, supplied=supplied, leaked=change.leaked)
-
-
-def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: float) -> GasChange:
-    """Mass changes [kg] in one step [s] with moving volumes, from both stages.
-
-    Without relieving supplies, the drawn mass is at least 0. If the pressure of a chamber rises above its supply inside
-    a step, the linearised flow would push gas back into the supply; this gas stays in the chamber.
+    If the pressure of a chamber rises above its supply inside a step, the linearised flow would push it there.
     """
-    change = both_stages(begun.first, second, step)
-    supplied = admitted_flow(change.supplied, plant.relieving)
-    kept = supplied - change.supplied
-    # The slope of a fed chamber's draw is below 0, the other's is 0.
-    to_1 = kept if begun.linear.supplied_by_1 < begun.linear.supplied_by_2 else 0.0
-    return GasChange(
-        mass_1=change.mass_1 + to_1, mass_2=change.mass_2 + (kept - to_1), supplied=supplied, leaked=change.leaked
+    return admitted_flow(supplied, plant.relieving) - supplied
+
+
+def gas_change(plant: PlantParameters, begun: GasStage, second: Flows, step: float) -> Flows:
+    """Changes [kg] in one step [s], from both stages."""
+    first = begun.first
+    supplied_1 = of_both_stages(first.supplied_1, second.supplied_1, step)
+    supplied_2 = of_both_stages(first.supplied_2, second.supplied_2, step)
+    kept_1 = refused_backflow(plant, supplied_1)
+    kept_2 = refused_backflow(plant, supplied_2)
+    return Flows(
+        mass_1=of_both_stages(first.mass_1, second.mass_1, step) + kept_1,
+        mass_2=of_both_stages(first.mass_2, second.mass_2, step) + kept_2,
+        supplied_1=supplied_1 + kept_1,
+        supplied_2=supplied_2 + kept_2,
+        leaked=of_both_stages(first.leaked, second.leaked, step),
     )
 
 
 def gas_error(
     plant: PlantParameters,
-    begun: StillGas,
+    begun: GasStage,
     second: Flows,
     next_angle: float,
     step: float,
@@ -339,8 +328,8 @@ def gas_error(
     added.
     """
     linear = begun.linear
-    drawn = 1.5 * begun.first.supplied + 0.5 * second.supplied
-    refused = admitted_flow(drawn, plant.relieving) - drawn
+    refused_1 = refused_backflow(plant, of_both_stages(begun.first.supplied_1, second.supplied_1, 1.0))
+    refused_2 = refused_backflow(plant, of_both_stages(begun.first.supplied_2, second.supplied_2, 1.0))
     added_1 = linear.d * (begun.first.mass_1 + second.mass_1) - linear.b * (begun.first.mass_2 + second.mass_2)
     added_2 = linear.a * (begun.first.mass_2 + second.mass_2) - linear.c * (begun.first.mass_1 + second.mass_1)
     volume_1, volume_2 = parts.rest_volumes(plant, next_angle)
@@ -348,7 +337,7 @@ def gas_error(
     scale = abs(linear.scale)
     content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)
     content_2 = volume_2 * pressure_that_matters(plant, begun.end_2)
-    missed = larger_share(scale * abs(added_1) + refused, content_1, scale * abs(added_2) + refused, content_2)
+    missed = larger_share(scale * abs(added_1) + refused_1, content_1, scale * abs(added_2) + refused_2, content_2)
     return 0.5 / ALLOWED_OF_PRESSURE * step * plant.gas_product * missed
 
 
@@ -360,7 +349,7 @@ def larger_share(part_1: float, whole_1: float, part_2: float, whole_2: float) -
 
 def opening_error(
     plant: PlantParameters,
-    begun: StillGas,
+    begun: GasStage,
     shift: float,
     next_angle: float,
     step: float,

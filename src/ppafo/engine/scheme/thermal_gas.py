@@ -30,6 +30,7 @@ from ppafo.engine.scheme.pneumatics import (
     GasFlows,
     SlopedFlows,
     pressure_that_matters,
+    refused_backflow,
 )
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.gas import enthalpy_flow_ratio, mass_flow_ratio
@@ -39,7 +40,6 @@ from ppafo.model.plant import (
     PlantState,
     ThermalParameters,
     ThermalState,
-    admitted_flow,
 )
 
 
@@ -49,7 +49,7 @@ class ThermalFlows(NamedTuple):
     Attributes:
         content_1, content_2: contents of both chambers
         mass_1, mass_2: true masses of both chambers
-        supplied: mass drawn from the source
+        supplied_1, supplied_2: masses drawn from both supplies
         leaked: mass through the vane leakage from chamber 1 to 2
         source_content: content drawn from the source
         port_content: content through both ports
@@ -60,7 +60,8 @@ class ThermalFlows(NamedTuple):
     content_2: float
     mass_1: float
     mass_2: float
-    supplied: float
+    supplied_1: float
+    supplied_2: float
     leaked: float
     source_content: float
     port_content: float
@@ -192,7 +193,8 @@ def thermal_flows(
         content_2=content_rate(thermal, enthalpy_2 + leaked_enthalpy, work_2, heat_2, at.give_2),
         mass_1=supplied_1 + vent_1 * vent_1_carries.mass - leaked,
         mass_2=supplied_2 + vent_2 * vent_2_carries.mass + leaked,
-        supplied=supplied_1 + supplied_2,
+        supplied_1=supplied_1,
+        supplied_2=supplied_2,
         leaked=leaked,
         source_content=source_1 + source_2,
         port_content=enthalpy_1 + enthalpy_2,
@@ -259,7 +261,8 @@ def flow_response(slopes: _FlowSlopes, content_1: float, content_2: float) -> Th
         content_2=slopes.kept_2 * (slopes.content_2_by_1 * content_1 + slopes.content_2_by_2 * content_2),
         mass_1=slopes.mass_1_by_1 * content_1 + slopes.mass_1_by_2 * content_2,
         mass_2=slopes.mass_2_by_1 * content_1 + slopes.mass_2_by_2 * content_2,
-        supplied=slopes.supplied_by_1 * content_1 + slopes.supplied_by_2 * content_2,
+        supplied_1=slopes.supplied_by_1 * content_1,
+        supplied_2=slopes.supplied_by_2 * content_2,
         leaked=slopes.leaked_by_1 * content_1 + slopes.leaked_by_2 * content_2,
         source_content=slopes.source_content_by_1 * content_1 + slopes.source_content_by_2 * content_2,
         port_content=(slopes.content_1_by_1 + slopes.content_2_by_1) * content_1
@@ -275,7 +278,8 @@ def combine_flows(one: ThermalFlows, factor_one: float, other: ThermalFlows, fac
         content_2=factor_one * one.content_2 + factor_other * other.content_2,
         mass_1=factor_one * one.mass_1 + factor_other * other.mass_1,
         mass_2=factor_one * one.mass_2 + factor_other * other.mass_2,
-        supplied=factor_one * one.supplied + factor_other * other.supplied,
+        supplied_1=factor_one * one.supplied_1 + factor_other * other.supplied_1,
+        supplied_2=factor_one * one.supplied_2 + factor_other * other.supplied_2,
         leaked=factor_one * one.leaked + factor_other * other.leaked,
         source_content=factor_one * one.source_content + factor_other * other.source_content,
         port_content=factor_one * one.port_content + factor_other * other.port_content,
@@ -387,28 +391,13 @@ def solve_thermal_stage(matrix: _ThermalMatrix, right: ThermalFlows) -> ThermalF
         content_2=content_2,
         mass_1=mass_1,
         mass_2=mass_2,
-        supplied=right.supplied + by_contents.supplied,
+        supplied_1=right.supplied_1 + by_contents.supplied_1,
+        supplied_2=right.supplied_2 + by_contents.supplied_2,
         leaked=right.leaked + by_contents.leaked,
         source_content=right.source_content + by_contents.source_content,
         port_content=right.port_content + by_contents.port_content,
         heat=right.heat + warmed_1 + warmed_2,
     )
-
-
-def begin_thermal_gas(
-    plant: PlantParameters,
-    thermal: ThermalParameters,
-    state: PlantState,
-    masses: ThermalState,
-    next_angle: float,
-    flowing: SlopedFlows,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> ThermalGas:
-    """First stage of one step [s] with an energy balance; volumes change linearly up to ``next_angle`` [rad]."""
-    at_begin = chambers_at_begin(plant, state, next_angle, step, parts=parts)
-    return begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step, parts=parts)
 
 
 def widening(
@@ -457,19 +446,19 @@ def chambers_at_end(
     return widening(ahead, here, ahead, pressure_1, pressure_2, step)
 
 
-def begin_thermal_stage(
+def begin_thermal_gas(
     plant: PlantParameters,
     thermal: ThermalParameters,
     state: PlantState,
     masses: ThermalState,
-    at_begin: ThermalBegin,
     next_angle: float,
     flowing: SlopedFlows,
     step: float,
     *,
     parts: ActuatorFunctions,
 ) -> ThermalGas:
-    """First stage of one step [s] that ends at ``next_angle`` [rad], from all flows with their derivatives."""
+    """First stage of one step [s] with an energy balance; volumes change linearly up to ``next_angle`` [rad]."""
+    at_begin = chambers_at_begin(plant, state, next_angle, step, parts=parts)
     at = at_begin.chambers
     per_content_1, per_content_2 = at_begin.per_content_1, at_begin.per_content_2
     flows = thermal_flows(thermal, state, masses, at, flowing.flows)
@@ -515,22 +504,21 @@ def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing:
 def thermal_change(
     plant: PlantParameters, thermal: ThermalParameters, begun: ThermalGas, second: ThermalFlows, step: float
 ) -> ThermalFlows:
-    """Changes [kg] in one step [s] from both stages; supplies without relief are treated as in ``moving_change``."""
+    """Changes [kg] in one step [s] from both stages; supplies without relief are treated as in ``gas_change``."""
     change = combine_flows(begun.first, 1.5 * step, second, 0.5 * step)
-    supplied = admitted_flow(change.supplied, plant.relieving)
-    kept = supplied - change.supplied
-    to_1 = kept if begun.matrix.slopes.supplied_by_1 < begun.matrix.slopes.supplied_by_2 else 0.0
-    to_2 = kept - to_1
+    kept_1 = refused_backflow(plant, change.supplied_1)
+    kept_2 = refused_backflow(plant, change.supplied_2)
     carries = enthalpy_flow_ratio(1.0, thermal.heat_capacity_ratio)
     return ThermalFlows(
-        content_1=change.content_1 + to_1 * carries * begun.matrix.slopes.kept_1,
-        content_2=change.content_2 + to_2 * carries * begun.matrix.slopes.kept_2,
-        mass_1=change.mass_1 + to_1,
-        mass_2=change.mass_2 + to_2,
-        supplied=supplied,
+        content_1=change.content_1 + kept_1 * carries * begun.matrix.slopes.kept_1,
+        content_2=change.content_2 + kept_2 * carries * begun.matrix.slopes.kept_2,
+        mass_1=change.mass_1 + kept_1,
+        mass_2=change.mass_2 + kept_2,
+        supplied_1=change.supplied_1 + kept_1,
+        supplied_2=change.supplied_2 + kept_2,
         leaked=change.leaked,
-        source_content=change.source_content + kept * carries,
-        port_content=change.port_content + kept * carries,
+        source_content=change.source_content + (kept_1 + kept_2) * carries,
+        port_content=change.port_content + (kept_1 + kept_2) * carries,
         heat=change.heat,
     )
 
@@ -603,12 +591,13 @@ def after_motion(
 
 def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlows) -> tuple[PlantState, ThermalState]:
     """Plant state, gas masses and energy totals after the changes [kg] of one step, without the work of the gas."""
-    vented = change.supplied - change.mass_1 - change.mass_2
+    supplied = change.supplied_1 + change.supplied_2
+    vented = supplied - change.mass_1 - change.mass_2
     return (
         state._replace(
             mass_1=state.mass_1 + change.content_1,
             mass_2=state.mass_2 + change.content_2,
-            supplied_mass=state.supplied_mass + change.supplied,
+            supplied_mass=state.supplied_mass + supplied,
             vented_mass=state.vented_mass + vented,
             leaked_mass=state.leaked_mass + abs(change.leaked),
         ),

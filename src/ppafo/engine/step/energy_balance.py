@@ -16,7 +16,7 @@ def groups(parts: Program) -> Groups:
     return {
         "thermal": given(ThermalParameters),
         "masses": kept(ThermalState),
-        **({"thermal_gas": handed(ThermalGas)} if parts.feed is None else {}),
+        "thermal_gas": handed(ThermalGas),
         **({"thermal_change": handed(ThermalFlows)} if parts.angle is None else {}),
     }
 
@@ -35,37 +35,37 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     )
 
 
-def chambers(parts: Program, lane: Lane) -> ThermalGas:
-    """Return the first stage of both chambers, with or without supply lines."""
-    return lane.thermal_gas if parts.feed is None else lane.fed_thermal_gas.chambers
-
-
 def ends(parts: Program, lane: Lane) -> tuple[float, float]:
     """Return the pressures [Pa] of both chambers after the first stage."""
-    return thermal_gas.end_pressures(lane.plant, chambers(parts, lane))
+    return thermal_gas.end_pressures(lane.plant, lane.thermal_gas)
 
 
-def first_flows(parts: Program, lane: Lane) -> tuple[float, float, float]:
-    """Return the flows of the first stage [kg/s]: from the supplies, and into both chambers."""
-    begun = chambers(parts, lane)
-    return begun.first.supplied, begun.first.mass_1, begun.first.mass_2
+def first(parts: Program, lane: Lane) -> ThermalFlows:
+    """Return the rates of the first stage [kg/s]."""
+    return lane.thermal_gas.first
+
+
+def changes(parts: Program, lane: Lane) -> ThermalFlows:
+    """Return the changes in the step [kg]."""
+    return lane.thermal_change
 
 
 def change(parts: Program, lane: Lane, length: float) -> None:
     """Set the second stage, and the changes of mass and energy from both stages."""
-    begun = chambers(parts, lane)
-    lane.thermal_second = thermal_gas.second_thermal_stage(lane.thermal, begun, lane.passing)
-    lane.thermal_change = thermal_gas.thermal_change(lane.plant, lane.thermal, begun, lane.thermal_second, length)
+    lane.thermal_second = thermal_gas.second_thermal_stage(lane.thermal, lane.thermal_gas, lane.passing)
+    lane.thermal_change = thermal_gas.thermal_change(
+        lane.plant, lane.thermal, lane.thermal_gas, lane.thermal_second, length
+    )
 
 
 def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
     """Return the error of the chamber pressures in a part of a step, divided by the allowed error [-]."""
-    return thermal_gas.thermal_error(lane.plant, chambers(parts, lane), lane.thermal_second, length)
+    return thermal_gas.thermal_error(lane.plant, lane.thermal_gas, lane.thermal_second, length)
 
 
 def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: float) -> float:
     """Return the error due to a moving valve in a part of a step, divided by the allowed error [-]."""
-    return thermal_gas.thermal_opening_error(lane.plant, chambers(parts, lane), shift, length)
+    return thermal_gas.thermal_opening_error(lane.plant, lane.thermal_gas, shift, length)
 
 
 def add(parts: Program, lane: Lane) -> None:

@@ -8,22 +8,13 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # a lane is of these, and makes none of them
     from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
-    from ppafo.engine.scheme.pneumatics import (
-        Flows,
-        GasChange,
-        GasFlows,
-        HeldChambers,
-        MovingGas,
-        SlopedFlows,
-        StillGas,
-    )
-    from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
+    from ppafo.engine.scheme.pneumatics import Flows, GasFlows, GasStage, HeldChambers, SlopedFlows
     from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
     from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
     from ppafo.model.gait import GaitMeasured, GaitNow, GaitPlace, GaitSeries, GaitTiming
     from ppafo.model.leg import FootLoad, LegParameters
     from ppafo.model.plant import PlantState, ThermalParameters
-    from ppafo.model.regulator import LineState, SupplyLines
+    from ppafo.model.regulator import LineState, LineStep, SupplyLines
     from ppafo.model.sensors import GaitSeen, GaitSensors, SensorParameters
     from ppafo.signals.meter import ReferenceSummary, Sample
 
@@ -139,13 +130,11 @@ class Lane:
     shown: Any  # what the valve shows beside its openings
     next_valve: Any  # state of the valve at the end of a part
     flowing: "SlopedFlows"  # flows as the step begins, with their derivatives
-    still_gas: "StillGas"  # first stage of the gas, by its kind: fixed volumes,
-    moving_gas: "MovingGas"  # moving volumes,
-    thermal_gas: "ThermalGas"  # energy balance,
-    fed_gas: "FedGas"  # behind supply lines,
-    fed_thermal_gas: "FedThermalGas"  # behind them with an energy balance
+    gas_stage: "GasStage"  # first stage of the gas,
+    thermal_gas: "ThermalGas"  # with an energy balance
+    line_stage: "LineStep"  # lines after the first stage
     passing: "GasFlows"  # flows at the pressures to which the first stage leads
-    change: "GasChange"  # what the step adds to the gas, by its kind
+    change: "Flows"  # what the step adds to the gas, by its kind
     thermal_change: "ThermalFlows"
     next_lines: "LineState"  # lines at the end of a part
     gas_error: float  # of the pressures over what is allowed

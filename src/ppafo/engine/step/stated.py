@@ -28,8 +28,9 @@ def moment(
 
 def begun_moment(parts: Program, lane: Lane, command: float) -> PlantSnapshot:
     """Return the input of effect laws at the start of a step, with the flows of the first stage [kg/s]."""
-    supplied, mass_1, mass_2 = parts.gas.first_flows(parts, lane)
-    return moment(parts, lane, lane.state, supplied, supplied - mass_1 - mass_2, command)
+    first = parts.gas.first(parts, lane)
+    supplied = first.supplied_1 + first.supplied_2
+    return moment(parts, lane, lane.state, supplied, supplied - first.mass_1 - first.mass_2, command)
 
 
 def straight_on(value: float, rate: float, length: float) -> float:

@@ -82,7 +82,8 @@ def of_the_textbook(run: Run, way: float | None, at: Mapping[str, float]) -> dic
         at_work = WarmChambers(*volumes, growth, -growth, 0.0, 0.0)
         thermal = thermal_flows(run.thermal, state, held, at_work, flowing)
         gained, entered = (thermal.content_1, thermal.content_2), (thermal.mass_1, thermal.mass_2)
-        supplied, vented = thermal.supplied, thermal.supplied - sum(entered)
+        supplied = thermal.supplied_1 + thermal.supplied_2
+        vented = supplied - sum(entered)
         for side in (0, 1):
             change = gained[side] / masses[side] - contents[side] * entered[side] / masses[side] ** 2
             moves[f"temperature_{side + 1}"] = run.thermal.temperature * change
