@@ -7,7 +7,7 @@ import os
 import platform
 import time
 from collections.abc import Iterable, Mapping
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -50,16 +50,17 @@ def sweep(
     A failed run has a row with its status and nan for all results.
 
     Arguments:
-        study: name of a study, a .toml file, data laid out as one, or a Study
-        overrides: values to change, texts or a dictionary as of ``simulate``; of one configuration: 'NAME:PATH=VALUE'
-        draws: number of draws in place of the file's
-        seed: random seed in place of the file's
+        study: name of a study, or a .toml file; in Python also data laid out as one, or a Study
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; of one configuration: 'NAME:PATH=VALUE'; may be
+            repeated
+        draws: number of draws; default: the file's
+        seed: random seed; default: the file's
         threads: threads of each process; default: all cores, one of a worker
         executor: an Executor of concurrent.futures, such as a cluster's, or the MODULE:OBJECT of one; default: this
             process
-        out: a folder, where an interrupted study resumes; default: a temporary folder that exists as long as the
-            returned object
-        agreed: consent to a folder that takes much of the disk
+        out: folder for the results, where an interrupted study resumes; default: out/NAME with the name of the study,
+            in Python a temporary one that exists as long as the returned object
+        agreed: start even if the results will fill much of the disk
         plugins: modules of your own, files or names, whose objects files may name
         progress: called with counts of the runs
 
@@ -136,6 +137,7 @@ def sweep(
 
 
 @checked
+@wraps(sweep)
 def sweep_into_folder(
     study: StudyLike,
     *,
@@ -143,24 +145,11 @@ def sweep_into_folder(
     overrides: Overrides = (),
     draws: Count | None = None,
     seed: Seed | None = None,
-    threads: Threads | None = None,
-    executor: Executor | None = None,
-    agreed: Agreed = False,
-    progress: Report | None = None,
+    **running: Any,
 ) -> Finding[StudyResults]:
-    """Run a study: many runs, one row each, resumable.
+    """Run a study into a folder with its figure, page and text: the command.
 
-    Its figure, page and text are written into the folder too. An interrupt is raised again with a message that tells
-    whether the same command resumes the study.
-
-    study: name of a study, or a .toml file
-    out: folder for the results; default out/NAME with the name of the study
-    draws: number of draws, instead of the number in the file
-    agreed: start even if the results will fill much of the disk
-
-    >>> from pathlib import Path
-    >>> print(sweep_into_folder("torque-task-uncertainty", draws=4, out=Path("four")).said[0])
-    torque-task-uncertainty: 8 runs: 8 completed
+    An interrupt is raised again with a message that tells whether the same command resumes the study.
     """
     from ppafo.report.drawing import load_drawing
     from ppafo.report.finding import page_files, text_of
@@ -173,9 +162,7 @@ def sweep_into_folder(
     # A text stays a text: in a Path, a URL is no longer recognised as one.
     folder = study_folder(out or Path("out") / chosen.name)
     try:
-        swept = sweep(
-            chosen, threads=threads, executor=executor, out=out or folder.path, agreed=agreed, progress=progress
-        )
+        swept = sweep(chosen, out=out or folder.path, **running)
         # No file contains the path of the folder, so the same study gives the same bytes anywhere.
         for name, content in {**page_files(swept), "summary.txt": f"{text_of(swept)}\n".encode()}.items():
             folder.write(name, content)
