@@ -1,7 +1,7 @@
 """Loading of a study by name, file or plain data into SI units, with a one-line error for each mistake."""
 
 import copy
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -12,7 +12,17 @@ import numpy as np
 from ppafo.arguments import Count, Overrides, Seed, checked
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, ParameterError, ScenarioError, StudyError, UnitError, refused_as
+from ppafo.errors import (
+    DataError,
+    ParameterError,
+    PpafoError,
+    ScenarioError,
+    StudyError,
+    UnitError,
+    noted_in,
+    raise_noted,
+    refused_as,
+)
 from ppafo.loading import load_scenario, placed
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
@@ -171,47 +181,65 @@ def _load(
 def _build(
     parsed: declared.StudyFile, document: dict[str, Any], source: _StudySource, changes: tuple[str, ...]
 ) -> Study:
-    """Build the study of a parsed study file in SI units; StudyError for a study that cannot be run."""
+    """Build the study of a parsed study file in SI units; StudyError with all mistakes that stand in the file."""
+    wrong, configurations, paths = list[PpafoError](), list[Configuration](), [entry.path for entry in parsed.vary]
+    for section in parsed.configurations:
+        with noted_in(wrong):
+            configurations.append(_configuration(section, source.folder))
     if (repeated := first_twice([section.name for section in parsed.configurations])) is not None:
-        raise StudyError(f"two configurations are named '{repeated}'; give every configuration a different name")
-    configurations = tuple(_configuration(section, source.folder) for section in parsed.configurations)
-    scenarios = [configuration.scenario for configuration in configurations]
-    paths = [entry.path for entry in parsed.vary]
-    if not paths and len(configurations) == 1:
-        raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
+        wrong.append(
+            StudyError(f"two configurations are named '{repeated}'; give every configuration a different name")
+        )
+    if not paths and len(parsed.configurations) == 1:
+        wrong.append(StudyError("varies nothing: give at least one [[vary]] or a second configuration"))
     # Rows of channels over time are lists of one length, and bands are quantiles at one time.
     if "run.duration" in paths and (parsed.outputs.trajectories or parsed.outputs.bands):
-        raise StudyError("'run.duration' cannot vary with trajectories or bands, which need runs of equal length")
+        said = "'run.duration' cannot vary with trajectories or bands, which need runs of equal length"
+        wrong.append(StudyError(said))
     if (repeated := first_twice(paths)) is not None:
-        raise StudyError(f"'{repeated}' is varied twice; omit one [[vary]]")
-    _check_set_or_varied(parsed, configurations)
-    varied_paths = {entry.path: _common_path(entry, configurations, parsed) for entry in parsed.vary}
-    independent = [
-        _axis_or_drawn(entry, varied_paths[entry.path], configurations)
-        for entry in parsed.vary
-        if not isinstance(entry, declared.SameAs)
-    ]
-    drawn = tuple(number for number in independent if isinstance(number, RandomValue))
-    scores = _scores(parsed, drawn)
+        wrong.append(StudyError(f"'{repeated}' is varied twice; omit one [[vary]]"))
+    # All else is about the scenarios.
+    raise_noted(wrong)
+    scenarios, outputs = [configuration.scenario for configuration in configurations], None
+    varied_paths, independent = dict[str, VariedPath](), list[Axis | RandomValue]()
+    for entry in parsed.vary:
+        with noted_in(wrong):
+            varied_paths[entry.path], values = _varied(entry, configurations, ATMOSPHERE_PATH in paths)
+            independent += [] if values is None else [values]
+        for section, configuration in zip(parsed.configurations, configurations, strict=True):
+            with noted_in(wrong):
+                _check_not_set(entry, section, configuration)
+    followed = {entry.path: entry.same_as for entry in parsed.vary if isinstance(entry, declared.SameAs)}
+    for path, other in followed.items():
+        with noted_in(wrong):
+            _check_followed(path, other, [each for each in paths if each not in followed], varied_paths)
+    drawn, scores, sample = tuple(each for each in independent if isinstance(each, RandomValue)), None, None
+    with noted_in(wrong):
+        scores = _scores(parsed, [entry.path for entry in parsed.vary if not isinstance(entry, declared.NOT_RANDOM)])
+    with noted_in(wrong):
+        outputs = valid_outputs(parsed.outputs, scenarios)
     # A grid alone is run once, with the noise that its scenarios write.
-    if drawn:
-        drawn, scores = with_noise(drawn, scores, scenarios, [*varied_paths])
+    if drawn and not wrong:
+        drawn, scores = with_noise(drawn, scores, scenarios, paths)
+    with noted_in(wrong):
+        sample = _sample(parsed, drawn)
+    raise_noted(wrong)
+    assert outputs is not None and sample is not None, "else refused above"  # noqa: PT018 - both or neither
     # The noise, which has no [[vary]] table, is a plain number.
     plain = {number.path: "-" for number in drawn}
     given = {path: varied.given for path, varied in varied_paths.items() if varied.given}
     # What follows a gauge pressure counts from the atmosphere of its run as well.
-    followed = _followed_paths(parsed, varied_paths)
     gauge = {path for path, varied in varied_paths.items() if varied.is_gauge}
     return Study(
         name=parsed.name,
         description=" ".join(parsed.description.split()),
-        configurations=configurations,
+        configurations=tuple(configurations),
         axes=tuple(axis for axis in independent if isinstance(axis, Axis)),
         drawn=drawn,
         same=followed,
         scores=scores,
-        sample=_sample(parsed, drawn),
-        outputs=valid_outputs(parsed.outputs, scenarios),
+        sample=sample,
+        outputs=outputs,
         runs_of_chunk=parsed.runs_of_chunk,
         units=plain | {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()},
         given={path: unit for path, unit in given.items() if unit != shown_unit(varied_paths[path].quantity.unit, {})},
@@ -223,104 +251,74 @@ def _build(
     )
 
 
-def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration]) -> None:
-    """Raise StudyError for a path that is both set and varied in a configuration, in any form (area or conductance)."""
-    for section, configuration in zip(parsed.configurations, configurations, strict=True):
-        overrides = read_overrides(section.overrides, StudyError)
-        set_values = override_set(overrides, StudyError, valve=configuration.scenario.device.valve_name)
-        for entry in parsed.vary:
-            if entry.only and section.name not in entry.only:
-                continue
-            path = chosen_path(entry.path, configuration.scenario)
-            # The varied column replaces the value in every run, whichever form of it (area or conductance) is set.
-            ignored = next((form for form in (path, *other_forms(path)) if form in set_values), None)
-            # A stated uncertainty is about the value that is set.
-            if ignored is None or (entry.kind == "stated" and ignored == path):
-                continue
-            raise StudyError(
-                f"configuration '{section.name}': '{set_values[ignored]}' is set and '{entry.path}' is varied: omit "
-                "one of them, or restrict the [[vary]] to other configurations with 'only'"
-            )
-
-
 def _configuration(entry: declared.ConfigurationSection, folder: Path) -> Configuration:
     """Load the scenario of a configuration section, with its overrides."""
     with refused_as(StudyError, f"configuration '{entry.name}'", ScenarioError, ParameterError, DataError):
         return Configuration(entry.name, load_scenario(placed(entry.scenario, folder), entry.overrides))
 
 
-def _common_path(
-    entry: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile
-) -> VariedPath:
-    """Return a varied path with its unit, limits and atmosphere; StudyError if these differ between configurations."""
+def _varied(
+    entry: declared.Varied, configurations: Sequence[Configuration], atmosphere_varies: bool
+) -> tuple[VariedPath, Axis | RandomValue | None]:
+    """Return a varied path, and its values or distribution in SI; None for one that takes those of another path."""
     names = [configuration.name for configuration in configurations]
-    scenarios = [each.scenario for each in configurations if not entry.only or each.name in entry.only]
-    for name in entry.only:
-        if name not in names:
-            raise StudyError(f"vary '{entry.path}': only: there is no configuration '{name}'{known_names(name, names)}")
-    with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError):
+    with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError, UnitError):
+        for name in entry.only:
+            if name not in names:
+                raise UnitError(f"only: there is no configuration '{name}'{known_names(name, names)}")
+        scenarios = [each.scenario for each in configurations if not entry.only or each.name in entry.only]
         varied, *others = (varied_path(entry.path, scenario) for scenario in scenarios)
-    if any(other != varied for other in others):
-        raise StudyError(
-            f"vary '{entry.path}': differs in unit, limits or atmosphere between configurations; use 'only'"
-        )
-    varied = given_in(varied, texts_of(entry))
-    # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
-    if isinstance(entry, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
-        return varied
-    with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
-        if isinstance(entry, declared.Stated):
-            _, unit = stated_normal(varied, scenarios[0])
-            return in_its_unit(varied, [f"0 {unit}"])
-        return in_its_unit(varied, texts_of(entry))
-
-
-def _axis_or_drawn(
-    entry: declared.Varied, varied_path: VariedPath, configurations: Iterable[Configuration]
-) -> Axis | RandomValue:
-    """Return the values of a grid or list, or the distribution of a path, in SI units."""
-    with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
-        if not isinstance(entry, declared.Stated):
-            return axis_or_distribution(entry, varied_path)
+        if any(other != varied for other in others):
+            raise UnitError("differs in unit, limits or atmosphere between configurations; use 'only'")
+        varied = given_in(varied, texts_of(entry))
+        if isinstance(entry, declared.SameAs):
+            return varied, None
+        stated = [stated_normal(varied, each) for each in scenarios] if isinstance(entry, declared.Stated) else []
+        # Where the atmosphere is fixed, gauge is a constant away from absolute; else each run has its own zero.
+        if atmosphere_varies:
+            varied = in_its_unit(varied, [f"0 {stated[0][1]}"] if stated else texts_of(entry))
+        if not stated:
+            return varied, axis_or_distribution(entry, varied)
         # One draw is run in every configuration, so all of them must mean the same distribution.
-        distributions = {
-            stated_normal(varied_path, each.scenario)[0]
-            for each in configurations
-            if not entry.only or each.name in entry.only
-        }
-        if len(distributions) > 1:
+        if len({distribution for distribution, _ in stated}) > 1:
             raise UnitError("the parameter sets of the configurations state different values; use 'only'")
-        zero = varied_path.atmosphere if varied_path.is_gauge else 0.0
-        return RandomValue(entry.path, replace(distributions.pop(), zero=zero))
+        zero = varied.atmosphere if varied.is_gauge else 0.0
+        return varied, RandomValue(entry.path, replace(stated[0][0], zero=zero))
 
 
-def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, VariedPath]) -> dict[str, str]:
-    """Map each 'same_as' path to the path whose draws it shares; StudyError for a fixed path or another unit."""
-    independent = [entry.path for entry in parsed.vary if not isinstance(entry, declared.SameAs)]
-    followed: dict[str, str] = {}
-    for entry in parsed.vary:
-        if not isinstance(entry, declared.SameAs):
-            continue
-        if entry.same_as not in independent:
-            raise StudyError(
-                f"vary '{entry.path}': same_as = '{entry.same_as}' must be the path of another [[vary]] without "
-                f"same_as{known_names(entry.same_as, independent)}"
-            )
-        unit, other = varied_paths[entry.path].quantity.unit, varied_paths[entry.same_as].quantity.unit
-        if unit != other:
-            raise StudyError(
-                f"vary '{entry.path}': same_as = '{entry.same_as}' has the unit '{other or '-'}', but '{entry.path}' "
-                f"has '{unit or '-'}'; both need the same unit"
-            )
-        followed[entry.path] = entry.same_as
-    return followed
+def _check_not_set(
+    entry: declared.Varied, section: declared.ConfigurationSection, configuration: Configuration
+) -> None:
+    """Raise StudyError for a path that is both set and varied in a configuration, in any form (area, conductance)."""
+    overrides, path = read_overrides(section.overrides, StudyError), chosen_path(entry.path, configuration.scenario)
+    set_values = override_set(overrides, StudyError, valve=configuration.scenario.device.valve_name)
+    # The varied column replaces the value in every run, whichever form of it is set.
+    ignored = next((form for form in (path, *other_forms(path)) if form in set_values), None)
+    # A stated uncertainty is about the value that is set.
+    is_meant = entry.kind == "stated" and ignored == path
+    if ignored is not None and not is_meant and (not entry.only or section.name in entry.only):
+        raise StudyError(
+            f"configuration '{section.name}': '{set_values[ignored]}' is set and '{entry.path}' is varied: omit "
+            "one of them, or restrict the [[vary]] to other configurations with 'only'"
+        )
 
 
-def _scores(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Factor | None:
+def _check_followed(path: str, other: str, independent: Sequence[str], varied: Mapping[str, VariedPath]) -> None:
+    """Raise StudyError for a path that takes the values of a fixed one, or of one with another unit."""
+    said = f"vary '{path}': same_as = '{other}'"
+    if other not in independent:
+        known = known_names(other, independent)
+        raise StudyError(f"{said} must be the path of another [[vary]] without same_as{known}")
+    # A path that is refused itself has no unit.
+    units = [varied[each].quantity.unit or "-" for each in (path, other) if each in varied]
+    if len(set(units)) > 1:
+        raise StudyError(f"{said} has the unit '{units[1]}', but '{path}' has '{units[0]}'; both need the same unit")
+
+
+def _scores(parsed: declared.StudyFile, paths: Sequence[str]) -> Factor | None:
     """Return the lower Cholesky factor of the correlation of the normal scores; None without correlations."""
     if not parsed.correlations:
         return None
-    paths = [number.path for number in drawn]
     coefficients: dict[tuple[str, str], float] = {}
     for pair in parsed.correlations:
         first, other = pair.between
