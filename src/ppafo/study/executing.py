@@ -4,16 +4,20 @@ The caller alone writes what workers compute, so that a study resumes and report
 program that a process of its computer compiled.
 """
 
+import multiprocessing
+import os
 import pickle
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future
+from functools import cache
 from itertools import islice
 from queue import SimpleQueue
 from secrets import token_hex
 from typing import Any, TypeVar
 
-from ppafo.errors import KindError, PpafoError, StudyError, refused_as
+from ppafo.errors import PpafoError, StudyError, refused_as
 from ppafo.plugins import name_modules_in, object_of
 from ppafo.version import __version__
 
@@ -30,8 +34,8 @@ def executor_of(given: Executor | str | None) -> Executor | None:
     found: Any = given
     if isinstance(given, str):
         name_modules_in(given)
-        wrong = ImportError, AttributeError, KindError, ValueError, TypeError
-        with refused_as(StudyError, f"executor = '{given}'", *wrong):
+        # A function of the user may raise anything.
+        with refused_as(StudyError, f"executor = '{given}'", Exception):
             found = object_of(given)
             found = found() if callable(found) and not isinstance(found, Executor) else found
     executor: Executor | None = found
@@ -93,6 +97,7 @@ def computed_by(
 
 def _computed(sent: bytes, block: Any, version: str, _mark: str) -> Any:
     """Return the answer to a block, on a worker."""
+    _end_with_caller()
     if version != __version__:
         raise StudyError(f"executor: a worker has ppafo {__version__}, not {version}; install the same version there")
     try:
@@ -104,3 +109,11 @@ def _computed(sent: bytes, block: Any, version: str, _mark: str) -> Any:
             "executor, such as upload_file of Dask's Client"
         ) from error
     return work(block)
+
+
+@cache
+def _end_with_caller() -> None:
+    """Make the process of a worker end with the one that started it: the workers of a pool outlive a killed caller."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()

@@ -4,7 +4,9 @@ import copy
 import os
 import pickle
 import signal
+import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -81,9 +83,39 @@ def test_what_cannot_be_loaded_or_sent_is_named(tmp_path: Path, monkeypatch: pyt
         _computed(sent, 1, "0.0.1", "")
     with pytest.raises(StudyError, match="a class or function of the study cannot be sent to workers"):
         list(computed_by(ThreadPoolExecutor(1), lambda block: block, [1]))
-    for word in ("nowhere:POOL", "math:nothing", "math:pi"):
+    (tmp_path / "my_pools.py").write_text("def pool(): raise RuntimeError('no queue answers')")
+    monkeypatch.syspath_prepend(tmp_path)
+    for word in ("nowhere:POOL", "math:nothing", "math:pi", "my_pools:pool"):
         with pytest.raises(StudyError, match=f"executor = '{word}'"):
             executor_of(word)
+
+
+CALLER = """
+from concurrent.futures import ProcessPoolExecutor
+import os, pickle, ppafo, time
+from ppafo.study.executing import _computed
+if __name__ == "__main__":
+    pool = ProcessPoolExecutor(2)
+    print(*{pool.submit(_computed, pickle.dumps(divmod), 0, ppafo.__version__, "").exception() and 0 for _ in "ab"})
+    print(*pool._processes, flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_the_workers_of_a_pool_end_with_a_caller_that_is_killed(tmp_path: Path) -> None:
+    (tmp_path / "caller.py").write_text(CALLER)
+    with subprocess.Popen([sys.executable, tmp_path / "caller.py"], stdout=subprocess.PIPE, text=True) as caller:
+        assert caller.stdout is not None
+        assert caller.stdout.readline() == "0\n"
+        workers = [int(number) for number in caller.stdout.readline().split()]
+        assert workers
+        caller.kill()
+    for _ in range(100):
+        if not any(Path(f"/proc/{worker}").exists() for worker in workers):
+            return
+        time.sleep(0.1)
+    pytest.fail("workers outlive their caller")
 
 
 @pytest.fixture(scope="module")
