@@ -133,6 +133,7 @@ def workbench(
     b'<!DOCTYPE html>'
     """
     name_plugins(plugins)
+    sliders = tuple(map(str, sliders))
     simulations = [_simulation(str(name), tuple(overrides), sliders) for name in scenarios]
     names = [simulation["name"] for simulation in simulations]
     if len({*names}) < len(names):

@@ -30,6 +30,7 @@ from ppafo.errors import (
     refused_as,
 )
 from ppafo.gait import load_gait
+from ppafo.gait.gait import BODY_MASSES
 from ppafo.loading import reloaded
 from ppafo.parameters.bottles.bottle import Bottle, load_bottle
 from ppafo.plugins import Plugins, name_plugins
@@ -168,8 +169,9 @@ def torque_of_gait(text: str, folder: Path, where: str) -> tuple[Floats, Floats]
         mass, share = parse_quantity(given["mass"], "kg"), parse_quantity(given["share"], "")
         if gait.ankle_moment is None:
             raise DataError("this gait has no ankle_moment")
-        if not (mass > 0.0 and 0.0 < share <= 1.0):
-            raise DataError("mass must be above 0 kg, share above 0 and at most 1")
+        least, most = BODY_MASSES
+        if not (least <= mass <= most and 0.0 < share <= 1.0):
+            raise DataError(f"mass must be from {least:g} to {most:g} kg, share above 0 and at most 1")
     phases = np.linspace(0.0, 1.0, _STRIDE_SAMPLES)
     return gait.stride_time * phases, share * mass * gait.ankle_moment.values_at(phases)
 

@@ -261,7 +261,7 @@ def test_a_profile_that_is_given_replaces_that_of_the_file_and_its_paths_count_f
         ("gait:falisse2019-subject1,mass=70,share=0.1", "kg"),
         ("gait:falisse2019-subject1,mass=70 kg,share=1.1", "at most 1"),
         ("gait:falisse2019-subject1,mass=70 kg,share=0", "above 0"),
-        ("gait:falisse2019-subject1,mass=0 kg,share=0.1", "above 0 kg"),
+        ("gait:falisse2019-subject1,mass=1 g,share=0.1", "from 1 to 500 kg"),
     ],
 )
 def test_a_text_that_is_no_share_of_a_moment_is_one_line_with_what_is_allowed(text: str, said: str) -> None:
