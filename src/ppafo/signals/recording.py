@@ -328,10 +328,10 @@ class Recording:
     ) -> "pandas.DataFrame":
         """Return the channels as columns indexed by time [s], in SI or in ``units``, such as ``{"angle": "deg"}``.
 
-        The units stand in ``attrs["units"]`` by column (pandas copies the attributes of a table to each column of it)
-        and are not written by ``to_csv``; ``recording.csv`` of a saved result has them in its header. Gauge pressures
-        are relative to ``atmosphere`` [Pa absolute]. Raises DataError for an unknown channel, and UnitError for a unit
-        that does not fit the channel.
+        The units stand in ``attrs["units"]`` by column (pandas copies the attributes of a table to each column, and
+        not to a number of it such as ``.iloc[-1]``) and are not written by ``to_csv``; ``recording.csv`` of a saved
+        result has them in its header. Gauge pressures are relative to ``atmosphere`` [Pa absolute]. Raises DataError
+        for an unknown channel, and UnitError for a unit that does not fit the channel.
         """
         from pandas import DataFrame, Index
 
