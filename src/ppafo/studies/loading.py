@@ -214,15 +214,16 @@ def _build(
         with noted_in(wrong):
             _check_followed(path, other, [each for each in paths if each not in followed], varied_paths)
     drawn, scores, sample = tuple(each for each in independent if isinstance(each, RandomValue)), None, None
+    random = [entry.path for entry in parsed.vary if not isinstance(entry, declared.NOT_RANDOM)]
     with noted_in(wrong):
-        scores = _scores(parsed, [entry.path for entry in parsed.vary if not isinstance(entry, declared.NOT_RANDOM)])
+        scores = _scores(parsed, random)
     with noted_in(wrong):
         outputs = valid_outputs(parsed.outputs, scenarios)
     # A grid alone is run once, with the noise that its scenarios write.
     if drawn and not wrong:
         drawn, scores = with_noise(drawn, scores, scenarios, paths)
     with noted_in(wrong):
-        sample = _sample(parsed, drawn)
+        sample = _sample(parsed, drawn or random)
     raise_noted(wrong)
     assert outputs is not None and sample is not None, "else refused above"  # noqa: PT018 - both or neither
     # The noise, which has no [[vary]] table, is a plain number.
@@ -343,7 +344,7 @@ def _scores(parsed: declared.StudyFile, paths: Sequence[str]) -> Factor | None:
     return factor
 
 
-def _sample(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> SamplingPlan:
+def _sample(parsed: declared.StudyFile, drawn: Sequence[object]) -> SamplingPlan:
     """Return the sampling plan of the distributions; without distributions, one run at each point of the grid."""
     if not drawn:
         if parsed.sample is not None:

@@ -498,9 +498,8 @@ def equilibrium(scenario: Scenario) -> Point:
     """
     planned, name = plan_run(scenario), scenario.name
 
-    def refusal(reason: str, joint: str = "; ", or_else: str = "") -> ScenarioError:
-        remedy = f"give a time of the run, such as {argument_text('at', '1 s')}"
-        return ScenarioError(f"{name}: {reason}{joint}{remedy}{or_else}")
+    def refusal(reason: str) -> ScenarioError:
+        return ScenarioError(f"{name}: {reason}; give a time of the run, such as {argument_text('at', '1 s')}")
 
     if planned.leg is not None and planned.program.shank is not CONSTANT:
         raise refusal("there is no equilibrium while the shank moves")
@@ -519,19 +518,12 @@ def equilibrium(scenario: Scenario) -> Point:
         full, reached = 1.0 if (level > 0.0) != scenario.device.supply.is_vacuum else -1.0, ""
         most = _steady(plant, values | dict.fromkeys(("command", *_openings_in(values)), full), quantity, None)
         if most is not None and quantity.name == TORQUE:
-            most_torque = plant.at(most)[1]["torque"]
-            reached = f": with the valve fully open the actuator reaches {most_torque:.4g} N m"
+            reached = f": with the valve fully open the actuator reaches {plant.at(most)[1]['torque']:.4g} N m"
         asked = of_path("reference.level", quantity.level.unit, ".4g").text(level)
-        remedy = f"set another reference{'' if is_held else ' or hold the ankle'}, or"
-        raise refusal(
-            f"there is no equilibrium at {asked}, the last value of the reference{reached}; {remedy}", joint=" "
-        )
+        raise refusal(f"there is no equilibrium at {asked}, the last value of the reference{reached}")
     if _direction(run, steady, scenario.run.duration):
         degrees = np.degrees(values["angle"])
-        raise refusal(
-            f"there is no equilibrium, because the torque accelerates the vane at {degrees:.4g} deg",
-            or_else=", or another reference",
-        )
+        raise refusal(f"there is no equilibrium, because the torque accelerates the vane at {degrees:.4g} deg")
     # A valve that is closed but for rounding is closed.
     steady |= {name: 0.0 for name in ("command", *_openings_in(steady)) if abs(steady[name]) < _STEADY}
     # What the valve takes from its command at once was no unknown.

@@ -11,8 +11,6 @@ from ppafo.analyses.walk.benefit import benefit_sentence
 from ppafo.documents.json_text import fields_of, plain
 from ppafo.loading import reloaded, usage_text
 from ppafo.metrics.strides import PER_STRIDE
-from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles, load_bottle
-from ppafo.parameters.bottles.fluid import list_fluids
 from ppafo.remedy_trials import tried
 from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
@@ -26,7 +24,6 @@ from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
 from ppafo.walking.bottle.course import SupplyCourse, duration_text, strides_text
-from ppafo.walking.bottle.supply import is_of_bottle
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
@@ -35,7 +32,6 @@ from ppafo.walking.planning import law_of, sensor_numbers
 from ppafo.walking.result import WALK_FORMAT, WalkResult, limited_request
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison
-from ppafo.wording import argument_text
 
 _PRESSURE, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("pressure", "torque", "gas mass"))
 _SHARE, _WARMTH, _BOTTLE_PRESSURE = (
@@ -115,7 +111,11 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
     mended = usage_text(reloaded(scenario, verdict.mended)) if verdict.mended else ""
-    remarks = (*person_remarks(scenario), _bottle_remark(worn), *_pressure_remarks(worn))
+    supply = worn.supply
+    lasts = (
+        f"bottle {supply.supply.bottle.label}: {supply.ending.message}" if supply and worn.status.is_completed else ""
+    )
+    remarks = (*person_remarks(scenario), lasts, *_pressure_remarks(worn))
     assumed = [(assumption.path, assumption.note) for assumption in scenario.assumptions]
     return Finding(
         name="walk",
@@ -214,22 +214,6 @@ def _files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
     if worn.supply is not None:
         files["bottle.csv"] = partial(marked_csv_bytes, worn.supply.recording)
     return files
-
-
-def _bottle_remark(worn: WalkResult) -> str:
-    """Return a remark on a bottle that outlasts the walk, or on the argument for one; "" if no gas is used."""
-    if worn.supply is not None:
-        said = f"bottle {worn.supply.supply.bottle.label}: {worn.supply.ending.message}"
-        return said if worn.status.is_completed else ""
-    if "gas" not in worn.metrics or worn.metrics["gas"].value <= 0.0:
-        return ""
-    gas, names = worn.scenario.device.gas, (PAPER_BOTTLE, *list_bottles())
-    fitting = next((name for name in names if is_of_bottle(gas.molar_mass, load_bottle(name))), None)
-    if fitting is None:
-        known = " or ".join(list_fluids())
-        return f"the supply pressure is constant here: bottles contain {known}, but the device uses {gas.species}"
-    with_bottle = argument_text("bottle", fitting)
-    return f"the supply pressure is constant here; give {with_bottle} to see how long a bottle lasts"
 
 
 def _pressure_remarks(worn: WalkResult) -> Iterator[str]:
