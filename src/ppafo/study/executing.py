@@ -114,6 +114,10 @@ def _computed(sent: bytes, block: Any, version: str, _mark: str) -> Any:
 @cache
 def _end_with_caller() -> None:
     """Make the process of a worker end with the one that started it: the workers of a pool outlive a killed caller."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
+    if (parent := multiprocessing.parent_process()) is not None:
+
+        def end() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=end, daemon=True).start()
