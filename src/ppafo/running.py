@@ -14,6 +14,7 @@ from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.model.valves.kind import VENT
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import simulate as of_loaded
+from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.scenario import Scenario
@@ -129,10 +130,7 @@ class SteppedRun:
         self._scenario = scenario.controlled_by(self._given)
         self._planned = plan_run(self._scenario)
         batch = batch_of(self._planned)
-        if batch.program.walks:
-            from ppafo.walking.contradictions import check_no_bottle
-
-            check_no_bottle(scenario)
+        check_no_bottle(scenario)
         self._allowed = (-1.0, 1.0, VENT) if batch.program.walks else (-1.0, 1.0)
         self._run = SampledRun(batch)
         self.period = scenario.controller.period

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Protocol
 from ppafo.model.columns import Problem
 from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import GaitMeasurement
 
 OPEN_LOOP = "constant"
 """Name of the controller without a reference: its recordings have no reference, and so no tracking error."""
@@ -76,6 +77,12 @@ class ControllerKind:
     needs_reference: bool = True
     plan: Plan | None = None
     controls: tuple[str, ...] = (TORQUE,)
+
+
+def reads_gait(update: Callable[..., Any]) -> bool:
+    """Tell whether a law detects gait phases: whether its ``update`` annotates a ``GaitMeasurement``."""
+    annotated = getattr(update, "__annotations__", {}).get("measurement")
+    return annotated in (GaitMeasurement, GaitMeasurement.__name__)
 
 
 def unbounded(_parameters: Any) -> tuple[float, float]:

@@ -3,7 +3,6 @@
 Each mistake in the document raises an error of one line.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 from ppafo.control.catalog import CONTROLLERS
@@ -15,7 +14,8 @@ from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph, Link, follows, gauge_link
 from ppafo.simulation.assumptions import assumed_lines, read_assumptions
-from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, read_clock
+from ppafo.simulation.clock import read_clock
+from ppafo.simulation.contradictions import check_contradictions
 from ppafo.simulation.declaration import (
     ACCURACY,
     AT_REST,
@@ -35,7 +35,7 @@ from ppafo.simulation.declaration import (
 from ppafo.simulation.default_gains import default_links
 from ppafo.simulation.document import REFERENCE_OF, DocumentReader, ScenarioRequest, controlled_in
 from ppafo.simulation.hardware import Hardware, device_error, read_device, read_hardware
-from ppafo.simulation.motion_kind import MOTIONS, RunTimes
+from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.overrides import OverriddenDocument
 from ppafo.simulation.profiles import read_profile, reference_problem
@@ -53,7 +53,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 from ppafo.units import split_quantity
-from ppafo.units.shown import shown_in, shown_text
+from ppafo.units.shown import shown_in
 from ppafo.wording import nearest_name
 
 _NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
@@ -85,9 +85,8 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         tolerance = reading.number("run.tolerance", ACCURACY)
         section = MOTIONS[kind_at(document, "motion")].section
         assert section is not None, "walks are built from another layout"
-        motion = section.read(reading, device, times.duration, times.step, request.folder)
-        sensors = _sensors(reading, of_sensors, times)
-        supply_line = read_supply_line(reading, device)
+        motion = section.read(reading, request.folder)
+        supply_line = read_supply_line(reading)
         kind = kind_at(document, "controller")
         as_written = DocumentReader(request.file, request.content)
         assumptions = read_assumptions(as_written, reading, hardware, request.overrides)
@@ -100,7 +99,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
             initial=initial,
             controller=Control(kind, {}, times.period),
             reference=reference,
-            sensors=sensors,
+            sensors=Sensors(**of_sensors, seed=int(reading.number("sensors.seed", SEED))),
             assumptions=(*assumptions, *assumed_lines(reading)),
             origin=origin_of(request, changed, hardware),
             gas_model=read_gas_model(reading),
@@ -113,6 +112,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         problem = reference_problem(scenario)
         if problem:
             raise ScenarioError(f"{request.file}: {problem}")
+        check_contradictions(scenario, reading)
         law = CONTROLLERS[kind]
         try:
             if supply_line is not None:
@@ -220,15 +220,6 @@ def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> t
     return choice, {path: follow for path, follow in links.items() if follow}
 
 
-def _sensors(reading: DocumentReader, values: Mapping[str, float], clock: RunTimes) -> Sensors:
-    if values["delay"] > clock.duration:
-        raise reading.refusal("sensors.delay", "must not be longer than run.duration, or no measurement would arrive")
-    if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
-        longest = shown_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
-        raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
-    return Sensors(**values, seed=int(reading.number("sensors.seed", SEED)))
-
-
 def read_gas_model(reading: DocumentReader) -> GasModel | None:
     """Return the heat exchange model of the gas in SI units; None for isothermal gas."""
     if kind_at(reading.document, "gas_model") != THERMAL:
@@ -241,22 +232,9 @@ def read_gas_model(reading: DocumentReader) -> GasModel | None:
     return model
 
 
-def read_supply_line(reading: DocumentReader, device: Device) -> SupplyLine | None:
-    """Return the supply lines of a file in SI units; None without such a section, for constant supply pressures.
-
-    Raises ScenarioError if the dorsiflexion pressure exceeds the pressure of the line that feeds its regulator.
-    """
+def read_supply_line(reading: DocumentReader) -> SupplyLine | None:
+    """Return the supply lines of a file in SI units; None without such a section, for constant supply pressures."""
     if value_at(reading.document, SUPPLY_LINE) is None:
         return None
-    supply = device.supply
-    if supply.dorsiflexion_pressure > supply.pressure:
-        first, second = (
-            shown_text(pressure, "Pa_a", atmosphere=supply.atmospheric_pressure)
-            for pressure in (supply.pressure, supply.dorsiflexion_pressure)
-        )
-        raise ScenarioError(
-            f"{reading.file}: [{SUPPLY_LINE}]: the first regulator feeds the second, so "
-            f"supply.dorsiflexion_pressure = {second} must not exceed supply.pressure = {first}"
-        )
     read = {line: reading.section(f"{SUPPLY_LINE}.{line}", line_quantities(line)) for line in SUPPLY_LINES}
     return SupplyLine(**{line: RegulatedLine(**numbers) for line, numbers in read.items()})

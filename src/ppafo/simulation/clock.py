@@ -38,13 +38,8 @@ def read_clock(reading: DocumentReader) -> RunTimes:
     """
     duration = reading.number(_DURATION_PATH, _DURATION)
     until = f"{_DURATION_PATH} = {reading.written(_DURATION_PATH)}"
-    if value_at(reading.document, _RATE_PATH) is not None:
-        period = 1.0 / reading.number(_RATE_PATH, RATE)
-        given = f"the period of {_RATE_PATH} = {reading.written(_RATE_PATH)} ({1.0e3 * period:.6g} ms)"
-    elif value_at(reading.document, _PERIOD_PATH) is not None:
-        period = reading.number(_PERIOD_PATH, PERIOD)
-        given = f"{_PERIOD_PATH} = {reading.written(_PERIOD_PATH)}"
-    else:
+    period, given = read_period(reading)
+    if not given:
         raise ScenarioError(f"{reading.file}: '{_RATE_PATH}' is missing: give for example rate = '1 kHz', or a period")
     has_output = value_at(reading.document, _OUTPUT_PATH) is not None
     if value_at(reading.document, _STEP_PATH) is not None:
@@ -81,6 +76,16 @@ def read_clock(reading: DocumentReader) -> RunTimes:
             f"{MAXIMUM_OUTPUTS:.0e} are allowed: increase {_OUTPUT_PATH}",
         )
     return RunTimes(duration, used, output, period)
+
+
+def read_period(reading: DocumentReader, default: float = 0.0) -> tuple[float, str]:
+    """Return the sample period of the controller [s], and how the document gives it; else the default and ""."""
+    if value_at(reading.document, _RATE_PATH) is not None:
+        period = 1.0 / reading.number(_RATE_PATH, RATE)
+        return period, f"the period of {_RATE_PATH} = {reading.written(_RATE_PATH)} ({1.0e3 * period:.6g} ms)"
+    if value_at(reading.document, _PERIOD_PATH) is None:
+        return default, ""
+    return reading.number(_PERIOD_PATH, PERIOD), f"{_PERIOD_PATH} = {reading.written(_PERIOD_PATH)}"
 
 
 def links_of_times(document: Mapping[str, Any]) -> Graph:

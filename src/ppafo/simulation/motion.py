@@ -4,7 +4,7 @@ Each declares its section of a file, and how that is read and checked against th
 all runs are checked at once: numbers that contradict each other, and times.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,10 @@ from ppafo.model.controlled import ANGLE as ANGLE_CONTROLLED
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import kind_at, value_at
-from ppafo.parameters.device import Device
 from ppafo.signals.meter import LED_SHANK
 from ppafo.signals.meter import WALK as OF_WALK
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, clock_with, time_texts
+from ppafo.simulation.contradictions import Contradiction
 from ppafo.simulation.declaration import (
     ANGLE,
     ANGLE_LEVEL,
@@ -43,7 +43,6 @@ from ppafo.simulation.motion_kind import VANE, LawSignals, MotionKind, MotionSec
 from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.plan import plan_vane
 from ppafo.simulation.profiles import (
-    TOLERANCE,
     Limits,
     disordered_knots,
     limits_of,
@@ -61,40 +60,35 @@ from ppafo.wording import one_line
 _PROFILE, _SHANK = "motion.profile", "motion.shank"
 
 
-def contradictory_numbers(scenario: Scenario) -> tuple[Problem, ...]:
-    """Problems of a scenario of a vane alone: knots not in order, angle or profile beyond a limit, delay too long."""
-    disordered = tuple(disordered_knots(choice, section) for section, choice in profiles_of(scenario).items())
+def contradictions(scenario: Scenario) -> Iterator[Contradiction]:
+    """Yield the contradictions of a vane alone: knots not in order, angle or profile beyond a limit, delay too long."""
+    disordered = [disordered_knots(choice, section) for section, choice in profiles_of(scenario).items()]
+    yield from (Contradiction("", is_bad, line) for is_bad, line in disordered)
     # The bounds of a curve need its knots in order.
     if any(np.any(is_bad) for is_bad, _ in disordered):
-        return disordered
+        return
     delay, step, device = scenario.sensors.delay, scenario.run.step, scenario.device
-    motion, followed = vane_motion(scenario), CONTROLLED[scenario.controlled]
+    motion, followed, stops = vane_motion(scenario), CONTROLLED[scenario.controlled], stops_of(scenario.device)
     profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
-    stops = stops_of(device)
 
-    def angle_line(run: int) -> str:
+    def beyond_stops(run: int) -> str:
         low, high = (shown_text(at(stop, run), "rad") for stop in (stops.lowest, stops.highest))
-        path, angle = path_of_locked_angle(scenario) or LOCKED_ANGLE, shown_text(at(profile.level, run), "rad")
-        return f"{path} = {angle}: must be between the stops of {device.name}, {low} to {high}"
-
-    def delay_line(run: int) -> str:
-        longest = shown_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
-        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
+        return f"must be between the stops of {device.name}, {low} to {high}"
 
     if profile.kind == "constant":
-        angle_problem: Problem = (_is_beyond(stops, profile), angle_line)
+        yield Contradiction(path_of_locked_angle(scenario) or LOCKED_ANGLE, _is_beyond(stops, profile), beyond_stops)
     else:
-        angle_problem = _beyond(scenario, stops, profile, "motion.profile")
-    problems = [
-        (
-            delay > scenario.run.duration,
-            lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
-        ),
-        (delay / step > MAXIMUM_STEPS_OF_DELAY, delay_line),
-    ]
+        yield Contradiction("", *_beyond(scenario, stops, profile, "motion.profile"))
     if followed.reach is not None and scenario.follows_reference:
-        problems.insert(0, _beyond(scenario, limits_of(device, followed), scenario.reference, "reference"))
-    return angle_problem, *problems
+        yield Contradiction("", *_beyond(scenario, limits_of(device, followed), scenario.reference, "reference"))
+    no_measurement = "must not be longer than run.duration, or no measurement would arrive"
+    yield Contradiction("sensors.delay", delay > scenario.run.duration, lambda _run: no_measurement)
+
+    def most_steps(run: int) -> str:
+        longest = shown_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
+        return f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
+
+    yield Contradiction("sensors.delay", delay / step > MAXIMUM_STEPS_OF_DELAY, most_steps)
 
 
 def _is_beyond(limits: Limits, profile: ProfileChoice) -> NDArray[np.bool_]:
@@ -186,7 +180,7 @@ VaneKind = partial(
     layout=VANE,
     plan=plan_vane,
     measured=measured_vane,
-    contradictory_numbers=contradictory_numbers,
+    contradictions=contradictions,
     quantities=numbers_of_vane,
     clock=clock,
     flaws=lambda scenario: scenario.sensors.flaws,
@@ -198,17 +192,7 @@ VaneKind = partial(
 """Motions of a vane alone, which differ in their section of the file, in the plan of a run and in what is recorded."""
 
 
-def _read_angle(reading: DocumentReader, device: Device) -> float:
-    """Return the angle [rad] of the vane; ScenarioError if it is not between the stops of the device."""
-    angle, stops = reading.number(LOCKED_ANGLE, ANGLE), (device.actuator.angle_min, device.actuator.angle_max)
-    if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
-        low, high = (shown_text(stop, "rad") for stop in stops)
-        raise reading.refusal(LOCKED_ANGLE, f"must be between the stops of {device.name}, {low} to {high}")
-    return angle
-
-
-def _read_free(reading: DocumentReader, device: Device, _duration: float, _step: float, _folder: Path) -> FreeMotion:
-    _read_angle(reading, device)
+def _read_free(reading: DocumentReader, _folder: Path) -> FreeMotion:
     numbers = reading.section("motion", FREE)
     return FreeMotion(numbers["angle"], numbers["angular_velocity"], numbers["external_torque"])
 
@@ -217,10 +201,8 @@ FREE_MOTION = VaneKind(name="free", section=MotionSection("the torques move the 
 """Free motion by equation (1), with a constant external torque."""
 
 
-def _read_locked(
-    reading: DocumentReader, device: Device, _duration: float, _step: float, _folder: Path
-) -> PrescribedMotion:
-    return PrescribedMotion(ProfileChoice("constant", {"level": _read_angle(reading, device)}), "locked")
+def _read_locked(reading: DocumentReader, _folder: Path) -> PrescribedMotion:
+    return PrescribedMotion(ProfileChoice("constant", {"level": reading.number(LOCKED_ANGLE, ANGLE)}), "locked")
 
 
 LOCKED_MOTION = VaneKind(
@@ -231,14 +213,9 @@ LOCKED_MOTION = VaneKind(
 """Vane clamped on a test bench: its profile is constant."""
 
 
-def _read_prescribed(
-    reading: DocumentReader, device: Device, duration: float, step: float, _folder: Path
-) -> PrescribedMotion:
-    profile = read_profile(reading, _PROFILE, profile_settings(kind_at(reading.document, _PROFILE), ANGLE_LEVEL))
-    problem = profile_problem(stops_of(device), profile, duration, step)
-    if problem:
-        raise ScenarioError(f"{reading.file}: {problem}")
-    return PrescribedMotion(profile)
+def _read_prescribed(reading: DocumentReader, _folder: Path) -> PrescribedMotion:
+    settings = profile_settings(kind_at(reading.document, _PROFILE), ANGLE_LEVEL)
+    return PrescribedMotion(read_profile(reading, _PROFILE, settings))
 
 
 PRESCRIBED_MOTION = VaneKind(
@@ -257,9 +234,8 @@ PRESCRIBED_MOTION = VaneKind(
 """The ankle follows a profile, independent of the device."""
 
 
-def _read_leg(reading: DocumentReader, device: Device, _duration: float, _step: float, folder: Path) -> FreeMotion:
+def _read_leg(reading: DocumentReader, folder: Path) -> FreeMotion:
     """Return the motion with a leg whose shank follows a smooth profile or a gait."""
-    _read_angle(reading, device)
     numbers: dict[str, Any] = reading.section("motion", LEG)
     start = numbers.pop("angle"), numbers.pop("angular_velocity")
     kind = kind_at(reading.document, _SHANK)

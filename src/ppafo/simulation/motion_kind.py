@@ -3,7 +3,7 @@
 A motion is loaded when a document or a scenario names it: scenarios of a vane alone load no walk.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ppafo.engine.run import Run
     from ppafo.metrics.metric import Metric, MetricKind
     from ppafo.model.columns import Problem
-    from ppafo.parameters.device import Device
     from ppafo.signals.recording import Recording
 
 
@@ -60,7 +59,7 @@ class MotionKind:
 
     - ``plan``: the run and its possible problems
     - ``measured``: recording and metrics of a run, from its rows (samples,) by path at times [s]
-    - ``contradictory_numbers``: the problems of contradictory numbers
+    - ``contradictions``: the checks of numbers that could contradict each other (``simulation/contradictions.py``)
     - ``quantities``: declarations of all numbers of a scenario except those of its device, by path
     - ``clock``: the clock with other times [s], by path, and the problems of contradictory times
     - ``flaws``: settings of the sensors, of which each, in one program, is 0 for all runs or for none
@@ -76,7 +75,7 @@ class MotionKind:
     layout: str
     plan: "Callable[[Any], tuple[Run, tuple[Problem, ...]]]"
     measured: "Callable[[Any, Run, Floats, Mapping[str, Floats]], Measured]"
-    contradictory_numbers: "Callable[[Any], tuple[Problem, ...]]"
+    contradictions: Callable[[Any], Iterable[Any]]
     quantities: Callable[[Any], dict[str, Quantity]]
     clock: "Callable[[Any, Mapping[str, Any]], tuple[RunTimes, tuple[Problem, ...]]]"
     flaws: Callable[[Any], tuple[Any, ...]]
@@ -97,13 +96,12 @@ class MotionKind:
 class MotionSection:
     """Section ``[motion]`` for one motion of a vane alone: its numbers, and its profile table, if any.
 
-    ``read(reading, device, duration, step, folder)`` returns the motion; ``duration`` and ``step`` are in seconds, and
-    relative paths start from ``folder``.
+    ``read(reading, folder)`` returns the motion; relative paths start from ``folder``.
     """
 
     summary: str
     numbers: tuple[Quantity, ...]
-    read: "Callable[[Any, Device, float, float, Path], Any]"
+    read: Callable[[Any, Path], Any]
     profile: "ProfileTable | None" = None
 
 

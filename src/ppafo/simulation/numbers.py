@@ -212,7 +212,12 @@ def _present(scenario: Scenario) -> Asked:
 
 def number_at(scenario: Scenario, path: str) -> float:
     """Return the number at a path of ``declared_numbers`` that is not in ``TIMES``, in SI units."""
-    return float(number_under(scenario, _attributes(chosen_path(path, scenario), scenario)))
+    return float(numbers_at(scenario, path))
+
+
+def numbers_at(scenario: Scenario, path: str) -> Any:
+    """Return the number at a path as ``number_at``, or the array (runs,) in an ensemble."""
+    return number_under(scenario, _attributes(chosen_path(path, scenario), scenario))
 
 
 def other_form(device: Device, section: str) -> tuple[str, ...]:

@@ -8,10 +8,9 @@ from weakref import WeakSet
 
 import numpy as np
 
-from ppafo.control.kind import PythonController
+from ppafo.control.kind import PythonController, reads_gait
 from ppafo.engine.lanes import Batch, BatchResult
 from ppafo.errors import SimulationError
-from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 from ppafo.simulation.sampled import SampledRun
 from ppafo.wording import nearest_name
@@ -29,7 +28,7 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     SimulationError for a command that is no finite number, and for a programming error in the controller.
     """
     run = SampledRun(batch)
-    is_framed = run.requests_torque and not _reads_gait(controller)
+    is_framed = run.requests_torque and not reads_gait(controller.update)
     # What an earlier run left behind in the object must not steer this one.
     try:
         controller.reset()
@@ -46,12 +45,6 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
         limited = _valve_command(command, controller, run.time, batch.program.walks)
         run.advance(VENT if is_framed and run.vents(measurement) else limited)
     return run.result()
-
-
-def _reads_gait(controller: PythonController) -> bool:
-    """Tell whether an object detects gait phases: whether its ``update`` annotates a ``GaitMeasurement``."""
-    annotated = getattr(controller.update, "__annotations__", {}).get("measurement")
-    return annotated in (GaitMeasurement, GaitMeasurement.__name__)
 
 
 def _valve_command(command: Any, controller: PythonController, time: float, walks: bool) -> float:

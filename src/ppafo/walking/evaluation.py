@@ -16,13 +16,13 @@ from ppafo.model.leg import LegParameters, passive_torque, torque_on_knee
 from ppafo.model.plant import PlantParameters
 from ppafo.signals import Recording
 from ppafo.signals.meter import LED_SHANK, REQUESTED
+from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status, end_of, rows_by_path
 from ppafo.simulation.vane_recording import device_channels, recording_of
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import UNITS, SupplyCourse
-from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.gait_series import ankle_path
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of, requests_torque

@@ -18,7 +18,9 @@ from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.assumptions import assumed_lines
 from ppafo.simulation.building import origin_of, read_gas_model, read_supply_line, with_settings
-from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE
+from ppafo.simulation.clock import read_period
+from ppafo.simulation.contradictions import check_contradictions
+from ppafo.simulation.declaration import SUPPLY_LINE
 from ppafo.simulation.document import DocumentReader, ScenarioRequest
 from ppafo.simulation.hardware import read_device, read_hardware
 from ppafo.simulation.loading import FILE as SCENARIO_FILE
@@ -27,7 +29,6 @@ from ppafo.simulation.motion_kind import MOTIONS, WALK
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
 from ppafo.simulation.scenario import Assumption, Control, Initial, RunSettings, Scenario, Sensors
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
-from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
     DURATION,
     FORCES,
@@ -63,7 +64,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     if bottle is not None:
         # A bottle always feeds lines, by default those of the declarations.
         document.setdefault(SUPPLY_LINE, {})
-    line = read_supply_line(reading, device)
+    line = read_supply_line(reading)
     if line is not None and bottle is not None:
         line = bottle.fed(line)
     sensors = reading.section("sensors", WALK_SENSORS)
@@ -80,7 +81,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         motion=motion,
         initial=Initial(atmosphere, atmosphere),
         # A law that is named by its module keeps this name; a law of the catalogue has the name that it has in walking.
-        controller=Control(kind if ":" in kind else law.name, {}, _period(reading)),
+        controller=Control(kind if ":" in kind else law.name, {}, read_period(reading, DEFAULT_PERIOD)[0]),
         reference=NO_REFERENCE,
         sensors=Sensors(
             **{name: number for name, number in sensors.items() if name not in FORCES},
@@ -94,8 +95,14 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     scenario = with_settings(reading, scenario, law.quantities)
     scenario = replace(scenario, links={**scenario.links, **links_of_stature(reading.document)})
     # Numbers that are usable by themselves may contradict each other.
-    check_walk(scenario, reading)
-    return with_duration(scenario, _duration(reading, scenario))
+    check_contradictions(scenario, reading)
+    if value_at(document, "run.duration") is None:
+        return with_duration(scenario, DEFAULT_DURATION if bottle is None else BOTTLE_DURATION)
+    duration = reading.number("run.duration", DURATION)
+    for is_bad, problem in duration_problems(scenario, duration):
+        if is_bad:
+            raise ScenarioError(f"{reading.file}: {problem(0)}")
+    return with_duration(scenario, duration)
 
 
 def _motion(
@@ -120,14 +127,6 @@ def _motion(
     )
 
 
-def _period(reading: DocumentReader) -> float:
-    """Return the sample period of the controller [s]."""
-    if value_at(reading.document, "controller.rate") is not None:
-        return 1.0 / reading.number("controller.rate", RATE)
-    is_given = value_at(reading.document, "controller.period") is not None
-    return reading.number("controller.period", PERIOD) if is_given else DEFAULT_PERIOD
-
-
 def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
     """Return the assumptions of a walk: from its file, its supply lines and its bottle."""
     notes = reading.document.get("assumed", {}) | ({} if bottle is None else bottle.assumed)
@@ -138,18 +137,6 @@ def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assu
     for line in assumed_lines(reading):
         assumptions[line.path] = replace(line, note=f"{line.value}, {line.note}")
     return tuple(assumptions.values())
-
-
-def _duration(reading: DocumentReader, scenario: Scenario) -> float:
-    """Return the duration of a walk [s] from its file, else 60 s, or 600 s on a bottle."""
-    motion = walk_of(scenario)
-    if value_at(reading.document, "run.duration") is not None:
-        duration = reading.number("run.duration", DURATION)
-        for is_bad, line in duration_problems(scenario, duration):
-            if is_bad:
-                raise ScenarioError(f"{reading.file}: {line(0)}")
-        return duration
-    return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION
 
 
 WALKING = Layout(FILE, OF_A_WALK, build_walk)

@@ -18,13 +18,13 @@ from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
 from ppafo.parameters.graph import outside
 from ppafo.plugins import Plugins, name_plugins
+from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.plan import MAXIMUM_STEPS, plan_run
 from ppafo.simulation.python_controller import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle
 from ppafo.walking.bottle.course import WALKED
-from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.evaluation import result_of_walk
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
@@ -124,21 +124,14 @@ def bottle_life(scenario: Scenario, schedule: Schedule) -> BottleLife:
         raise ScenarioError(f"{scenario.name}: has no bottle; give a walk with [bottle]")
     if scenario.controller.custom is not None:
         check_no_bottle(scenario)
-    repeated = _repeated_walk(scenario, schedule.longest)
-    run, device = plan_run(repeated), fed_device(repeated)
-    return life_on_bottle(run, device, motion.bottle, motion.gait.stride_time, schedule, silent)
-
-
-def _repeated_walk(scenario: Scenario, longest: float) -> Scenario:
-    """Return the walk that is repeated on a bottle: strides for up to ``longest`` [s].
-
-    Strides are recorded once a minute, and last as many whole minutes as the steps of one run allow.
-    """
-    stride_time = walk_of(scenario).gait.stride_time
+    # Recorded once a minute, for up to the longest duration: whole minutes, as many as the steps of one run allow.
+    stride_time = motion.gait.stride_time
     minute = replace(scenario, run=replace(scenario.run, duration=60.0, output_interval=60.0))
     seconds_of_run = 60.0 * (MAXIMUM_STEPS * plan_run(minute).step // 60.0)
-    seconds = min(math.ceil(longest / stride_time) * stride_time, seconds_of_run)
-    return replace(minute, run=replace(minute.run, duration=60.0 * max(1, round(seconds / 60.0))))
+    seconds = min(math.ceil(schedule.longest / stride_time) * stride_time, seconds_of_run)
+    repeated = replace(minute, run=replace(minute.run, duration=60.0 * max(1, round(seconds / 60.0))))
+    run, device = plan_run(repeated), fed_device(repeated)
+    return life_on_bottle(run, device, motion.bottle, stride_time, schedule, silent)
 
 
 def lasting(scenario: Scenario, minutes: float | None) -> Scenario:

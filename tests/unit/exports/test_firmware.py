@@ -75,14 +75,6 @@ def test_a_state_that_may_leave_a_narrower_range_is_not_proved() -> None:
         proof(replace(law, state_ranges={**law.state_ranges, "error": (-1000, 1000)}))
 
 
-def test_a_converter_of_sixteen_bits_is_not_proved() -> None:
-    law = FIXED_LAWS["pid_fixed_point"]
-    wider = [replace(item, maximum=item.maximum * 2.0 + 1.0) for item in law.number_quantities[:2]]
-    others = [replace(item, maximum=65535.0) for item in law.number_quantities[2:]]
-    with pytest.raises(ProgramError):
-        proof(replace(law, number_quantities=(*wider, *others)))
-
-
 def test_drawn_readings_reach_edges_saturation_and_faults() -> None:
     drawn = list(drawn_readings(4095, 20_000, 1))
     for place in range(3):

@@ -107,7 +107,7 @@ def test_a_refusal_is_in_the_unit_of_what_it_refuses_else_in_that_of_the_set(in_
         "must be at least 0.01 bar_a and at most 1000 bar_a (regulated pressure to chamber 1)"
     )
     assert "must be at least 0 mm^2 and at most 10000 mm^2" in refusal("valve.area=-1 mm^2")
-    lines = refusal("supply_line.plantarflexion.droop=1 bar_d", "supply.dorsiflexion_pressure=5 bar_g")
+    lines = refusal("supply_line.plantarflexion.droop=1e8 Pa s/kg", "supply.dorsiflexion_pressure=5 bar_g")
     assert "supply.dorsiflexion_pressure = 5 bar_g must not exceed supply.pressure = 3.44738 bar_g" in lines
 
 

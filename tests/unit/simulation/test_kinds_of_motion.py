@@ -24,7 +24,7 @@ from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice
 SIZE = (Quantity("size", "rad", "largest angle from 90 deg", 0.1, 0.0, 0.5),)
 
 
-def read(reading, device, duration, step, folder):
+def read(reading, folder):
     size = reading.number("motion.size", SIZE[0])
     settings = {"level": 1.5707963267948966, "amplitude": size, "frequency": 2.0, "phase": 0.0}
     return PrescribedMotion(ProfileChoice("sine", settings), "swaying:SWAY")

@@ -185,7 +185,6 @@ PRESCRIBED = 'kind = "prescribed"\n[motion.profile]\n'
         'kind = "sine"\nlevel = "75 deg"\namplitude = "-56 deg"\nfrequency = "97.3 Hz"',
         'kind = "ramp_hold"\nstart_level = "75 deg"\nlevel = "131 deg"',
         'kind = "ramp_hold"\nstart_level = "0 deg"\nlevel = "75 deg"\nramp_time = "1 us"',
-        'kind = "constant"\nlevel = "140 deg"',
     ],
 )
 def test_a_prescribed_vane_that_leaves_the_stops_is_refused_with_the_time(profile: str) -> None:

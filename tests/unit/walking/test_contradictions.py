@@ -9,7 +9,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from ppafo.errors import ArgumentError, DataError, ParameterError, ScenarioError
+from ppafo.errors import ArgumentError, ParameterError, ScenarioError
 from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
 from ppafo.simulation.plan import plan_run
@@ -77,13 +77,6 @@ def test_the_published_schema_accepts_the_shipped_walks_and_no_unknown_key() -> 
         jsonschema.validate(document, schema)
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**document, "wearers": {}}, schema)
-
-
-def test_unknown_names_have_a_hint() -> None:
-    with pytest.raises(ScenarioError, match="did you mean 'solenoid'"):
-        load_walk("solenoit")
-    with pytest.raises(DataError, match="no gait 'falisse'"):
-        load_walk("solenoid", gait="falisse")
 
 
 def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from ppafo.errors import ScenarioError
 from ppafo.loading import load_scenario
-from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.walking import load_walk, walk
 
 OF_ANOTHER_PACKAGE = """
@@ -19,10 +18,6 @@ SLOW = replace(WALK_KIND, name="slow")
 """
 
 
-def test_the_walk_has_the_name_by_which_it_is_found() -> None:
-    assert MOTIONS["walk"].name == "walk"
-
-
 def test_a_kind_of_another_package_plans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "slow_motion.py").write_text(OF_ANOTHER_PACKAGE)
     monkeypatch.chdir(tmp_path)
@@ -31,18 +26,6 @@ def test_a_kind_of_another_package_plans(tmp_path: Path, monkeypatch: pytest.Mon
     assert other.motion.motion_kind.name == "slow"
     angles = [walk(scenario).recording["angle"] for scenario in (other, load_walk("proportional", given))]
     assert np.array_equal(*angles)
-
-
-def test_a_kind_that_is_not_there_is_refused_with_those_that_are() -> None:
-    with pytest.raises(ScenarioError, match=r"motion\.kind = 'wlak' is not known, did you mean 'walk'"):
-        load_walk("proportional", ["motion.kind=wlak"])
-
-
-def test_the_motion_of_a_vane_is_none_of_a_walk() -> None:
-    with pytest.raises(
-        ScenarioError, match=r"a walk file needs motion\.kind = 'walk'; simulate other scenarios with 'ppafo simulate'"
-    ):
-        load_walk("proportional", ["motion.kind=free"])
 
 
 def test_a_shipped_scenario_without_a_walk_is_told_from_a_name_that_is_unknown() -> None:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers import model_based, pid, switching
-from ppafo.control.kind import BelievedBand, ControllerKind
+from ppafo.control.kind import BelievedBand, ControllerKind, reads_gait
 from ppafo.control.torque_loop import INTEGRAL_GAIN, PROPORTIONAL_GAIN, beyond_dead_band
 from ppafo.control.walking import assistance, event_on_off, phases
 from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest
@@ -238,10 +238,10 @@ def walking_controllers() -> dict[str, ControllerKind]:
         and TORQUE in law.controls
         and law.plan is None
         and not shared_settings(law)
-        and not reads_gait(law)
+        and not reads_gait(law.update)
     }
     # Of the user's modules, either catalogue takes every law when it meets an unknown name.
-    own = {name: law for name, law in WALKING_CONTROLLERS.items() if ":" not in name or reads_gait(law)}
+    own = {name: law for name, law in WALKING_CONTROLLERS.items() if ":" not in name or reads_gait(law.update)}
     return own | {name: law_that_walks(law) for name, law in laws.items()}
 
 
@@ -253,13 +253,8 @@ def load_walking_controller(name: str) -> None:
         return
     # Either catalogue would take an object that is named by its module: what its law reads says whose it is.
     law = CONTROLLERS.get(name)
-    if law is not None and reads_gait(law):
+    if law is not None and reads_gait(law.update):
         WALKING_CONTROLLERS[name] = law
-
-
-def reads_gait(kind: ControllerKind) -> bool:
-    """Tell whether a controller detects gait phases, so that its law takes a ``GaitMeasurement``."""
-    return kind.update.__annotations__.get("measurement") in (GaitMeasurement, GaitMeasurement.__name__)
 
 
 def law_that_walks(law: ControllerKind) -> ControllerKind:

@@ -91,15 +91,6 @@ class _ForOneRun(ast.NodeTransformer):
         return getattr(self.value_of(node.value), node.attr, None) if isinstance(node, ast.Attribute) else None
 
 
-def _collector() -> SourceCollector:
-    """Return a collector of functions that specialises array functions for a single run."""
-    return SourceCollector(
-        INLINE,
-        lambda function, tree: ast.fix_missing_locations(_ForOneRun(function.__globals__).visit(tree)),
-        replacements=Replacements(everywhere=dict(FOR_ONE_RUN)),
-    )
-
-
 LOOP_TYPES: tuple[Type, ...] = (
     *map(Array, LOOP_ARRAYS.values()),
     *(FLOAT if kind == "float64" else INT for kind in LOOP_NUMBERS.values()),
@@ -126,12 +117,18 @@ def c_text_of_run(
     from ppafo.translation.c_terms import is_free
     from ppafo.translation.walk import walk_module
 
-    collector = _collector()
+    # Array functions are specialised for a single run.
+    collector = SourceCollector(
+        INLINE,
+        lambda function, tree: ast.fix_missing_locations(_ForOneRun(function.__globals__).visit(tree)),
+        replacements=Replacements(everywhere=dict(FOR_ONE_RUN)),
+    )
     program = exported.program
     link_program(program, collector.replacements)
     entries = [metrics_entry(exported, collector)] if exported.metrics else []
     entries += [add(collector) for add in further]
-    steps = _steps_of(exported, collector)
+    # Functions that both loops have in common are written once.
+    steps = {name: StepText(each, collector, _ENDINGS[name]) for name, each in exported.loops.items()}
     loop = run_loop(steps[WHOLE], f"{name}_outputs", steps.get(IN_PARTS))
     composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
     states = struct_of("run_states", program.state_rows(), collector.add)
@@ -204,11 +201,6 @@ def _names_around() -> frozenset[str]:
 
 
 _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)
-
-
-def _steps_of(exported: ExportedProgram, collector: SourceCollector) -> dict[str, StepText]:
-    """Return the step functions of the time-stepping loops by C name; functions common to both are written once."""
-    return {name: StepText(program, collector, _ENDINGS[name]) for name, program in exported.loops.items()}
 
 
 def metrics_entry(exported: ExportedProgram, collector: SourceCollector) -> str:

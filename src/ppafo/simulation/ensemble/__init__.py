@@ -107,15 +107,10 @@ def run_ensemble(
             # Where the finer run has no value this one may be wrong by anything; without a value it has no error.
             changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)
             estimated[name] = np.where(np.isfinite(values), MARGIN * changes, np.nan)
-    return _ensemble_result(runs, plan.reasons, estimated)
-
-
-def _ensemble_result(runs: MeteredRuns, refusals: Mapping[int, str], errors: dict[str, Floats]) -> EnsembleResult:
-    """Result of an ensemble; ``refusals`` map the index of each refused run to the reason."""
     status = np.where(runs.is_completed, COMPLETED, DIVERGED).astype(np.int8)
     # Runs that were refused are in no batch, so that until here they count as diverged.
-    status[list(refusals)] = REFUSED
-    reasons = dict(refusals)
+    status[list(plan.reasons)] = REFUSED
+    reasons = dict(plan.reasons)
     for run in np.flatnonzero(status == DIVERGED).tolist():
         remedy = TOO_MANY_PARTS if runs.too_many_parts[run] else REMEDY
         reasons[run] = f"diverged at t = {runs.failure_time[run]:.6g} s; {remedy}"
@@ -124,9 +119,9 @@ def _ensemble_result(runs: MeteredRuns, refusals: Mapping[int, str], errors: dic
         failure_time=runs.failure_time,
         reasons=dict(sorted(reasons.items())),
         metrics=runs.metrics,
-        times=runs.request.times,
+        times=times,
         traces=runs.traces,
-        errors=errors,
+        errors=estimated,
     )
 
 

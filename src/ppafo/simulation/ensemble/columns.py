@@ -13,6 +13,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import OF_SECOND_CHAMBER, WHY_ONE_CHAMBER
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import either, in_two_forms
+from ppafo.simulation.contradictions import check_no_bottle
 from ppafo.simulation.declaration import TEXTS, WALL_AREA
 from ppafo.simulation.numbers import chosen_path, declared_numbers, moving_together
 from ppafo.simulation.scenario import Scenario
@@ -57,6 +58,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     """
     if base.controller.is_outside and base.controller.custom is None:
         raise ScenarioError(f"{base.name}: has no controller; give one with controlled_by")
+    check_no_bottle(base)
     # Effects of other packages are known by their paths once they are loaded.
     find_effects(columns)
     declared = declared_numbers(base)

@@ -16,6 +16,7 @@ from ppafo.parameters.building import actuator_problem, beyond_pressures, consis
 from ppafo.parameters.declaration import is_within, range_rule
 from ppafo.parameters.effects import number_under, switches_of
 from ppafo.simulation.clock import TIMES
+from ppafo.simulation.contradictions import problems_of
 from ppafo.simulation.ensemble.columns import ScenarioColumns
 from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.numbers import NOISE_SEED, declared_numbers, with_numbers
@@ -163,25 +164,14 @@ def _first_problem(problems: Iterable[Problem]) -> Problem | None:
 
 def _contradictory_numbers(scenario: Scenario) -> Iterator[Problem]:
     """Yield the problems of contradictory numbers of a scenario of many runs; later checks rely on earlier ones."""
-    device, supply = scenario.device, scenario.device.supply
+    device = scenario.device
     for path, relation, other, holds in consistency(device):
         yield np.logical_not(holds), partial(_inconsistent_line, scenario, path, relation, other)
     yield from _misshapen(scenario)
     is_beyond, line = beyond_pressures(device)
     yield is_beyond, lambda run: f"actuator: {line(run)}"
     yield growth_and_problem(device)[1]
-    yield from scenario.motion.motion_kind.contradictory_numbers(scenario)
-    if scenario.supply_lines is None:
-        return
-
-    def line_of_regulator(run: int) -> str:
-        supplied, dorsiflexion = (
-            shown_text(at(pressure, run), "Pa_a", atmosphere=at(supply.atmospheric_pressure, run))
-            for pressure in (supply.pressure, supply.dorsiflexion_pressure)
-        )
-        return f"supply.dorsiflexion_pressure = {dorsiflexion} must not exceed supply.pressure = {supplied}"
-
-    yield np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line_of_regulator
+    yield from problems_of(scenario)
 
 
 def _inconsistent_line(scenario: Scenario, path: str, relation: str, other: str, run: int) -> str:
