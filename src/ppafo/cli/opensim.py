@@ -54,8 +54,7 @@ def export_opensim(
             other = "a walk, not for a recording" if is_recording else "a recording; a walk states the body mass"
             raise DataError(f"{option} is allowed only for {other}")
     from ppafo.exports.opensim import files_of_walk
-    from ppafo.storage.opensim import opensim_bytes
-    from ppafo.storage.opensim_names import opensim_recording
+    from ppafo.storage.opensim import opensim_bytes, opensim_recording
     from ppafo.storage.reading import read_recording
 
     # Known once the files are made, and said after that.

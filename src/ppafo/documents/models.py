@@ -1,18 +1,141 @@
-"""Building blocks of closed file layouts: strict tables, their validation, and JSON Schema."""
+"""Building blocks of closed file layouts: strict tables, their validation with all problems by path, JSON Schema."""
 
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from types import UnionType
+from typing import Annotated, Any, Literal, TypeGuard, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
-from pydantic_core import PydanticKnownError
+from pydantic_core import ErrorDetails, PydanticKnownError
 
-from ppafo.documents.faults import line_of, refuse
-from ppafo.documents.problems import faults_of
+from ppafo.documents.faults import line_of, no_table, refuse, unknown_key
 from ppafo.documents.regular_file import decoded
-from ppafo.documents.toml_text import SCHEMA, TomlKind, label
+from ppafo.documents.toml_text import NAME, NAME_RULE, SCHEMA, TomlKind, label, quote
 from ppafo.errors import PpafoError
+from ppafo.plugins import nearest_kind
+from ppafo.wording import nearest_name, one_line
 
 Model = TypeVar("Model", bound=BaseModel)
+LABEL = r"^[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?$"
+"""Pattern of a display name: one line of text without leading or trailing space."""
+_TEXT_RULES = {
+    NAME: NAME_RULE,
+    LABEL: "must be one line of text without leading or trailing spaces",
+}
+"""Message endings for a text that does not match a pattern, by pattern."""
+_FORMS = {"int": "a whole number", "float": "a number", "bool": "true or false"}
+_MISSING = {"missing": "", "union_tag_not_found": ".kind"}
+"""Suffix of the path of a missing key, by problem type."""
+
+
+def faults_of(details: list[ErrorDetails], model: type[BaseModel]) -> dict[str, str]:
+    """Return all problems by path, "" for a gap.
+
+    For a value that matches none of several types only the first reason is given.
+    """
+    containers = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
+    faults: dict[str, str] = {}
+    for detail in details:
+        # A table or list that is wrong because of a value in it has the problem of this value.
+        if detail["loc"] in containers:
+            continue
+        key = _key_at(detail["loc"], model)
+        if detail["type"] in _MISSING:
+            # Of a table that is missing its required keys are named, which the next refusal would ask for.
+            faults |= dict.fromkeys(_required(key) or [f"{key.path}{_MISSING[detail['type']]}"], "")
+        else:
+            faults.setdefault(key.path, _message(key, detail))
+    return faults
+
+
+@dataclass(frozen=True, slots=True)
+class _Key:
+    """Key of a document: dotted path, type of its table, and type of its value (None if unknown)."""
+
+    path: str
+    table: Any
+    value_type: Any
+
+
+def _key_at(location: Iterable[int | str], model: type[BaseModel]) -> _Key:
+    """Return the key at a pydantic location, in which the kind of a union appears as a key."""
+    names: list[str] = []
+    table: Any = model
+    value_type: Any = model
+    # Of a list the first item is number 1.
+    for name in (str(part + 1 if isinstance(part, int) else part) for part in location):
+        tables = [item for item in _tables_in(value_type) if "kind" in item.model_fields]
+        if tables:
+            kinds = {get_args(item.model_fields["kind"].annotation)[0]: item for item in tables}
+            value_type = kinds.get(name)
+            continue
+        table = value_type
+        names.append(one_line(name))
+        if not _is_model(table):
+            # The values of a list, or of a table with free names, have one type.
+            types = [item for item in get_args(table) if item is not Ellipsis]
+            value_type = types[-1] if types else None
+        elif name not in table.model_fields:
+            value_type = None
+        else:
+            value_type = table.model_fields[name].annotation
+            # The value of an optional key, X | None, is an X if it is given.
+            types = [item for item in get_args(value_type) if item is not type(None)]
+            if get_origin(value_type) in (Union, UnionType) and len(types) == 1:
+                value_type = types[0]
+    return _Key(".".join(names), table, value_type)
+
+
+def _is_model(value_type: Any) -> TypeGuard[type[BaseModel]]:
+    return isinstance(value_type, type) and issubclass(value_type, BaseModel)
+
+
+def _tables_in(value_type: Any) -> list[type[BaseModel]]:
+    """Return the table models of a union; empty for any other type."""
+    if get_origin(value_type) is Annotated:
+        return _tables_in(get_args(value_type)[0])
+    is_union = get_origin(value_type) in (Union, UnionType)
+    return [item for item in get_args(value_type) if _is_model(item)] if is_union else []
+
+
+def _required(key: _Key) -> list[str]:
+    """Return the paths of the keys that the table at a key must have."""
+    fields = key.value_type.model_fields if _is_model(key.value_type) else {}
+    return [f"{key.path}.{name}" for name, field in fields.items() if field.is_required()]
+
+
+def _message(key: _Key, detail: ErrorDetails) -> str:
+    """Return the message on a problem at a key of a document."""
+    assignment = f"{key.path} = {quote(detail['input'])}"
+    match detail["type"]:
+        case "extra_forbidden":
+            return unknown_key(key.path, key.path.rpartition(".")[2], (), list(key.table.model_fields))
+        case "literal_error":
+            words = detail["ctx"]["expected"].replace(" or ", ",")
+            return f"{assignment} is not allowed{_allowed_words(detail['input'], words)}"
+        case "union_tag_invalid":
+            kind = detail["ctx"]["tag"]
+            words = _allowed_words(kind, detail["ctx"]["expected_tags"], nearest_kind)
+            return f"{key.path}.kind = {quote(kind)} is not known{words}"
+        case "int_type" | "int_from_float" | "float_type" | "bool_type":
+            return f"{assignment} must be {_FORMS[detail['type'].partition('_')[0]]}"
+        case "string_pattern_mismatch":
+            return f"{assignment} {_TEXT_RULES.get(detail['ctx']['pattern'], _TEXT_RULES[NAME])}"
+        case "string_type":
+            return f"{assignment} must be a text in quotation marks"
+        case "model_type" | "model_attributes_type" | "dict_type":
+            return no_table(key.path, detail["input"], [name.rpartition(".")[2] for name in _required(key)])
+    # "Input should be less than 5" becomes "must be less than 5".
+    _, separator, requirement = detail["msg"].partition(" should ")
+    requirement = requirement if separator else f"be {detail['msg']}"
+    return f"{assignment}: must {one_line(requirement)}"
+
+
+def _allowed_words(word: object, allowed: str, nearest: Callable[[str, list[str]], str] = nearest_name) -> str:
+    """Return the message ending for an unknown word: nearest and allowed words; pydantic separates these by commas."""
+    words = [item.strip(" '") for item in allowed.split(",")]
+    return f"{nearest(str(word), words)}; allowed: {', '.join(words)}"
 
 
 class StrictTable(BaseModel):

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from datetime import date, time
 from functools import lru_cache
 from importlib.resources.abc import Traversable
-from os.path import isfile
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +26,6 @@ SCHEMA = "https://json-schema.org/draft/2020-12/schema"
 """JSON Schema version of the published file layouts."""
 LONGEST_VALUE = 60
 """Largest number of characters of a value in a message."""
-_RESULT = "run.json"
-"""File of a result folder that describes the run."""
 _LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _DEEP_KEY = re.compile(
@@ -53,16 +50,12 @@ def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TomlKind:
-    """Kind of TOML file: noun for messages, name for ``--schema``, folder of bundled files, and error type.
-
-    ``made`` is added in messages after "give a .toml file": the command that creates such a file, if there is one.
-    """
+    """Kind of TOML file: noun for messages, name for ``--schema``, folder of bundled files, and error type."""
 
     noun: str
     schema: str
     shipped: Traversable
     error: type[PpafoError]
-    made: str = ""
 
     def names(self) -> tuple[str, ...]:
         """Return the names of the bundled files."""
@@ -78,29 +71,20 @@ class TomlKind:
         if path.suffix != _SUFFIX and not is_there:
             hint = nearest_name(name, self.names())
             known = f"available: {', '.join(self.names())}, or " if self.names() else ""
-            raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; {known}give a .toml file{self.made}")
+            raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; {known}give a .toml file")
         try:
             return read_regular_file(path, MAXIMUM_BYTES_TYPED)
         except (OSError, ValueError) as error:
             others = [each.name for each in path.parent.glob(f"*{_SUFFIX}") if each != path]
             hint = nearest_name(path.name, others) if isinstance(error, FileNotFoundError) else ""
-            raise self.error(f"{label(name)}: cannot be read: {reason(error)}{hint}{self._remedy(name)}") from error
-
-    def _remedy(self, file: str) -> str:
-        """Return the remedy for a stored result or a file of another kind; empty for a .toml file."""
-        # Path.is_file raises an error for a name that is too long.
-        if Path(file).name == _RESULT or isfile(Path(file, _RESULT)):  # noqa: PTH113
-            return "; it is a stored result: give the name or file of what was run"
-        return "" if Path(file).suffix == _SUFFIX else f"; give a .toml file{self.made}"
+            raise self.error(f"{label(name)}: cannot be read: {reason(error)}{hint}") from error
 
     def parse(self, content: bytes, file: str) -> dict[str, Any]:
         """Parse the bytes of a file; ``file`` is its label in messages."""
         try:
             text = decoded(content)
         except UnicodeDecodeError as error:
-            raise self.error(
-                f"{file}: is not a text file in UTF-8 (byte {error.start} is invalid){self._remedy(file)}"
-            ) from error
+            raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start} is invalid)") from error
         if not text.strip():
             raise self.error(f"{file}: is empty; 'ppafo doctor --schema {self.schema}' prints its format")
         # Before the parser, whose time grows with the square of the dots.
@@ -110,7 +94,7 @@ class TomlKind:
             # A copy, since overrides are written into a document and the parsed one is kept.
             document = copy.deepcopy(_document(text))
         except tomllib.TOMLDecodeError as error:
-            said = _twice(text, str(error)) or f"is not valid TOML: {one_line(error)}{self._remedy(file)}"
+            said = _twice(text, str(error)) or f"is not valid TOML: {one_line(error)}"
             raise self.error(f"{file}: {said}") from error
         except (RecursionError, ValueError) as error:
             raise self.error(f"{file}: is not usable TOML: it is nested too deeply, or a number is too long") from error

@@ -13,8 +13,7 @@ import numpy as np
 from ppafo.errors import ScenarioError
 from ppafo.gait.recorded.mapping import Side
 from ppafo.signals import Channel, Recording
-from ppafo.storage.opensim import opensim_bytes
-from ppafo.storage.opensim_names import opensim_recording
+from ppafo.storage.opensim import opensim_bytes, opensim_recording
 from ppafo.walking.loading import check_duration_once, load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult

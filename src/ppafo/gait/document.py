@@ -139,13 +139,7 @@ def json_schema() -> dict[str, Any]:
 NORMATIVE = "falisse2019-subject1"
 """Name of the default gait."""
 
-_FILE = TomlKind(
-    "gait",
-    "gait",
-    resources.files("ppafo") / "gait" / "normative",
-    DataError,
-    made=", which 'ppafo gait import' makes from a recording",
-)
+_FILE = TomlKind("gait", "gait", resources.files("ppafo") / "gait" / "normative", DataError)
 
 
 def list_gaits() -> tuple[str, ...]:

@@ -10,8 +10,7 @@ import numpy as np
 
 from ppafo.errors import DataError, check_all
 from ppafo.gait.gait import HARMONICS, Gait, fit_curve
-from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride
-from ppafo.gait.plausible_angles import check_ankle, check_ankle_range, check_shank
+from ppafo.gait.plausible_angles import CLEARLY_BETTER, MeanStride, check_ankle, check_ankle_range, check_shank
 from ppafo.gait.plausible_knee import check_knee, check_knee_means
 from ppafo.signals.recording import Floats
 from ppafo.wording import without_exponent

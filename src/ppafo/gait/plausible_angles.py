@@ -1,10 +1,12 @@
 """Plausibility of shank and ankle angles: range, zero, and sign, checked by the standing foot in mid-stance."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import Gait
-from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride
 from ppafo.signals.recording import Floats
 
 SHANK_RANGE = (25.0, 120.0)
@@ -26,6 +28,22 @@ Recorded feet on level ground have 0.5 to 4.6 deg, from the sole of the shoe and
 foot is not tilted by more than 20 deg: this is a heel of 6 cm on a foot of 17 cm from heel to ball, walking on the
 toes, or a ramp of 1 in 3. A larger tilt shows a wrong zero.
 """
+CLEARLY_BETTER = 2.0
+"""Factor by which the opposite sign of a curve must fit better, or give a larger value, to reject the given sign."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeanStride:
+    """Mean stride: files and curves (101 samples, SI) by curve name, stance fraction [-] and stride time [s].
+
+    ``is_knee_one_marker`` is True if both coordinates of the knee are from one marker, whose scales cannot differ.
+    """
+
+    file: Mapping[str, str]
+    curves: Mapping[str, Floats]
+    stance_share: float
+    stride_time: float
+    is_knee_one_marker: bool = False
 
 
 def check_shank(walk: MeanStride) -> None:

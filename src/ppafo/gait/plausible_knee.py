@@ -7,7 +7,7 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError, check_all, raise_noted
 from ppafo.gait.gait import HARMONICS, KNEE, fit_curve
-from ppafo.gait.mean_stride import MeanStride
+from ppafo.gait.plausible_angles import MeanStride
 from ppafo.signals.recording import Floats
 
 FOOT_FLAT = slice(15, 43)

@@ -1,16 +1,21 @@
 """Reading of recordings from files of all supported formats, result folders and data frames."""
 
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
 
 from ppafo.arguments import Pressure, Word, checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, refused_as
 from ppafo.signals import Recording, recording_kind
-from ppafo.storage.comma_separated import read_csv
+from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
+from ppafo.storage.comma_separated import parse_header, read_csv, recording_of_columns
 from ppafo.storage.result_folder import CSV_FILE, MANIFEST, NETCDF_FILE, RUN_FILE, read_document, read_stored
-from ppafo.wording import argument_text
+from ppafo.wording import argument_text, one_line
 
 if TYPE_CHECKING:
     from pandas import DataFrame  # type: ignore[import-untyped]
@@ -23,6 +28,96 @@ ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
 """File-name suffixes of text tables."""
+
+
+def recording_of_frame(frame: Any, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
+    """Return the recording in a pandas DataFrame or an xarray Dataset, in SI units; its attributes name title and kind.
+
+    Time is a column, the index, or the coordinate of a Dataset; gauge pressures are relative to ``atmosphere`` [Pa
+    absolute]. Raises DataError for a table without time, a column without unit and a cell that is no finite number.
+    """
+    attributes = dict(frame.attrs)
+    if hasattr(frame, "data_vars"):
+        names = [TIME, *(str(name) for name in frame.data_vars)]
+        if TIME not in frame.coords and TIME not in frame.data_vars:
+            known = ", ".join(map(str, frame.coords))
+            raise DataError(f"the Dataset has no coordinate '{TIME}'; its coordinates are {known}")
+        names = list(dict.fromkeys(names))
+        values = [np.asarray(frame[name].values) for name in names]
+        units = {name: str(frame[name].attrs.get("units", "")) for name in names}
+    else:
+        names = [str(name) for name in frame.columns]
+        values = [np.asarray(frame[name].to_numpy()) for name in frame.columns]
+        units = {str(name): str(unit) for name, unit in dict(attributes.get("units", {})).items()}
+        if not any(_is_time(name) for name in names):
+            named = str(frame.index.name or "")
+            if not _is_time(named):
+                known = ", ".join(map(one_line, names))
+                raise DataError(f"the table has no column and no index '{TIME} [{TIME_UNIT}]'; available: {known}")
+            names, values = [named, *names], [np.asarray(frame.index), *values]
+    title, kind = str(attributes.get("title", "")) or "table", str(attributes.get("kind", "measured"))
+    return _recording(names, values, units, title, kind, atmosphere)
+
+
+def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
+    """Read a recording from a Parquet file with columns ``name [unit]``, or with units in the column metadata.
+
+    Raises DataError, naming the file, if it cannot be used.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from ppafo.storage.files import read_bytes
+
+    content = read_bytes(path)
+    with refused_as(DataError, str(path), DataError):
+        try:
+            table = pq.read_table(pa.BufferReader(content))
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise DataError(f"is not a readable Parquet file: {one_line(error)}") from error
+        units = {
+            field.name: (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace") for field in table.schema
+        }
+        # What pandas keeps of a frame's attributes, as text.
+        attributes = json.loads((table.schema.metadata or {}).get(b"PANDAS_ATTRS", b"{}"))
+        units |= attributes.get("units", {})
+        names = [name for name in table.column_names if name != "__index_level_0__"]
+        if not any(map(_is_time, names)):
+            raise DataError(f"has no column '{TIME} [{TIME_UNIT}]'; available: {', '.join(map(one_line, names))}")
+        values = [table[name].to_numpy() for name in names]
+        kind = str(attributes.get("kind", "measured"))
+        return _recording(names, values, units, one_line(Path(path).stem), kind, atmosphere)
+
+
+def _is_time(name: str) -> bool:
+    return name.partition("[")[0].strip() == TIME
+
+
+def _recording(
+    names: Sequence[str], values: Sequence[Any], units: Mapping[str, str], label: str, kind: str, atmosphere: float
+) -> Recording:
+    """Return a recording from columns in any order, with units in their names or in ``units``."""
+    pairs = sorted(zip(names, values, strict=True), key=lambda pair: not _is_time(pair[0]))
+    heads, columns = [], []
+    for name, column in pairs:
+        unit, head = units.get(name, ""), name
+        # Of a table without units all names are bare, its time too.
+        if "[" not in name and (unit or (name == TIME and any(units.values()))):
+            head = f"{name} [{PLAIN_NUMBER if unit == '1' else unit or TIME_UNIT}]"
+        heads.append(head)
+        if np.issubdtype(column.dtype, np.timedelta64):
+            columns.append(column / np.timedelta64(1, "s"))
+            continue
+        try:
+            numbers = column.astype(np.float64)
+        except (TypeError, ValueError) as error:
+            raise DataError(f"column '{one_line(name)}' is not numeric") from error
+        wrong = np.flatnonzero(~np.isfinite(numbers))
+        if wrong.size:
+            raise DataError(f"column '{one_line(name)}': row {wrong[0]} is {numbers[wrong[0]]}, not a finite number")
+        columns.append(numbers)
+    rows = range(len(columns[0]))
+    return recording_of_columns(parse_header(heads), columns, rows, label, recording_kind(kind), atmosphere, "row")
 
 
 @checked
@@ -54,8 +149,6 @@ def read_recording(
     ('angle', 'angular_velocity', 'pressure_1')
     """
     if not isinstance(path, str | Path):
-        from ppafo.storage.frames import recording_of_frame  # a run reads no tables of others
-
         return recording_of_frame(path, atmosphere=atmosphere)
     file = Path(path)
     if columns is not None:
@@ -87,18 +180,10 @@ def read_recording(
             kind = recording_kind(str(described.get("kind", recording.kind)))
         return replace(recording, label=str(described.get("label", recording.label)), kind=kind)
     if file.suffix.lower() == ".parquet":
-        from ppafo.storage.frames import read_parquet
-
         return read_parquet(file, atmosphere)
-    if file.suffix.lower() == ".mat":
-        raise DataError(
-            f"{file}: the variables of a .mat file have no units: give names and units in a column map, "
-            f"{argument_text('columns', 'FILE.toml:NAME')}"
-        )
     if not file.exists():
         raise DataError(f"{file}: no such file or folder")
     raise DataError(
         f"{file}: must be a result folder or a .nc, .parquet, {', '.join(TEXT_SUFFIXES)} or (through a column map, "
-        f"{argument_text('columns', 'FILE.toml:NAME')}) other text file; another table is read as a pandas DataFrame, "
-        "or written as CSV"
+        f"{argument_text('columns', 'FILE.toml:NAME')}) .mat or other text file"
     )

@@ -9,8 +9,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
-from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema
-from ppafo.documents.problems import LABEL
+from ppafo.documents.models import LABEL, SchemaVersion, StrictTable, Text, Texts, make_schema
 from ppafo.documents.toml_text import NAME
 from ppafo.simulation.scenario import LARGEST_SEED
 

@@ -24,8 +24,7 @@ from ppafo.simulation.tracking import Tracking, tracking_in
 from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.simulation.tracking.remedies import level_text
 from ppafo.simulation.tracking.verdict import TOO_SHORT
-from ppafo.storage.opensim import write_opensim
-from ppafo.storage.opensim_names import opensim_recording
+from ppafo.storage.opensim import opensim_recording, write_opensim
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.motion import walk_of

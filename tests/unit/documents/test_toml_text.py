@@ -1,7 +1,6 @@
 """A document is read from its file: one that is changed by whoever asked for it is as written for the next."""
 
 import time
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -33,27 +32,6 @@ def test_a_typed_file_of_more_than_a_megabyte_is_refused(load, kind: type[PpafoE
     file.write_bytes(b"#" * (MAXIMUM_BYTES_TYPED + 1))
     with pytest.raises(kind, match=r"long\.toml: cannot be read: it is larger than 1 MB"):
         load(file)
-
-
-def test_a_file_of_another_kind_and_a_folder_are_answered_with_what_to_give(tmp_path: Path) -> None:
-    kind = replace(KIND, made=", which a command makes")
-    (tmp_path / "walk.csv").write_text("time [s],angle [deg]\n", encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r"walk\.csv: is not valid TOML: .*; give a \.toml file, which a command"):
-        kind.parse(kind.read(tmp_path / "walk.csv"), "walk.csv")
-    (tmp_path / "walk.csv").write_bytes(b"0" * (MAXIMUM_BYTES_TYPED + 1))
-    with pytest.raises(ScenarioError, match=r"it is larger than 1 MB, .*; give a \.toml file, which a command makes$"):
-        kind.read(tmp_path / "walk.csv")
-    with pytest.raises(
-        ScenarioError, match=r"it is a directory, not a file; give a \.toml file, which a command makes$"
-    ):
-        kind.read(tmp_path)
-    (tmp_path / "run.json").write_text("{}", encoding="utf-8")
-    for stored in (tmp_path, tmp_path / "run.json"):
-        with pytest.raises(
-            ScenarioError,
-            match=r"it is a stored result: give the name or file of what was run",
-        ):
-            kind.parse(kind.read(stored), str(stored))
 
 
 def test_a_number_that_would_become_0_is_refused() -> None:

@@ -11,14 +11,13 @@ from ppafo.gait import Gait, load_gait, walk_recording
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
-from ppafo.gait.recorded.cycle import wrap_cycle
+from ppafo.gait.recorded.footfalls import wrap_cycle
 from ppafo.gait.recorded.mapping import FrameClock, GaitMap, Side
 from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.source import read_table
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
-from ppafo.storage.opensim import write_opensim
-from ppafo.storage.opensim_names import opensim_recording
+from ppafo.storage.opensim import opensim_recording, write_opensim
 from tests.unit.gait.laboratory import GAIT, MASS, STRIDE, UNLOADED, angles, curve, force, markers, opensim, trc
 
 PHASES = np.linspace(0.0, 1.0, 101)

@@ -10,9 +10,8 @@ import numpy as np
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
-from ppafo.gait.mean_stride import MeanStride
 from ppafo.gait.plausible import check_plausible, check_side, force_remarks, moment_remarks
-from ppafo.gait.plausible_angles import sign_remarks, zero_remarks
+from ppafo.gait.plausible_angles import MeanStride, sign_remarks, zero_remarks
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.curves import CurveStatistics, check_scatter, over_strides, scatter_remarks, statistics
 from ppafo.gait.recorded.footfalls import (

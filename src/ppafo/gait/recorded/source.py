@@ -9,9 +9,8 @@ import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.mean_stride import MeanStride
 from ppafo.gait.plausible import check_force_scale, check_moment
-from ppafo.gait.plausible_angles import check_ankle_alone
+from ppafo.gait.plausible_angles import MeanStride, check_ankle_alone
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.contacts import force_of_plates
 from ppafo.gait.recorded.footfalls import FORCE

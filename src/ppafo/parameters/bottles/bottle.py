@@ -21,14 +21,23 @@ from ppafo.model.source import (
     liquid_density,
     pressure_reserve,
 )
-from ppafo.parameters.bottles.declaration import FILLS, PATHS, REQUIRED, WARMING, declared
-from ppafo.parameters.bottles.fluid import Fluid, check_temperature, filled_mass, load_fluid
+from ppafo.parameters.bottles.fluid import (
+    FILLS,
+    PATHS,
+    REQUIRED,
+    WARMING,
+    Fluid,
+    check_temperature,
+    declared,
+    filled_mass,
+    load_fluid,
+)
 from ppafo.parameters.declared import check_keys, value_at
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.parameters.parameter_set import SOURCE, Entry, allowed_number, number_entry
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_text
-from ppafo.wording import changed_text, known_names, nearest_name, said_missing
+from ppafo.wording import changed_text, nearest_name, said_missing
 
 PAPER_BOTTLE = "paper-co2-9oz"
 FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") / "files", ParameterError)
@@ -83,9 +92,6 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
 
     ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
-    name, bundled = label(str(name_or_path)), list_bottles()
-    if not (name in bundled or Path(name_or_path).suffix == ".toml" or "/" in name):
-        raise ParameterError(f"there is no bottle '{name}'{known_names(name, bundled)}, or give a .toml file")
     parsed, file = _read(name_or_path)
     # A file need not state how its regulator and hose warm the gas: they then do so as the paper's.
     paper = _entries_of(_read(PAPER_BOTTLE)[0])
