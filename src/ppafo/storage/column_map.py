@@ -1,7 +1,6 @@
 """Column maps: channels, units and signs of the columns of a foreign table.
 
-A map is part of a TOML file, ``[columns.NAME]``. ``foreign.py`` reads a recording through a map; ``mapped_text.py``
-extracts the mapped columns of a text file.
+A map is part of a TOML file, ``[columns.NAME]``. ``foreign.py`` reads a recording through a map.
 """
 
 from collections.abc import Collection, Sequence
