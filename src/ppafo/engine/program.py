@@ -257,7 +257,7 @@ class Program:
     @property
     def chooses_parts(self) -> bool:
         """True if numeric values decide whether steps are divided: locked joint, rigid chambers, no supply lines."""
-        return self.is_locked and self.feed is None and not self.actuator.gives
+        return self.is_locked and self.feed is None and not (self.actuator.gives or self.valve.regulates)
 
     @property
     def takes_samples(self) -> bool:

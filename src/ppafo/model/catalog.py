@@ -20,6 +20,7 @@ VALVES: Kinds[ValveKind] = Kinds(
     {
         "proportional": "ppafo.model.valves.proportional:KIND",
         "solenoid": "ppafo.model.valves.solenoid:KIND",
+        "pressure_regulator": "ppafo.model.valves.pressure_regulator:KIND",
     },
 )
 

@@ -210,7 +210,9 @@ def time_grid(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
     # The error decides about the parts of a step, but for a locked joint whose chambers no pressure widens, and which
     # are slow enough for plain steps.
     model = ACTUATORS[scenario.device.actuator.kind].model
-    is_alone = scenario.supply_lines is None and not model.gives
+    device = scenario.device
+    regulates = VALVES[device.valve.kind].regulation is not None
+    is_alone = scenario.supply_lines is None and not (model.gives or regulates)
     angle = vane_motion(scenario).locked_angle if is_alone else None
     if angle is None:
         return counts, True, tolerance

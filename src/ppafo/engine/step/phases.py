@@ -149,7 +149,10 @@ def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
     if parts.stated_at_ports:
         stated.predict(parts, lane, command_of(parts, lane, now), length_of(parts, lane))
     source = lane.plant if parts.feed is None else parts.feed.source_ahead(parts, lane)
-    port_1, port_2 = parts.valve.connect(source, lane.shown)
+    if parts.valve.connect_ahead is None:
+        port_1, port_2 = parts.valve.connect(source, lane.shown)
+    else:
+        port_1, port_2 = parts.valve.connect_ahead(source, lane.shown)
     pressure_1, pressure_2 = parts.gas.ends(parts, lane)
     flow = parts.valve.port_flow
     sloped = pneumatics.gas_flows(lane.plant, pressure_1, pressure_2, port_1, port_2, flow)

@@ -16,6 +16,9 @@ def control(parts: Program, lane: Lane, now: Now) -> None:
         lane.controller, lane.controller_state, wanted, lane.seen, lane.timing.period
     )
     lane.controller_state = after
+    if parts.valve.command_for is not None and parts.has_reference:
+        seen_1, seen_2 = lane.seen.pressure_1, lane.seen.pressure_2
+        command = parts.valve.command_for(lane.valve, command, seen_1, seen_2)
     if parts.inverts_valve:
         command = sent_command(command)
     lane.result = lane.result._replace(command=command)

@@ -105,7 +105,7 @@ def plant_of(scenario: Scenario) -> PlantAlone:
     # Metrics need a whole run, which only the caller sees.
     # Where a locked joint may take its steps whole, this one does as long as it stands still.
     is_turned, program = "angle" in input_names, library.program.program
-    rests_whole = is_turned and program.feed is None and not program.actuator.gives
+    rests_whole = is_turned and program.feed is None and not (program.actuator.gives or program.valve.regulates)
     program = replace(program, meters=(), traced=outputs, rests_whole=rests_whole)
     beginnings = (*_REPLACED, _PATH) if is_turned else _REPLACED
     replaced = {setting.path for setting in library.settings if setting.path.startswith(beginnings)}

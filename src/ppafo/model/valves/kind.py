@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 
 from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.orifice import FlowCurve
-from ppafo.model.plant import BlendedPort, Openings, PlantParameters, PortFlow, PortSlopes, SinglePort
+from ppafo.model.plant import Openings, PlantParameters, PortFlow, PortSlopes
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,12 @@ class ValveModel:
     The reference solver uses the same valve in continuous time: ``instant(parameters, state, command)`` returns the
     openings at an instant, ``rates(parameters, state, command)`` the time derivatives of the state,
     ``next_event(parameters, state, command, time)`` the time of the next abrupt change (1e9 or more for never), and
-    ``settle(parameters, state, command, time)`` the state after the abrupt changes that are due.
+    ``settle(parameters, state, command, time)`` the state after the abrupt changes that are due. ``instant``, ``rates``
+    and ``settle`` are None for a valve that regulates pressures, whose openings follow from these.
+
+    Such a valve has ``connect_ahead(plant, shown)``, the ports at the second stage of a step, and ``command_for(
+    parameters, opening, pressure_1, pressure_2)``, the command [-] at which it changes the measured pressures [Pa] as
+    the opening [-] wanted by a law would; None for others.
     """
 
     parameters: type
@@ -38,17 +43,24 @@ class ValveModel:
     prepare: Callable[[Any], Any]
     initial: Callable[[], Any]
     shown: type
-    port: type[SinglePort] | type[BlendedPort]
+    port: type
     advance: Callable[[Any, Any, float, float, float], tuple[Any, Any]]
     connect: Callable[[PlantParameters, Any], tuple[Any, Any]]
     port_flow: Callable[[float, Any, FlowCurve], tuple[PortFlow, PortSlopes]]
     jumps: bool
     shift: Callable[[Any, Any], float] | None
     command_delay: Callable[[Any], float]
-    instant: Callable[[Any, Any, float], Openings]
-    rates: Callable[[Any, Any, float], Any]
+    instant: Callable[[Any, Any, float], Openings] | None
+    rates: Callable[[Any, Any, float], Any] | None
     next_event: Callable[[Any, Any, float, float], float]
-    settle: Callable[[Any, Any, float, float], Any]
+    settle: Callable[[Any, Any, float, float], Any] | None
+    connect_ahead: Callable[[PlantParameters, Any], tuple[Any, Any]] | None = None
+    command_for: Callable[[Any, float, float, float], float] | None = None
+
+    @property
+    def regulates(self) -> bool:
+        """True for a valve whose command is a set pressure: its openings follow the pressures in the chambers."""
+        return self.command_for is not None
 
 
 def valve_problem(valve: ValveModel) -> str:
@@ -79,6 +91,9 @@ class ValveKind:
     ``vents_at_rest`` is True for a valve that connects both chambers to the atmosphere at a command of 0, at which
     others are closed.
 
+    ``regulation(settings)`` is the change of a pressure per command [Pa], and the time constant of its lag [s], of a
+    valve that regulates pressures; None for others.
+
     ``choose(settings)`` returns the simplest model that is exact for the settings. It may only distinguish settings
     that are 0: runs of an ensemble with zeros in the same settings share one model.
     """
@@ -89,6 +104,7 @@ class ValveKind:
     choose: Callable[[Any], ValveModel]
     lag: Callable[[Any], float] | None = None
     vents_at_rest: bool = False
+    regulation: Callable[[Any], tuple[float, float]] | None = None
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

@@ -1,0 +1,221 @@
+"""Electronic pressure regulators, one for each chamber: the command is a set pressure, and gas flows until it is there.
+
+A command above 0 sets chamber 1 above the lowest pressure, one below 0 chamber 2; the other chamber is set to the
+lowest, as both are at 0 and ``VENT``. The command passes hysteresis and resolution, the set pressure follows it with a
+lag of first order. A regulator opens to the supply below its set pressure and to the atmosphere above it, in proportion
+to the deviation and fully beyond its band.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from ppafo.model.declaration import Number
+from ppafo.model.orifice import FlowCurve
+from ppafo.model.plant import PlantParameters, PortFlow, PortSlopes, SinglePort, single_port_flow
+from ppafo.model.ports import exhaust_path, supply_path
+from ppafo.model.sensors import follow, quantise
+from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel, never
+
+TIMES_OF_CONSTANT = 2.1972245773362196
+"""Time from 10 to 90 % of a first-order lag, divided by its time constant: ln 9 [-]."""
+STAGE = 0.2928932188134524
+"""Gamma of the method that fills the chambers (``engine.scheme.pneumatics``): both of its stages are off the ends of a
+step by this fraction, so that a chamber that follows its set pressure closely arrives with it."""
+SMALLEST_RANGE = 1.0
+"""Smallest range of set pressures [Pa] that is divided by."""
+
+
+class RegulatorSettings(NamedTuple):
+    """Settings of a regulator: range, dead time, response time, band, and flaws of the set pressure."""
+
+    lowest_pressure: Annotated[float, Number("Pa_a", "set pressure at a command of 0", None, 1.0e3, 1.0e7)]
+    highest_pressure: Annotated[float, Number("Pa_a", "set pressure at full command", None, 1.0e3, 1.0e7)]
+    response_time: Annotated[float, Number("s", "time from 10 to 90 % of a step, 0 for none", 0.0, 0.0, 10.0)]
+    delay: Annotated[float, Number("s", "dead time between command and set pressure", 0.0, 0.0, 0.2)]
+    band: Annotated[
+        float, Number("", "deviation at which it is fully open, as a fraction of the range", 0.01, 1.0e-4, 1.0)
+    ]
+    hysteresis: Annotated[float, Number("", "hysteresis, as a fraction of the range", 0.0, 0.0, 0.5)]
+    resolution: Annotated[float, Number("", "step of the set pressure, as a fraction of the range", 0.0, 0.0, 0.5)]
+
+
+class RegulatorParameters(NamedTuple):
+    """Lowest set pressure, range and band [Pa], rate of the lag [1/s] (0 for none), hysteresis and resolution [-]."""
+
+    lowest: float
+    range: float
+    band: float
+    rate: float
+    hysteresis: float
+    resolution: float
+
+
+class RegulatorState(NamedTuple):
+    """Commands behind the hysteresis [-], and set pressures behind the lag above the lowest ones [Pa]."""
+
+    command_1: float = 0.0
+    command_2: float = 0.0
+    set_1: float = 0.0
+    set_2: float = 0.0
+
+
+class SetPressures(NamedTuple):
+    """Set pressures [Pa absolute] of both chambers at both stages of a step, and the band [Pa]."""
+
+    first_1: float
+    first_2: float
+    second_1: float
+    second_2: float
+    band: float
+
+
+class RegulatedPort(NamedTuple):
+    """Full conductance [kg/(s Pa)], pressures of source and atmosphere, set pressure and band [Pa].
+
+    ``is_relieving`` is 1 where gas may flow back into the source, else 0.
+    """
+
+    conductance: float
+    source_pressure: float
+    vent_pressure: float
+    is_relieving: float
+    set_pressure: float
+    band: float
+
+
+def behind_hysteresis(before: float, command: float, hysteresis: float) -> float:
+    """Command [-] behind a hysteresis [-], a play of that width, given the one before."""
+    half = 0.5 * hysteresis
+    return max(command - half, min(command + half, before))
+
+
+def advance(
+    valve: RegulatorParameters, state: RegulatorState, command: float, time: float, step: float
+) -> tuple[SetPressures, RegulatorState]:
+    """Set pressures [Pa] during a step [s] with a constant command [-], and the state at its end."""
+    asked = 0.0 if command > VENTS_ABOVE else max(-1.0, min(1.0, command))
+    command_1 = behind_hysteresis(state.command_1, max(asked, 0.0), valve.hysteresis)
+    command_2 = behind_hysteresis(state.command_2, max(-asked, 0.0), valve.hysteresis)
+    target_1 = valve.range * quantise(command_1, valve.resolution)
+    target_2 = valve.range * quantise(command_2, valve.resolution)
+    begin_1 = state.set_1 if valve.rate > 0.0 else target_1
+    begin_2 = state.set_2 if valve.rate > 0.0 else target_2
+    end_1 = follow(valve.rate, step, state.set_1, target_1, target_1)
+    end_2 = follow(valve.rate, step, state.set_2, target_2, target_2)
+    shown = SetPressures(
+        first_1=valve.lowest + begin_1 + STAGE * (end_1 - begin_1),
+        first_2=valve.lowest + begin_2 + STAGE * (end_2 - begin_2),
+        second_1=valve.lowest + end_1 - STAGE * (end_1 - begin_1),
+        second_2=valve.lowest + end_2 - STAGE * (end_2 - begin_2),
+        band=valve.band,
+    )
+    return shown, RegulatorState(command_1, command_2, end_1, end_2)
+
+
+def regulated_ports(
+    plant: PlantParameters, set_1: float, set_2: float, band: float
+) -> tuple[RegulatedPort, RegulatedPort]:
+    """Ports of both chambers for their set pressures and a band [Pa]."""
+    full, room, back = plant.valve_conductance, plant.atmospheric_pressure, plant.relieving
+    return (
+        RegulatedPort(full, plant.supply_pressure, room, back, set_1, band),
+        RegulatedPort(full, plant.dorsiflexion_pressure, room, back, set_2, band),
+    )
+
+
+def connect(plant: PlantParameters, shown: SetPressures) -> tuple[RegulatedPort, RegulatedPort]:
+    """Ports of both chambers at the first stage of a step."""
+    return regulated_ports(plant, shown.first_1, shown.first_2, shown.band)
+
+
+def connect_ahead(plant: PlantParameters, shown: SetPressures) -> tuple[RegulatedPort, RegulatedPort]:
+    """Ports of both chambers at the second stage of a step."""
+    return regulated_ports(plant, shown.second_1, shown.second_2, shown.band)
+
+
+def regulated_port_flow(pressure: float, port: RegulatedPort, curve: FlowCurve) -> tuple[PortFlow, PortSlopes]:
+    """Flow into a chamber at ``pressure`` [Pa absolute] through its regulator, and its derivatives. Eqs (6) to (8)."""
+    opening = (port.set_pressure - pressure) / port.band
+    fed, vented = max(min(opening, 1.0), 0.0), max(min(-opening, 1.0), 0.0)
+    # Flows per conductance: the derivative has that of the opening, too.
+    source, by_source = single_port_flow(
+        pressure, SinglePort(1.0, port.source_pressure, 1.0, port.is_relieving), curve
+    )
+    vent, by_vent = single_port_flow(pressure, SinglePort(1.0, port.vent_pressure, 0.0, 1.0), curve)
+    supply, exhaust = supply_path(fed * port.conductance), exhaust_path(vented * port.conductance)
+    within = port.conductance / port.band
+    narrowing = -within * source.total if fed > 0.0 and fed < 1.0 else 0.0
+    widening = within * vent.total if vented > 0.0 and vented < 1.0 else 0.0
+    from_source, slope = supply * source.total, supply * by_source.total + narrowing
+    return PortFlow(from_source + exhaust * vent.total, from_source), PortSlopes(
+        slope + exhaust * by_vent.total + widening, slope
+    )
+
+
+def command_for(valve: RegulatorParameters, opening: float, pressure_1: float, pressure_2: float) -> float:
+    """Command [-] for a law that wants an opening [-], by which a spool would change the pressures [Pa absolute].
+
+    A set pressure beyond the present one by the opening changes the pressure at a rate in proportion to it; an opening
+    of 0 keeps it. ``VENT`` is passed on.
+    """
+    present = (pressure_1 - pressure_2) / valve.range
+    return opening if opening > VENTS_ABOVE else max(-1.0, min(1.0, present + opening))
+
+
+def prepare(settings: RegulatorSettings) -> RegulatorParameters:
+    """Parameters of the regulators from ``settings`` [SI]."""
+    width = max(settings.highest_pressure - settings.lowest_pressure, SMALLEST_RANGE)
+    time = settings.response_time
+    return RegulatorParameters(
+        lowest=settings.lowest_pressure,
+        range=width,
+        band=settings.band * width,
+        rate=TIMES_OF_CONSTANT / time if time > 0.0 else 0.0,
+        hysteresis=settings.hysteresis,
+        resolution=settings.resolution,
+    )
+
+
+def dead_time(settings: RegulatorSettings) -> float:
+    """Time from a command to the first change of the set pressure [s]."""
+    return settings.delay
+
+
+def regulation(settings: RegulatorSettings) -> tuple[float, float]:
+    """Change of the pressure per command [Pa], and time constant of its lag [s]."""
+    return settings.highest_pressure - settings.lowest_pressure, settings.response_time / TIMES_OF_CONSTANT
+
+
+MODEL = ValveModel(
+    parameters=RegulatorParameters,
+    state=RegulatorState,
+    prepare=prepare,
+    initial=RegulatorState,
+    shown=SetPressures,
+    port=RegulatedPort,
+    advance=advance,
+    connect=connect,
+    port_flow=regulated_port_flow,
+    jumps=False,
+    shift=None,
+    command_delay=dead_time,
+    instant=None,
+    rates=None,
+    next_event=never,
+    settle=None,
+    connect_ahead=connect_ahead,
+    command_for=command_for,
+)
+
+
+def choose(settings: RegulatorSettings) -> ValveModel:
+    """Model of the regulators, whatever the settings."""
+    return MODEL
+
+
+KIND = ValveKind(
+    name="pressure_regulator",
+    summary="Electronic pressure regulators, one for each chamber: the command is a set pressure.",
+    settings=RegulatorSettings,
+    choose=choose,
+    regulation=regulation,
+)
