@@ -60,7 +60,7 @@ def _number(path: str, value: float, unit: str) -> str:
 
 
 def draw_joint(draw: random.Random, kind: str, folder: Path, number: int) -> Path:
-    """Write the parameter set of a drawn joint with a proportional valve and a pair of on/off valves; its file."""
+    """Write the parameter set of a drawn joint with a spool, a pair of on/off valves and regulators; its file."""
 
     def log(low: float, high: float) -> float:
         return float(low * (high / low) ** draw.random())
@@ -120,7 +120,9 @@ def draw_joint(draw: random.Random, kind: str, folder: Path, number: int) -> Pat
         orifice = [("sonic_conductance", growth * log(0.01, 0.1), "L/(s bar)"), ("critical_ratio", 0.3, "")]
     else:
         orifice = [("area", growth * log(0.05, 0.5), "mm^2"), ("discharge_coefficient", 0.7, "")]
-    numbers += [(f"valves.{name}.{item}", value, unit) for name in ("prop", "pair") for item, value, unit in orifice]
+    numbers += [
+        (f"valves.{name}.{item}", value, unit) for name in ("prop", "pair", "reg") for item, value, unit in orifice
+    ]
     numbers.append(("valves.prop.delay", log(0.2, 6.0), "ms"))
     if draw.random() < 0.4:
         numbers.append(("valves.prop.dead_band", draw.uniform(0.02, 0.1), ""))
@@ -129,17 +131,33 @@ def draw_joint(draw: random.Random, kind: str, folder: Path, number: int) -> Pat
         ("valves.pair.closing_delay", log(2.0, 20.0), "ms"),
         ("valves.pair.switching_interval", log(4.0, 50.0), "ms"),
     ]
+    numbers += _of_regulators(random.Random(f"regulators of {number} {gauge}"), gauge)
     if kind == "bladder":
         # Its one chamber refuses the numbers of a second one.
         numbers = [item for item in numbers if item[0] not in OF_SECOND_CHAMBER]
     head = (
         f'schema_version = 1\nname = "joint{number}"\ntitle = "Drawn joint {number}: {kind}"\ndefault_valve = "prop"\n'
-        f'[valves.prop]\nkind = "proportional"\n[valves.pair]\nkind = "solenoid"\n{section}'
+        f'[valves.prop]\nkind = "proportional"\n[valves.pair]\nkind = "solenoid"\n'
+        f'[valves.reg]\nkind = "pressure_regulator"\n{section}'
         '[gas.species]\nvalue = "air"\norigin = "datasheet"\nsource = "drawn"\n'
     )
     file = folder / f"joint{number}.toml"
     file.write_text(head + "".join(_number(*item) for item in numbers), encoding="utf-8")
     return file
+
+
+def _of_regulators(draw: random.Random, gauge: float) -> list[tuple[str, float, str]]:
+    """Range, times and flaws of drawn regulators below a supply [bar gauge]."""
+    numbers = [
+        ("lowest_pressure", draw.choice((0.0, 0.05)), "bar_g"),
+        ("highest_pressure", gauge * draw.uniform(0.6, 1.3), "bar_g"),
+        ("response_time", 5.0 * 60.0 ** draw.random(), "ms"),
+        ("delay", draw.choice((0.0, draw.uniform(0.5, 10.0))), "ms"),
+        ("band", 0.003 * 20.0 ** draw.random(), ""),
+        ("hysteresis", draw.uniform(0.0, 0.01), ""),
+        ("resolution", draw.uniform(0.0, 0.004), ""),
+    ]
+    return [(f"valves.reg.{name}", value, unit) for name, value, unit in numbers]
 
 
 def _table(kind: str, first: float, last: float, gauge: float, growth: float) -> str:
@@ -161,9 +179,9 @@ def _table(kind: str, first: float, last: float, gauge: float, growth: float) ->
     return "\n".join(lines) + "\n"
 
 
-def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
-    """Give the tasks of a joint; references lie within the reach of the actuator where the name does not deny it."""
-    probe = _document(file, "prop", _middle(file), {"kind": "pid"}, {"kind": "constant", "level": "0 N m"}, 1.0, 1000)
+def draw_tasks(draw: random.Random, file: Path, main: str) -> Iterator[DrawnTask]:
+    """Give the tasks of a joint with its valve ``main``; references lie within its reach if the name does not deny it."""
+    probe = _document(file, main, _middle(file), {"kind": "pid"}, {"kind": "constant", "level": "0 N m"}, 1.0, 1000)
     device = scenario_from_dict(probe).device
     low, high = float(device.actuator.angle_min), float(device.actuator.angle_max)
     middle = 0.5 * (low + high)
@@ -177,7 +195,7 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
         motion: dict[str, Any],
         law: dict[str, Any],
         reference: dict[str, Any],
-        valve: str = "prop",
+        valve: str = main,
         small: Sequence[str] = (),
     ) -> DrawnTask:
         duration = 4.0 if name.startswith("angle") else 2.5
@@ -206,7 +224,7 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
     gain = {"kind": "pid", "proportional_gain": f"{draw.choice((0.003, 0.3, 30.0)):.3g} 1/(N m)"}
     yield task("gains of another", locked(middle), gain, hold(level))
     yield from _pulses(draw, partial(task, motion=locked(middle)), device, (base, level, travel), sine)
-    gauge = float(device.supply.pressure) - float(device.supply.atmospheric_pressure)
+    gauge = float(device.highest_pressures[0]) - float(device.supply.atmospheric_pressure)
     for name, share in (("pressure", draw.uniform(0.3, 0.8)), ("pressure above supply", 1.3)):
         pressure = {"of": "pressure_1", "kind": "ramp_hold", "ramp_time": "0.3 s", "start_level": "0 Pa_g"}
         yield task(name, locked(middle), pid, {**pressure, "level": f"{share * gauge:.6g} Pa_g"})
@@ -269,6 +287,8 @@ def _pulses(
     yield task("torque table", law=pid, reference=_table_of(*knots, first=base))
     ripple = {**sine, "amplitude": f"{draw.choice((0.001, 0.02, 0.05)) * travel:.6g} N m", "frequency": "2 Hz"}
     yield task("torque ripple", law=pid, reference=ripple)
+    if device.valve.kind != "proportional":
+        return
     weak = {"kind": "pid", "proportional_gain": f"{1.0 / travel:.4g} 1/(N m)", "integral_gain": "0 1/(N m s)"}
     yield task("torque ripple, dead band", law=weak, reference=ripple, small=["valve.dead_band=0.3"])
 
@@ -381,7 +401,9 @@ def printed_remedy(sentence: str) -> list[str]:
     return [] if found is None else list(ast.literal_eval(found[1]))
 
 
-def run_joints(seed: int, joints: int, log: Path, kinds: Sequence[str] = KINDS) -> list[dict[str, Any]]:
+def run_joints(
+    seed: int, joints: int, log: Path, kinds: Sequence[str] = KINDS, valve: str = "prop"
+) -> list[dict[str, Any]]:
     """Run every task of the joints of some kinds that a log (a JSON object a line for each run) has not; all records.
 
     Each joint is drawn by itself, so that a count that was stopped goes on where it ended.
@@ -396,7 +418,7 @@ def run_joints(seed: int, joints: int, log: Path, kinds: Sequence[str] = KINDS) 
             file = draw_joint(draw, kind, Path(folder), number)
             records = [
                 {"seed": seed, "joint": number, "kind": kind, "task": task.name, **_outcome(task)}
-                for task in draw_tasks(draw, file)
+                for task in draw_tasks(draw, file, valve)
             ]
             # A joint is written whole or not at all.
             lines.write("".join(f"{json.dumps(record)}\n" for record in records))

@@ -140,10 +140,13 @@ def main(words: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--log", type=Path, default=None, help="records of the joints that were run")
     parser.add_argument("--kinds", default=",".join(KINDS), help="kinds of joints that are run, with commas between")
+    parser.add_argument(
+        "--valve", default="prop", choices=("prop", "reg"), help="valve of the joints: a spool, or regulators"
+    )
     given = parser.parse_args(words)
     if given.joints:
         log = given.log or Path(f"joints-{given.seed}.jsonl")
-        records = run_joints(given.seed, given.joints, log, given.kinds.split(","))
+        records = run_joints(given.seed, given.joints, log, given.kinds.split(","), given.valve)
         counts = counts_of(records)
         print(table_text(counts), angle_text(records), sep="\n\n")
         return 1 if any(row["good said"] or row["fails silent"] for row in counts.values()) else 0

@@ -83,7 +83,7 @@ class Joint(NamedTuple):
 def bandwidth(loop: TorqueLoop, joint: Joint) -> float:
     """Bandwidth w [rad/s], limited by the dead time of the torque loop and by the torque rate over the travel."""
     by_dead_time = 1.0 / (OUTER_TIMES_INNER * loop.dead_time)
-    return min(by_dead_time, power(max(loop.rate, 1.0e-9) / (joint.inertia * joint.travel), THIRD))
+    return min(by_dead_time, power(max(min(loop.rate, loop.largest_rate), 1.0e-9) / (joint.inertia * joint.travel), THIRD))
 
 
 def angle_stiffness(loop: TorqueLoop, joint: Joint) -> float:
@@ -174,4 +174,5 @@ def slow_loop(loop: TorqueLoop, joint: Joint) -> TorqueLoop:
     dry = 4.0 * joint.friction / (math.pi * frequency * USUAL_SWING)
     damping = max(joint.damping + dry, 2.0 * LEAST_DAMPING_RATIO * frequency * joint.inertia)
     late = max(loop.dead_time + damping / joint.stiffness, joint.inertia / damping)
-    return TorqueLoop(rate=loop.rate / joint.stiffness, dead_time=late)
+    rate = loop.rate / joint.stiffness
+    return TorqueLoop(rate, late, rate)

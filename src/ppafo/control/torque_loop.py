@@ -18,10 +18,14 @@ from typing import NamedTuple
 
 
 class TorqueLoop(NamedTuple):
-    """Torque rate R at full opening [N m/s], and dead time theta [s]."""
+    """Torque rate R at full opening [N m/s], dead time theta [s], and the largest rate that the flow allows [N m/s].
+
+    A valve that regulates pressures reaches the largest rate with less than its full opening.
+    """
 
     rate: float
     dead_time: float
+    largest_rate: float
 
 
 PROPORTIONAL_GAIN = "proportional gain of the torque loop"

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar, Protocol
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
-from ppafo.model.catalog import ACTUATORS
-from ppafo.model.columns import first
+from ppafo.model.catalog import ACTUATORS, VALVES
+from ppafo.model.columns import first, smaller
 from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
@@ -236,6 +236,14 @@ class Device:
     def shown(self) -> dict[str, str]:
         """Display units of the device by SI unit, and the atmosphere as zero of gauge pressures."""
         return counted_from(self.units, first(self.supply.atmospheric_pressure))
+
+    @property
+    def highest_pressures(self) -> tuple[Any, Any]:
+        """Highest pressures that the chambers can be filled to [Pa absolute]; a regulator may be set no higher."""
+        supplies, highest = (self.supply.pressure, self.supply.dorsiflexion_pressure), self.valve.settings
+        if VALVES[self.valve.kind].regulation is None:
+            return supplies
+        return smaller(supplies[0], highest["highest_pressure"]), smaller(supplies[1], highest["highest_pressure"])
 
     @property
     def has_torque_constant(self) -> bool:

@@ -33,10 +33,11 @@ def torque_reach(device: Device, angle: float, torque: StaticTorque | None = Non
 
     ``torque`` is the ``static_torque`` of the device, for repeated calls.
     """
-    own, supply = torque or static_torque(device), device.supply
-    vented = float(supply.atmospheric_pressure)
-    by_1, by_2 = own(angle, float(supply.pressure), vented), own(angle, vented, float(supply.dorsiflexion_pressure))
-    return (by_1, by_2) if supply.is_vacuum else (by_2, by_1)
+    own = torque or static_torque(device)
+    vented = float(device.supply.atmospheric_pressure)
+    highest_1, highest_2 = map(float, device.highest_pressures)
+    by_1, by_2 = own(angle, highest_1, vented), own(angle, vented, highest_2)
+    return (by_1, by_2) if device.supply.is_vacuum else (by_2, by_1)
 
 
 def supply_that_moves(device: Device, upwards: bool) -> str:

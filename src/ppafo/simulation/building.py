@@ -6,8 +6,10 @@ Each mistake in the document raises an error of one line.
 from dataclasses import replace
 
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.kind import ControllerKind
 from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted
-from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.model.catalog import VALVES
+from ppafo.model.controlled import ANGLE, ANYTHING, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import WHY_ONE_CHAMBER
 from ppafo.parameters.declared import kind_at, value_at
@@ -121,11 +123,31 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
                 # These open the valve by their own idea of the device, where a command above 0 raises the torque.
                 able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
                 device.check_pressurised(f"the controller '{kind}'", f"; set controller.kind to one of {able}")
+            check_regulated(device, law, controlled)
             if law.plan is not None:
                 device.check_torque_constant("a fixed-point controller")
         except ParameterError as error:
             raise device_error(reading, error) from error
         return scenario
+
+
+def check_regulated(device: Device, law: ControllerKind, controlled: str) -> None:
+    """Raise ParameterError for a valve that regulates pressures under a law which has an idea of its flow of its own.
+
+    An angle needs a law that asks for a torque: at a set pressure there is no gas spring that would hold a joint.
+    """
+    valve = device.valve.kind
+    if VALVES[valve].regulation is None or not law.needs_reference:
+        return
+    device.check_pressurised(f"a valve of kind '{valve}'")
+    believes = law.plan is not None or any(item.name == "valve_conductance" for item in law.quantities)
+    if believes or (controlled == ANGLE and TORQUE in law.controls):
+        wanted = (ANGLE,) if controlled == ANGLE else ANYTHING
+        able = ", ".join(name for name, other in CONTROLLERS.items() if other.controls == wanted)
+        raise ParameterError(
+            f"the controller '{law.name}' opens a valve for a flow, but one of kind '{valve}' sets a pressure; set "
+            f"controller.kind to one of {able}"
+        )
 
 
 def origin_of(request: ScenarioRequest, changed: OverriddenDocument, hardware: Hardware) -> Origin:

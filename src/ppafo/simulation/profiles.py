@@ -118,16 +118,10 @@ def stops_of(device: Device) -> Limits:
 
 def limits_of(device: Device, followed: ControlledQuantity) -> Limits:
     """Reach of a device in the controlled quantity of a reference; infinite for a torque."""
-    actuator, supply = device.actuator, device.supply
-    ends = Ends(
-        angle_min=actuator.angle_min,
-        angle_max=actuator.angle_max,
-        supply_pressure=supply.pressure,
-        dorsiflexion_pressure=supply.dorsiflexion_pressure,
-        atmospheric_pressure=supply.atmospheric_pressure,
-    )
+    actuator, room = device.actuator, device.supply.atmospheric_pressure
+    ends = Ends(actuator.angle_min, actuator.angle_max, *device.highest_pressures, room)
     lowest, highest = (-np.inf, np.inf) if followed.reach is None else followed.reach(ends)
-    words, room = f"{followed.limits} of {device.name}", supply.atmospheric_pressure
+    words = f"{followed.limits} of {device.name}"
     return Limits(words=words, lowest=lowest, highest=highest, unit=followed.level.unit, room=room)
 
 

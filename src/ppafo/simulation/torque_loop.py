@@ -36,6 +36,8 @@ from ppafo.simulation.motion_kind import LawSignals
 _TABLES = ("tabulated", "smooth")
 _LEADING = ("constant", "ramp_hold", "sine", *_TABLES)
 """Kinds of profiles whose extreme angles are known."""
+LEAST_RATE = 1.0e-9
+"""Smallest rate of a torque or a pressure that is divided by [SI]."""
 _OF_PAIR = {"opening_delay", "closing_delay", "switching_interval"}
 """Settings of a pair of on/off valves."""
 _OF_PRESSURE = {"pressure_1": (1.0, 0.0), "pressure_2": (0.0, 1.0), "pressure_difference": (1.0, 1.0)}
@@ -75,6 +77,11 @@ class LoopParts:
         return chambers_of(self.device.actuator)
 
     @property
+    def regulates(self) -> bool:
+        """True for a valve whose command is a set pressure."""
+        return VALVES[self.device.valve.kind].regulation is not None
+
+    @property
     def is_sonic(self) -> bool:
         """True for a valve given by its sonic conductance."""
         return isinstance(self.device.valve.orifice, SonicOrifice)
@@ -84,7 +91,7 @@ class LoopParts:
         if name not in kept:
             asked = settings if name in self.reads else Asked(settings.__getitem__)
             lane = _Groups(lambda other: self.group(other, asked, kept))
-            GROUPS[name](self, lane, asked)
+            self.function_of(name)(self, lane, asked)
             # Those that it read are there already.
             kept.update(vars(lane))
             if name not in self.reads:
@@ -100,7 +107,11 @@ class LoopParts:
         kept = dict[str, Any]()
         for name in groups:
             self.group(name, Asked(present), kept)
-        return list(dict.fromkeys(GROUPS[name] for name in kept))
+        return list(dict.fromkeys(map(self.function_of, kept)))
+
+    def function_of(self, name: str) -> PlainFunction:
+        """Return the function that computes a group."""
+        return set_regulated_loop if self.regulates and name == "torque_loop" else GROUPS[name]
 
     def combinations(
         self, groups: tuple[str, ...], present: Callable[[str], Any]
@@ -155,9 +166,12 @@ def set_device(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> No
     """Set the settings of the actuator, its stops and dead volumes, and the pressures around the device."""
     lane.actuator = section_row(ACTUATORS[parts.device.actuator.kind].settings, settings, "actuator")
     lane.stops = section_row(Range, settings, "actuator")
-    lane.around = Surroundings(
-        settings["supply.pressure"], settings["supply.dorsiflexion_pressure"], settings["supply.atmospheric_pressure"]
-    )
+    supply = settings["supply.pressure"]
+    other = settings["supply.dorsiflexion_pressure"]
+    if parts.regulates:
+        supply = min(supply, settings["valve.highest_pressure"])
+        other = min(other, settings["valve.highest_pressure"])
+    lane.around = Surroundings(supply, other, settings["supply.atmospheric_pressure"])
 
 
 def set_usual(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001
@@ -291,7 +305,31 @@ def set_torque_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float]) 
         quickest = max(torque_per_flow(here, lane.around), torque_per_flow(there, lane.around))
     else:
         quickest = max(per_flow(here, lane.around, by[0], by[1]), per_flow(there, lane.around, by[0], by[1]))
-    lane.torque_loop = TorqueLoop(lane.flow * quickest, lane.valve_time + lane.late)
+    rate = lane.flow * quickest
+    lane.torque_loop = TorqueLoop(rate, lane.valve_time + lane.late, rate)
+
+
+def set_regulated_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:
+    """Set the torque or pressure loop of a valve that regulates pressures: R = K p / (tau_1 + theta), theta.
+
+    An opening of 1 sets the pressure by p, the pressure per command, beyond the present one. The set pressure and the
+    chamber follow with a lag each; of the shorter one a half is added to the longer one tau_1, a half to the dead time
+    (the half rule of Skogestad 2003). The flow limits the rate.
+    """
+    kind = VALVES[parts.device.valve.kind]
+    by = _OF_PRESSURE.get(parts.controlled)
+    pressure, band, set_lag = kind.regulation(section_row(kind.settings, settings, "valve"))
+    mean = parts.chambers_at(lane.actuator, lane.stops, lane.around, lane.places[0])
+    if by is None:
+        gain = max(mean.torque_per_pressure_1, mean.torque_per_pressure_2)
+        largest = lane.flow * torque_per_flow(mean, lane.around)
+    else:
+        gain = max(by[0], by[1])
+        largest = lane.flow * per_flow(mean, lane.around, by[0], by[1])
+    chamber_lag = gain * band / max(largest, LEAST_RATE)
+    shorter = 0.5 * min(set_lag, chamber_lag)
+    late = lane.valve_time + lane.late + shorter
+    lane.torque_loop = TorqueLoop(gain * pressure / (max(set_lag, chamber_lag) + shorter + late), late, largest)
 
 
 def set_reach(parts: LoopParts, lane: Any, settings: Mapping[str, float]) -> None:  # noqa: ARG001

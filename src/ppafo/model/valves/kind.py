@@ -91,8 +91,8 @@ class ValveKind:
     ``vents_at_rest`` is True for a valve that connects both chambers to the atmosphere at a command of 0, at which
     others are closed.
 
-    ``regulation(settings)`` is the change of a pressure per command [Pa], and the time constant of its lag [s], of a
-    valve that regulates pressures; None for others.
+    ``regulation(settings)`` is the change of a pressure per command [Pa], the deviation that opens the valve fully
+    [Pa], and the time constant of the set pressure [s], of a valve that regulates pressures; None for others.
 
     ``choose(settings)`` returns the simplest model that is exact for the settings. It may only distinguish settings
     that are 0: runs of an ensemble with zeros in the same settings share one model.
@@ -104,7 +104,7 @@ class ValveKind:
     choose: Callable[[Any], ValveModel]
     lag: Callable[[Any], float] | None = None
     vents_at_rest: bool = False
-    regulation: Callable[[Any], tuple[float, float]] | None = None
+    regulation: Callable[[Any], tuple[float, float, float]] | None = None
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

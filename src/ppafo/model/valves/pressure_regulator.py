@@ -6,7 +6,7 @@ lag of first order. A regulator opens to the supply below its set pressure and t
 to the deviation and fully beyond its band.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.model.declaration import Number
 from ppafo.model.orifice import FlowCurve
@@ -137,9 +137,7 @@ def regulated_port_flow(pressure: float, port: RegulatedPort, curve: FlowCurve) 
     opening = (port.set_pressure - pressure) / port.band
     fed, vented = max(min(opening, 1.0), 0.0), max(min(-opening, 1.0), 0.0)
     # Flows per conductance: the derivative has that of the opening, too.
-    source, by_source = single_port_flow(
-        pressure, SinglePort(1.0, port.source_pressure, 1.0, port.is_relieving), curve
-    )
+    source, by_source = single_port_flow(pressure, SinglePort(1.0, port.source_pressure, 1.0, port.is_relieving), curve)
     vent, by_vent = single_port_flow(pressure, SinglePort(1.0, port.vent_pressure, 0.0, 1.0), curve)
     supply, exhaust = supply_path(fed * port.conductance), exhaust_path(vented * port.conductance)
     within = port.conductance / port.band
@@ -180,9 +178,10 @@ def dead_time(settings: RegulatorSettings) -> float:
     return settings.delay
 
 
-def regulation(settings: RegulatorSettings) -> tuple[float, float]:
-    """Change of the pressure per command [Pa], and time constant of its lag [s]."""
-    return settings.highest_pressure - settings.lowest_pressure, settings.response_time / TIMES_OF_CONSTANT
+def regulation(settings: RegulatorSettings) -> tuple[float, float, float]:
+    """Change of the pressure per command and band [Pa], and time constant of the lag [s]."""
+    width = settings.highest_pressure - settings.lowest_pressure
+    return width, settings.band * width, settings.response_time / TIMES_OF_CONSTANT
 
 
 MODEL = ValveModel(
