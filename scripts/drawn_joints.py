@@ -180,7 +180,7 @@ def _table(kind: str, first: float, last: float, gauge: float, growth: float) ->
 
 
 def draw_tasks(draw: random.Random, file: Path, main: str) -> Iterator[DrawnTask]:
-    """Give the tasks of a joint with its valve ``main``; references lie within its reach if the name does not deny it."""
+    """Give the tasks of a joint with its valve ``main``; references lie within reach unless the name denies it."""
     probe = _document(file, main, _middle(file), {"kind": "pid"}, {"kind": "constant", "level": "0 N m"}, 1.0, 1000)
     device = scenario_from_dict(probe).device
     low, high = float(device.actuator.angle_min), float(device.actuator.angle_max)

@@ -83,7 +83,9 @@ class Joint(NamedTuple):
 def bandwidth(loop: TorqueLoop, joint: Joint) -> float:
     """Bandwidth w [rad/s], limited by the dead time of the torque loop and by the torque rate over the travel."""
     by_dead_time = 1.0 / (OUTER_TIMES_INNER * loop.dead_time)
-    return min(by_dead_time, power(max(min(loop.rate, loop.largest_rate), 1.0e-9) / (joint.inertia * joint.travel), THIRD))
+    return min(
+        by_dead_time, power(max(min(loop.rate, loop.largest_rate), 1.0e-9) / (joint.inertia * joint.travel), THIRD)
+    )
 
 
 def angle_stiffness(loop: TorqueLoop, joint: Joint) -> float:

@@ -99,8 +99,11 @@ def actuator_departure(model: ActuatorModel, plant: Any) -> Departure:
 def valve_departure(model: ValveModel, settings: Any, plant: Any) -> Departure:
     """Return the largest departure of the steady flow of ``advance`` from the one of ``instant``.
 
-    Time stepping uses the first, the reference solver the second. A valve that does not come to rest departs by 0.
+    Time stepping uses the first, the reference solver the second. A valve that does not come to rest departs by 0, and
+    so does one that regulates pressures.
     """
+    if model.instant is None or model.settle is None:
+        return Departure(0.0, "")
     valve, room = model.prepare(settings), plant.atmospheric_pressure
     pressure = room + 0.5 * (plant.supply_pressure - room)
     full, found = plant.valve_conductance * max(plant.supply_pressure, room), [Departure(0.0, "")]

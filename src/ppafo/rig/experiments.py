@@ -170,6 +170,11 @@ def _valve_map(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
     kind = VALVES[device.valve.kind]
     still = valve_settings(device.valve)._replace(**{item.name: 0.0 for item in kind.quantities if item.unit})
     model = kind.choose(still)
+    if model.instant is None or model.settle is None:
+        raise ParameterError(
+            f"the experiment 'valve-map' measures a flow over the command, but a valve of kind '{kind.name}' sets a "
+            "pressure; take 'step-response'"
+        )
     parameters = model.prepare(still)
     rising = np.linspace(-1.0, 1.0, 101)
     commands = np.concatenate([rising, rising[-2::-1]])

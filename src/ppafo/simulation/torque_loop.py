@@ -318,6 +318,7 @@ def set_regulated_loop(parts: LoopParts, lane: Any, settings: Mapping[str, float
     """
     kind = VALVES[parts.device.valve.kind]
     by = _OF_PRESSURE.get(parts.controlled)
+    assert kind.regulation is not None, "the valve regulates pressures"
     pressure, band, set_lag = kind.regulation(section_row(kind.settings, settings, "valve"))
     mean = parts.chambers_at(lane.actuator, lane.stops, lane.around, lane.places[0])
     if by is None:

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, SHUT, reversals
+from ppafo.model.catalog import VALVES
+from ppafo.parameters.plant import valve_settings
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import Remedy
@@ -16,6 +18,8 @@ from ppafo.simulation.tracking.settled import SettledPart
 
 _FULLY_OPEN = 0.98
 """Command above which a valve counts as fully open [-]."""
+_FAR, _FAR_OF_RANGE = 2.0, 0.05
+"""Deviation from the set pressure beyond which a regulator counts as fully open: in bands, and of its range [-]."""
 
 
 class Case(NamedTuple):
@@ -45,6 +49,11 @@ class Case(NamedTuple):
     @property
     def is_fully_open(self) -> NDArray[np.bool_]:
         """True for each sample of the recording with a fully open valve."""
+        valve = self.scenario.device.valve
+        regulation = VALVES[valve.kind].regulation
+        if regulation is not None:
+            span, band, _ = regulation(valve_settings(valve))
+            return _is_far_from_set(self.recording, valve.lowest_pressure, span, band)
         command, settings = np.abs(self.recording["command"]), self.scenario.controller.settings
         # An on/off law may open its valves by less on purpose.
         return np.asarray((command >= _FULLY_OPEN * min(settings.get("opening", 1.0), 1.0)) & (command <= 1.0 + SHUT))
@@ -67,6 +76,21 @@ class Case(NamedTuple):
         """Error of the settled part [SI]."""
         reference, value = followed(self.recording)
         return np.asarray((value - reference)[self.settled.samples])
+
+
+def _is_far_from_set(recording: Recording, lowest: float, span: float, band: float) -> NDArray[np.bool_]:
+    """Return for each sample whether a pressure is off the one that its regulator is set to, far beyond its band [Pa].
+
+    ``lowest`` is the lowest set pressure and ``span`` the range above it [Pa].
+    """
+    command = recording["command"]
+    far = np.zeros(command.shape, dtype=np.bool_)
+    for chamber, sign in (("pressure_1", 1.0), ("pressure_2", -1.0)):
+        # An actuator with one chamber has no second pressure.
+        if chamber in recording:
+            wanted = lowest + span * np.clip(sign * command, 0.0, 1.0)
+            far |= np.abs(wanted - recording[chamber]) > max(_FAR * band, _FAR_OF_RANGE * span)
+    return far
 
 
 def only_opens_fully(recording: Recording) -> bool:
