@@ -109,6 +109,9 @@ VANE_FEATURES: dict[str, Feature] = {
         *("valve.opening_delay=3.3 ms", "valve.closing_delay=2 ms", "valve.switching_interval=7 ms"),
         needs="valve law clock actuator",
     ),
+    "regulators": _feature(
+        "device.set=cylinder-lever", "device.valve=regulators", "valve.delay=1.3 ms", needs="valve law actuator area"
+    ),
     "parts of steps": _feature("valve.area=150 mm^2", "run.tolerance=1e-4", needs="area"),
     # Gas.
     "thermal gas": _feature(*_THERMAL),
@@ -333,7 +336,7 @@ SHORT = (
     _chosen(VANE_BASE, "cascade", "late sensors", "late command", "cylinder", "thermal gas"),
     _chosen(VANE_BASE, "difference", "supply lines", "bandwidth", "samples between steps", "parts of steps"),
     _chosen(VANE_BASE, "opening delays", "noise", "resolution"),
-    _chosen(VANE_BASE, "joint load", "Stribeck", "seal friction", "sensors late by parts of a step"),
+    _chosen(VANE_BASE, "joint load", "Stribeck", "seal friction", "sensors late by parts of a step", "regulators"),
     _chosen(VANE_BASE, "leg of a gait"),
     _chosen(VANE_BASE, "prescribed", "line resistance", "records between steps"),
     _chosen(VANE_BASE, "bladder", "slew", "dead band", "damped", "smooth"),

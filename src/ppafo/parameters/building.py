@@ -3,6 +3,7 @@
 import itertools
 import math
 import operator
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -135,13 +136,14 @@ def contradictions(parameter_set: ParameterSet, device: Device) -> Iterator[tupl
         yield SUPPLIES, f"actuator: {line(0)}"
     for path, relation, other, holds in consistency(device):
         if not holds:
-            entry, limit = parameter_set.numbers[path], number_under(device, other.split("."))
+            limit, room = number_under(device, other.split(".")), device.supply.atmospheric_pressure
+            named = [re.sub("^valve[.]", f"valves.{device.valve_name}.", name) for name in (path, other)]
             # In the unit of the number at fault: a gauge pressure beside an absolute one would have to be converted.
-            si_unit, room = declaration.quantities({})[path].unit, device.supply.atmospheric_pressure
+            entry, si_unit = parameter_set.numbers[named[0]], parameter_set.declarations()[named[0]].unit
             unit = entry.unit if declaration.fits(entry.unit, si_unit) else ""
-            allowed = f"{relation} {other} = {shown_text(limit, si_unit, atmosphere=room, unit=unit)}"
+            allowed = f"{relation} {named[1]} = {shown_text(limit, si_unit, atmosphere=room, unit=unit)}"
             why = _BESIDE_ANOTHER if path in SUPPLIES else ""
-            yield (path, other), f"{path} = {entry_text(entry)} must be {allowed}{why}"
+            yield tuple(named), f"{named[0]} = {entry_text(entry)} must be {allowed}{why}"
     if device.supply.is_vacuum and declaration.RELIEVING_PATH in parameter_set.flags and not device.supply.relieving:
         yield (
             (declaration.RELIEVING_PATH, *SUPPLIES),
@@ -325,8 +327,16 @@ def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
             else (path, "at least", ATMOSPHERE_PATH, gauge >= 0.0)
             for path, gauge in zip(SUPPLIES, sides, strict=True)
         ),
+        *_order_of_pressures(device.valve.settings),
         *_order_of_openings(device.effects.get("opening", {})),
     )
+
+
+def _order_of_pressures(settings: Mapping[str, Any]) -> Iterator[tuple[str, str, str, Any]]:
+    """Yield the rule between the lowest and the highest pressure of a regulator."""
+    if "highest_pressure" in settings:
+        is_ordered = settings["lowest_pressure"] < settings["highest_pressure"]
+        yield "valve.lowest_pressure", "below", "valve.highest_pressure", is_ordered
 
 
 def _order_of_openings(table: Mapping[str, Any]) -> Iterator[tuple[str, str, str, Any]]:

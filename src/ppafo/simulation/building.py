@@ -9,7 +9,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.kind import ControllerKind
 from ppafo.errors import ParameterError, PpafoError, ScenarioError, noted_in, raise_noted
 from ppafo.model.catalog import VALVES
-from ppafo.model.controlled import ANGLE, ANYTHING, CONTROLLED, TORQUE
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import WHY_ONE_CHAMBER
 from ppafo.parameters.declared import kind_at, value_at
@@ -137,16 +137,14 @@ def check_regulated(device: Device, law: ControllerKind, controlled: str) -> Non
     An angle needs a law that asks for a torque: at a set pressure there is no gas spring that would hold a joint.
     """
     valve = device.valve.kind
-    if VALVES[valve].regulation is None or not law.needs_reference:
+    if VALVES[valve].regulation is None:
         return
     device.check_pressurised(f"a valve of kind '{valve}'")
     believes = law.plan is not None or any(item.name == "valve_conductance" for item in law.quantities)
-    if believes or (controlled == ANGLE and TORQUE in law.controls):
-        wanted = (ANGLE,) if controlled == ANGLE else ANYTHING
-        able = ", ".join(name for name, other in CONTROLLERS.items() if other.controls == wanted)
+    if law.needs_reference and (believes or (controlled == ANGLE and TORQUE in law.controls)):
         raise ParameterError(
             f"the controller '{law.name}' opens a valve for a flow, but one of kind '{valve}' sets a pressure; set "
-            f"controller.kind to one of {able}"
+            f"controller.kind to '{'cascade' if controlled == ANGLE else 'pid'}'"
         )
 
 

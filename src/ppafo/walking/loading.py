@@ -11,6 +11,7 @@ from ppafo.control.walking.catalog import walking_controllers
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, ParameterError, ScenarioError, at_fault, refused_as
 from ppafo.gait import NORMATIVE, load_gait
+from ppafo.model.catalog import VALVES
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.loading import set_or_load
@@ -60,6 +61,11 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     device = read_device(reading, hardware)
     with refused_as(ParameterError, f"{request.file}: [device]", ParameterError):
         device.check_pressurised("a walk, whose controllers fill the chambers,")
+        if VALVES[device.valve.kind].regulation is not None:
+            raise ParameterError(
+                f"device.valve = '{device.valve_name}' regulates pressures, whose flow the fixed steps of a walk do not "
+                "resolve; set it to a proportional valve or a pair of on/off valves"
+            )
     bottle = read_bottle(reading, device, request.folder)
     if bottle is not None:
         # A bottle always feeds lines, by default those of the declarations.
