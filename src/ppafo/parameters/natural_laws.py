@@ -102,7 +102,7 @@ def valve_departure(model: ValveModel, settings: Any, plant: Any) -> Departure:
     Time stepping uses the first, the reference solver the second. A valve that does not come to rest departs by 0, and
     so does one that regulates pressures.
     """
-    if model.instant is None or model.settle is None:
+    if model.instant is None:
         return Departure(0.0, "")
     valve, room = model.prepare(settings), plant.atmospheric_pressure
     pressure = room + 0.5 * (plant.supply_pressure - room)

@@ -170,7 +170,7 @@ def _valve_map(device: Device, preset: Preset, _seed: int) -> dict[str, Floats]:
     kind = VALVES[device.valve.kind]
     still = valve_settings(device.valve)._replace(**{item.name: 0.0 for item in kind.quantities if item.unit})
     model = kind.choose(still)
-    if model.instant is None or model.settle is None:
+    if model.instant is None:
         raise ParameterError(
             f"the experiment 'valve-map' measures a flow over the command, but a valve of kind '{kind.name}' sets a "
             "pressure; take 'step-response'"

@@ -63,7 +63,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         device.check_pressurised("a walk, whose controllers fill the chambers,")
         if VALVES[device.valve.kind].regulation is not None:
             raise ParameterError(
-                f"device.valve = '{device.valve_name}' regulates pressures, whose flow the fixed steps of a walk do not "
+                f"device.valve = '{device.valve_name}' regulates pressures, whose flow fixed steps of a walk do not "
                 "resolve; set it to a proportional valve or a pair of on/off valves"
             )
     bottle = read_bottle(reading, device, request.folder)

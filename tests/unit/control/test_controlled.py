@@ -65,7 +65,7 @@ def test_a_walk_is_offered_laws_of_a_torque_alone() -> None:
     assert all(kind.controls == (TORQUE,) for kind in offered.values())
 
 
-LOOP = TorqueLoop(rate=80.0, dead_time=2.0e-3)
+LOOP = TorqueLoop(80.0, 2.0e-3, 80.0)
 JOINT = Joint(
     inertia=8.4e-3,
     stiffness=2.0,

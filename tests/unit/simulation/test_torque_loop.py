@@ -36,9 +36,11 @@ def by_hand(scenario: Scenario) -> TorqueLoop:
     flow = plant.valve_conductance * plant.gas_product
     volume_1 = actuator.dead_volume_1 + actuator.displacement_per_radian * (0.5 * math.pi - actuator.angle_min)
     volume_2 = actuator.dead_volume_2 + actuator.displacement_per_radian * (actuator.angle_max - 0.5 * math.pi)
-    fastest = max(plant.supply_pressure / volume_1, plant.dorsiflexion_pressure / volume_2)
+    rate = (
+        actuator.torque_constant * flow * max(plant.supply_pressure / volume_1, plant.dorsiflexion_pressure / volume_2)
+    )
     theta = scenario.device.valve.settings["delay"] + 1.5 * scenario.controller.period
-    return TorqueLoop(actuator.torque_constant * flow * fastest, theta)
+    return TorqueLoop(rate, theta, rate)
 
 
 @pytest.mark.parametrize("changes", [(), SMALL_AIR], ids=["paper", "small, air"])
@@ -125,7 +127,7 @@ def test_late_sensors_are_dead_time_too() -> None:
 
 
 def test_no_flow_leaves_a_gain_that_is_finite() -> None:
-    assert proportional_gain(TorqueLoop(0.0, 1.5e-3)) == 1000.0
+    assert proportional_gain(TorqueLoop(0.0, 1.5e-3, 0.0)) == 1000.0
 
 
 @pytest.mark.parametrize("file", ["torque-task-cylinder.toml", "torque-task-measured-bladder.toml"])

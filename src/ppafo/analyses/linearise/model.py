@@ -339,7 +339,7 @@ class LinearisedPlant:
         """Return the valve state after its immediate changes, the openings [-], and rates of the states by name."""
         run, call, valve, names = self.run, self.functions.of, self.run.program.valve, valve_states(self.run.program)
         command = call(at_valve)(values["command"])
-        assert valve.settle is not None and valve.rates is not None and valve.instant is not None, "no regulator"  # noqa: PT018
+        assert valve.rates is not None and valve.instant is not None, "no regulator"  # noqa: PT018
         state = call(valve.settle)(run.valve, rebuilt(valve.state, [values[name] for name in names]), command, 0.0)
         rates = numbers(call(valve.rates)(run.valve, state, command))
         return state, call(valve.instant)(run.valve, state, command), dict(zip(names, rates, strict=True))

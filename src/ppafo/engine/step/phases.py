@@ -73,7 +73,6 @@ def measure_part(parts: Program, lane: Lane, now: Now) -> None:
         look = (1.0 - lane.timing.signal_lag) * lane.timing.step - lane.before
         until = min(until, look) if look > motion.SAME_INSTANT else until
     if parts.valve.jumps:
-        assert parts.valve.settle is not None, "a valve that regulates pressures does not jump"
         command = command_of(parts, lane, now)
         settled = parts.valve.settle(lane.valve, lane.valve_state, command, time)
         jump = parts.valve.next_event(lane.valve, settled, command, time)

@@ -30,8 +30,8 @@ class ValveModel:
     The reference solver uses the same valve in continuous time: ``instant(parameters, state, command)`` returns the
     openings at an instant, ``rates(parameters, state, command)`` the time derivatives of the state,
     ``next_event(parameters, state, command, time)`` the time of the next abrupt change (1e9 or more for never), and
-    ``settle(parameters, state, command, time)`` the state after the abrupt changes that are due. ``instant``, ``rates``
-    and ``settle`` are None for a valve that regulates pressures, whose openings follow from these.
+    ``settle(parameters, state, command, time)`` the state after the abrupt changes that are due. ``instant`` and
+    ``rates`` are None for a valve that regulates pressures, whose openings follow from these.
 
     Such a valve has ``connect_ahead(plant, shown)``, the ports at the second stage of a step, and ``command_for(
     parameters, opening, pressure_1, pressure_2)``, the command [-] at which it changes the measured pressures [Pa] as
@@ -53,7 +53,7 @@ class ValveModel:
     instant: Callable[[Any, Any, float], Openings] | None
     rates: Callable[[Any, Any, float], Any] | None
     next_event: Callable[[Any, Any, float, float], float]
-    settle: Callable[[Any, Any, float, float], Any] | None
+    settle: Callable[[Any, Any, float, float], Any]
     connect_ahead: Callable[[PlantParameters, Any], tuple[Any, Any]] | None = None
     command_for: Callable[[Any, float, float, float], float] | None = None
 

@@ -12,14 +12,21 @@ from ppafo.model.declaration import Number
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import PlantParameters, PortFlow, PortSlopes, SinglePort, single_port_flow
 from ppafo.model.ports import exhaust_path, supply_path
-from ppafo.model.sensors import follow, quantise
-from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel, never
+from ppafo.model.sensors import decay_factors, quantise
+from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel
 
 TIMES_OF_CONSTANT = 2.1972245773362196
 """Time from 10 to 90 % of a first-order lag, divided by its time constant: ln 9 [-]."""
-STAGE = 0.2928932188134524
-"""Gamma of the method that fills the chambers (``engine.scheme.pneumatics``): both of its stages are off the ends of a
-step by this fraction, so that a chamber that follows its set pressure closely arrives with it."""
+STAGE = 0.41421356237309503
+"""Half the difference of the set pressures at both stages of a step, divided by how far the end is from the mean [-].
+
+By the weights of the method that fills the chambers (``engine.scheme.pneumatics``), sqrt(2) - 1 lets a chamber that
+follows closely arrive with its set pressure, and gives one that follows slowly the mean over the step.
+"""
+FOREVER = 1.0e9
+"""Time of an event that never comes [s]."""
+SMALLEST_RATE = 1.0e-300
+"""Smallest rate of a set pressure that is divided by [Pa/s]."""
 SMALLEST_RANGE = 1.0
 """Smallest range of set pressures [Pa] that is divided by."""
 
@@ -88,27 +95,56 @@ def behind_hysteresis(before: float, command: float, hysteresis: float) -> float
     return max(command - half, min(command + half, before))
 
 
+def settle(valve: RegulatorParameters, state: RegulatorState, command: float, time: float) -> RegulatorState:
+    """State with the commands behind the hysteresis; without a lag the set pressures follow them."""
+    asked = 0.0 if command > VENTS_ABOVE else max(-1.0, min(1.0, command))
+    command_1 = behind_hysteresis(state.command_1, max(asked, 0.0), valve.hysteresis)
+    command_2 = behind_hysteresis(state.command_2, max(-asked, 0.0), valve.hysteresis)
+    follows = valve.rate > 0.0
+    return RegulatorState(
+        command_1=command_1,
+        command_2=command_2,
+        set_1=state.set_1 if follows else target_of(valve, command_1),
+        set_2=state.set_2 if follows else target_of(valve, command_2),
+    )
+
+
+def target_of(valve: RegulatorParameters, command: float) -> float:
+    """Set pressure above the lowest one [Pa] at which a command behind the hysteresis [-] ends."""
+    return valve.range * quantise(command, valve.resolution)
+
+
+def next_event(valve: RegulatorParameters, state: RegulatorState, command: float, time: float) -> float:
+    """Time [s] before which no set pressure moves by more than a band.
+
+    Within a longer part a regulator would pass from shut to fully open, unseen by the error of the part.
+    """
+    distance_1 = abs(target_of(valve, state.command_1) - state.set_1)
+    distance_2 = abs(target_of(valve, state.command_2) - state.set_2)
+    distance = max(distance_1, distance_2)
+    wait = valve.band / max(valve.rate * distance, SMALLEST_RATE)
+    return time + wait if distance > valve.band else FOREVER
+
+
 def advance(
     valve: RegulatorParameters, state: RegulatorState, command: float, time: float, step: float
 ) -> tuple[SetPressures, RegulatorState]:
     """Set pressures [Pa] during a step [s] with a constant command [-], and the state at its end."""
-    asked = 0.0 if command > VENTS_ABOVE else max(-1.0, min(1.0, command))
-    command_1 = behind_hysteresis(state.command_1, max(asked, 0.0), valve.hysteresis)
-    command_2 = behind_hysteresis(state.command_2, max(-asked, 0.0), valve.hysteresis)
-    target_1 = valve.range * quantise(command_1, valve.resolution)
-    target_2 = valve.range * quantise(command_2, valve.resolution)
-    begin_1 = state.set_1 if valve.rate > 0.0 else target_1
-    begin_2 = state.set_2 if valve.rate > 0.0 else target_2
-    end_1 = follow(valve.rate, step, state.set_1, target_1, target_1)
-    end_2 = follow(valve.rate, step, state.set_2, target_2, target_2)
+    begun = settle(valve, state, command, time)
+    target_1, target_2 = target_of(valve, begun.command_1), target_of(valve, begun.command_2)
+    kept, mean = decay_factors(valve.rate, step)
+    end_1 = target_1 + kept * (begun.set_1 - target_1)
+    end_2 = target_2 + kept * (begun.set_2 - target_2)
+    mean_1 = target_1 + mean * (begun.set_1 - target_1)
+    mean_2 = target_2 + mean * (begun.set_2 - target_2)
     shown = SetPressures(
-        first_1=valve.lowest + begin_1 + STAGE * (end_1 - begin_1),
-        first_2=valve.lowest + begin_2 + STAGE * (end_2 - begin_2),
-        second_1=valve.lowest + end_1 - STAGE * (end_1 - begin_1),
-        second_2=valve.lowest + end_2 - STAGE * (end_2 - begin_2),
+        first_1=valve.lowest + mean_1 - STAGE * (end_1 - mean_1),
+        first_2=valve.lowest + mean_2 - STAGE * (end_2 - mean_2),
+        second_1=valve.lowest + mean_1 + STAGE * (end_1 - mean_1),
+        second_2=valve.lowest + mean_2 + STAGE * (end_2 - mean_2),
         band=valve.band,
     )
-    return shown, RegulatorState(command_1, command_2, end_1, end_2)
+    return shown, RegulatorState(begun.command_1, begun.command_2, end_1, end_2)
 
 
 def regulated_ports(
@@ -194,13 +230,13 @@ MODEL = ValveModel(
     advance=advance,
     connect=connect,
     port_flow=regulated_port_flow,
-    jumps=False,
+    jumps=True,
     shift=None,
     command_delay=dead_time,
     instant=None,
     rates=None,
-    next_event=never,
-    settle=None,
+    next_event=next_event,
+    settle=settle,
     connect_ahead=connect_ahead,
     command_for=command_for,
 )

@@ -1,0 +1,162 @@
+"""Pressure regulators against equations of their own, solved by SciPy, and against the step of a data sheet."""
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from ppafo.engine.scheme.pneumatics import GAMMA
+from ppafo.errors import ParameterError
+from ppafo.model.catalog import ACTUATORS
+from ppafo.model.valves.kind import VENT
+from ppafo.model.valves.pressure_regulator import MODEL, STAGE, RegulatorSettings
+from ppafo.parameters.plant import plant_parameters
+from ppafo.simulation.loading import scenario_from_dict
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate
+
+LOCKED = {"kind": "locked", "angle": "75 deg"}
+CONSTANT = {"kind": "constant", "command": 0.6, "rate": "1 kHz"}
+EXACT = ("valve.hysteresis=0", "valve.resolution=0")
+SWINGING = {
+    "kind": "prescribed",
+    "profile": {"kind": "sine", "level": "75 deg", "amplitude": "20 deg", "frequency": "4 Hz"},
+}
+FREE = {"kind": "free", "angle": "60 deg"}
+
+
+def regulated(
+    motion: dict[str, Any], law: dict[str, Any], reference: dict[str, Any] | None = None, *changes: str, **run: str
+) -> Scenario:
+    """A task of the cylinder with regulators."""
+    document = {
+        "schema_version": 1,
+        "name": "regulated",
+        "device": {"set": "cylinder-lever", "valve": "regulators", "overrides": list(changes)},
+        "run": {"duration": "0.5 s", "output_interval": "1 ms", **run},
+        "motion": motion,
+        "controller": {"rate": "1 kHz", **law},
+    }
+    return scenario_from_dict(document if reference is None else {**document, "reference": reference})
+
+
+def flow(upstream: float, downstream: float, conductance: float, ratio: float) -> float:
+    """Mass flow [kg/s] of ISO 6358, linear from a ratio of 0.999 on."""
+    high, low = max(upstream, downstream), min(upstream, downstream)
+    share = 1.0 if low / high <= ratio else math.sqrt(1.0 - ((min(low / high, 0.999) - ratio) / (1.0 - ratio)) ** 2)
+    share *= min(1.0, (1.0 - low / high) / 0.001)
+    return math.copysign(conductance * high * share, upstream - downstream)
+
+
+def solved(scenario: Scenario, command: float, times: np.ndarray) -> np.ndarray:
+    """Pressures [Pa] over time of both chambers, by an equation of this test: set pressure, opening, flow, gas law."""
+    device, plant = scenario.device, plant_parameters(scenario.device)
+    valve, chambers = device.valve, ACTUATORS[device.actuator.kind].model.chambers
+    span = valve.highest_pressure - valve.lowest_pressure
+    constant = valve.response_time / math.log(9.0)
+    moves = "amplitude" in getattr(scenario.motion.profile, "settings", {})
+
+    def volumes(time: float) -> tuple[float, float]:
+        angle = math.radians(75.0 + (20.0 * math.sin(8.0 * math.pi * time) if moves else 0.0))
+        return chambers(plant, angle, 1e5, 1e5)[:2]
+
+    def rates(time: float, pressures: np.ndarray) -> list[float]:
+        found, late = [], max(time - valve.delay, 0.0)
+        begun = 1.0 - math.exp(-late / constant) if constant > 0.0 else 1.0
+        now, soon = volumes(time), volumes(time + 1e-6)
+        for place, (share, supply) in enumerate(((max(command, 0.0), 5e5), (max(-command, 0.0), 5e5))):
+            off = (valve.lowest_pressure + span * share * begun - pressures[place]) / (valve.band * span)
+            source, room = (supply + 101325.0, 101325.0)
+            gained = min(max(off, 0.0), 1.0) * max(flow(source, pressures[place], plant.valve_conductance, 0.3), 0.0)
+            gained += min(max(-off, 0.0), 1.0) * flow(room, pressures[place], plant.valve_conductance, 0.3)
+            growth = (soon[place] - now[place]) / 1e-6
+            found.append((plant.gas_product * gained - pressures[place] * growth) / now[place])
+        return found
+
+    pressures, parts = np.full((2, 1), 101325.0), []
+    # The command arrives between two parts.
+    for begin, end in pairwise(dict.fromkeys((0.0, valve.delay, times[-1]))):
+        here = np.append(times[(times >= begin) & (times < end)], end)
+        parts.append(
+            solve_ivp(rates, (begin, end), pressures[:, -1], "LSODA", here, rtol=1e-9, atol=1e-2, max_step=1e-3)
+        )
+        pressures = parts[-1].y
+    return np.hstack([*(part.y[:, :-1] for part in parts), pressures[:, -1:]])
+
+
+@pytest.mark.parametrize(
+    ("motion", "command", "changes"),
+    [
+        (LOCKED, 0.6, ()),
+        (LOCKED, -0.9, ("valve.response_time=5 ms", "valve.delay=7 ms")),
+        (LOCKED, 0.6, ("valve.response_time=0 s", "valve.band=0.001")),
+        (LOCKED, 1.0, ("valve.response_time=30 ms", "valve.band=0.2", "valve.sonic_conductance=0.01 l/(s bar)")),
+        (SWINGING, 0.5, ("valve.response_time=20 ms",)),
+    ],
+)
+def test_the_pressures_are_those_of_an_equation_of_its_own(
+    motion: dict[str, Any], command: float, changes: tuple[str, ...]
+) -> None:
+    scenario = regulated(motion, {**CONSTANT, "command": command}, None, *EXACT, *changes)
+    recording = simulate(scenario).recording
+    expected = solved(scenario, command, recording.time)
+    assert np.abs(recording["pressure_1"] - expected[0]).max() < 1e-4 * 5e5
+    assert np.abs(recording["pressure_2"] - expected[1]).max() < 1e-4 * 5e5
+    assert pytest.approx(1.0 / (1.0 / GAMMA - 1.0)) == STAGE
+
+
+def test_a_step_takes_the_time_of_the_data_sheet() -> None:
+    recording = simulate(regulated(LOCKED, CONSTANT, None, *EXACT, "valve.sonic_conductance=3 l/(s bar)")).recording
+    share = (recording["pressure_1"] - 106325.0) / (0.6 * 4.95e5)
+    first, last = (float(np.interp(level, share, recording.time)) for level in (0.1, 0.9))
+    assert last - first == pytest.approx(0.1, rel=0.01)
+
+
+def test_hysteresis_and_resolution_are_those_of_the_settings_and_a_vent_sets_the_lowest_pressure() -> None:
+    valve = MODEL.prepare(RegulatorSettings(1.0e5, 6.0e5, 0.0, 0.0, 0.01, 0.02, 0.01))
+
+    def course(commands: list[float]) -> list[float]:
+        state, found = MODEL.initial(), []
+        for command in commands:
+            shown, state = MODEL.advance(valve, state, command, 0.0, 1e-3)
+            found.append(shown.second_1)
+        return found
+
+    rising, falling = np.linspace(0.0, 1.0, 501).tolist(), np.linspace(1.0, 0.0, 501).tolist()
+    pressures = course([*rising, *falling])
+    widths = np.array(pressures[1001:501:-1]) - np.array(pressures[:500])
+    assert np.max(widths) == pytest.approx(0.02 * 5e5, abs=0.01 * 5e5)
+    assert {round(abs(after - before)) for before, after in pairwise(pressures)} <= {0, 5000}
+    assert course([0.5, VENT])[-1] == pytest.approx(1.0e5, abs=0.011 * 5e5)
+
+
+@pytest.mark.parametrize("response", [0, 5, 100, 400])
+def test_default_gains_follow_the_regulator(response: int) -> None:
+    changes = (f"valve.response_time={response} ms", "valve.delay=4 ms")
+    torque = {"kind": "ramp_hold", "level": "2 N m", "ramp_time": "0.3 s"}
+    pressure = {"of": "pressure_2", "kind": "ramp_hold", "start_level": "0 bar_g", "level": "3 bar_g"}
+    angle = {"of": "angle", "kind": "ramp_hold", "start_level": "60 deg", "level": "80 deg", "ramp_time": "0.5 s"}
+    for motion, law, reference in (
+        (LOCKED, "pid", torque),
+        (LOCKED, "sliding_mode", torque),
+        (LOCKED, "pid", {**pressure, "ramp_time": "0.3 s"}),
+        (FREE, "cascade", angle),
+    ):
+        result = simulate(regulated(motion, {"kind": law}, reference, *changes, duration="2.5 s"))
+        assert not result.tracking.fails, result.tracking.sentence
+
+
+@pytest.mark.parametrize(
+    ("law", "change", "said"),
+    [
+        ("pid_feedforward", "valve.delay=1 ms", "opens a valve for a flow"),
+        ("pid", "valve.highest_pressure=0.01 bar_g", "lowest_pressure = 0.05 bar_g must be below"),
+        ("pid", "supply.pressure=-0.3 bar_g", "needs a supply above atmospheric pressure"),
+    ],
+)
+def test_what_regulators_cannot_do_is_refused(law: str, change: str, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        regulated(LOCKED, {"kind": law}, {"kind": "constant", "level": "1 N m"}, change)
