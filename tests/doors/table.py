@@ -110,7 +110,10 @@ VANE_FEATURES: dict[str, Feature] = {
         needs="valve law clock actuator",
     ),
     "regulators": _feature(
-        "device.set=cylinder-lever", "device.valve=regulators", "valve.delay=1.3 ms", needs="valve law actuator area"
+        *("device.set=cylinder-lever", "device.valve=pressure_regulator", "valve.delay=1.3 ms"),
+        *("valve.lowest_pressure=0.1 bar_g", "valve.highest_pressure=4 bar_g", "valve.response_time=20 ms"),
+        *("valve.band=0.02", "valve.hysteresis=0.01", "valve.resolution=0.004"),
+        needs="valve law actuator area",
     ),
     "parts of steps": _feature("valve.area=150 mm^2", "run.tolerance=1e-4", needs="area"),
     # Gas.

@@ -35,7 +35,7 @@ def regulated(
     document = {
         "schema_version": 1,
         "name": "regulated",
-        "device": {"set": "cylinder-lever", "valve": "regulators", "overrides": list(changes)},
+        "device": {"set": "cylinder-lever", "valve": "pressure_regulator", "overrides": list(changes)},
         "run": {"duration": "0.5 s", "output_interval": "1 ms", **run},
         "motion": motion,
         "controller": {"rate": "1 kHz", **law},

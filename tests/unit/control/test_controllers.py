@@ -25,14 +25,11 @@ from ppafo.control.controllers.switching import (
     SlidingModeParameters,
     SlidingModeState,
 )
-from ppafo.control.profiles import KNOTS as TABLE_KNOTS
 from ppafo.control.profiles import NEVER, TABLE, TabulatedProfile, table_bounds, table_value
 from ppafo.engine.rows import rebuilt
 from ppafo.model.orifice import iso6358_flow_function
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.plant import plant_parameters
-from ppafo.running import simulate
-from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 
 PERIOD = 1.0e-3
@@ -172,30 +169,6 @@ def test_anti_windup_brings_the_torque_down_in_time() -> None:
     assert errors[0] < 0.5 * errors[1]
 
 
-@pytest.mark.parametrize(
-    ("kind", "largest"),
-    [
-        ("feedback_linearisation", 0.05),
-        ("pid_feedforward", 0.05),
-        ("damped_proportional", 0.3),
-        ("sliding_mode", 0.05),
-    ],
-)
-def test_a_law_that_knows_the_dead_band_of_its_valve_opens_it_beyond(kind: str, largest: float) -> None:
-    changes = [f"controller.kind={kind}", "valve.dead_band=0.3", "reference.level=4 N m", "run.duration=1.5 s"]
-    run = ppafo.simulate("torque-task-slow-valve", [*changes, "reference.ramp_time=0.5 s"])
-    assert run.scenario.controller.dead_band == 0.3
-    assert run.metrics["final_error"].value < largest
-    assert run.tracking.follows
-
-
-@pytest.mark.parametrize("kind", ["on_off_dead_zone", "on_off"])
-def test_on_off_laws_run_on_the_solenoid_pair(kind: str) -> None:
-    run = ppafo.simulate("torque-task-solenoid", [f"controller.kind={kind}", "run.duration=0.5 s"])
-    assert run.status.is_completed
-    assert run.recording["torque"].max() > 0.5
-
-
 NOMINAL = NominalChambers(*(on_the_paper_device("pid_feedforward")[item.name] for item in NOMINAL_QUANTITIES))
 PRESSURES = st.floats(1.02e5, 4.4e5)
 """Between the atmosphere and the supply."""
@@ -287,14 +260,6 @@ def test_the_rate_is_that_of_the_line_which_begins_at_a_knot() -> None:
     assert table_value(table(), 1.0)[1] == pytest.approx(0.5 / 0.4)
 
 
-def test_all_knots_may_be_used() -> None:
-    times = tuple(TABLE_PERIOD * knot / TABLE_KNOTS for knot in range(TABLE_KNOTS))
-    values = tuple(float(knot % 7) for knot in range(TABLE_KNOTS))
-    profile = table(times, values)
-    assert [table_value(profile, time)[0] for time in times] == pytest.approx(values)
-    assert all(knot.time < profile.period for knot in profile.knots)
-
-
 def test_knots_that_never_come_count_neither_in_the_value_nor_in_the_bounds() -> None:
     whole = table()
     assert whole.knots[18].time == NEVER
@@ -302,23 +267,3 @@ def test_knots_that_never_come_count_neither_in_the_value_nor_in_the_bounds() ->
     profile = whole._replace(knots=knots)
     assert table_bounds(profile) == (-3.0, 6.0)
     assert max(table_value(profile, 0.01 * step)[0] for step in range(300)) <= 6.0
-
-
-def test_the_lanes_follow_the_table_as_python_does() -> None:
-    texts = [f"reference.time_{number:02d}={time} s" for number, time in enumerate(TIMES, 1) if number > 1]
-    texts += [f"reference.value_{number:02d}={torque} N m" for number, torque in enumerate(VALUES, 1)]
-    kind = [
-        "reference.kind=tabulated",
-        "reference.level=0 N m",
-        f"reference.period={TABLE_PERIOD} s",
-        "run.duration=2.5 s",
-    ]
-    scenario = load_scenario("torque-task-proportional", [*kind, *texts])
-    pressure = np.array([scenario.device.supply.pressure])
-    lanes = run_ensemble(scenario, {"supply.pressure": pressure}, ("rms_error", "peak_error"))
-    alone = simulate(scenario)
-    reference = alone.recording["reference"]
-    expected = np.interp(np.mod(alone.recording.time, TABLE_PERIOD), (*TIMES, TABLE_PERIOD), (*VALUES, VALUES[0]))
-    assert np.max(np.abs(reference - expected)) < 1e-9
-    for name in ("rms_error", "peak_error"):
-        assert lanes.metrics[name][0] == pytest.approx(alone.metrics[name].value, rel=1e-9)

@@ -15,29 +15,6 @@ SPOOL = proportional.ProportionalSettings(
 PAIR = solenoid.TimedSolenoid(opening_delay=0.003, closing_delay=0.005, switching_interval=0.05)
 
 
-def test_dead_band_hides_small_commands_and_leaves_full_command_full() -> None:
-    assert proportional.opening_of_command(0.04, 0.05) == 0.0
-    assert proportional.opening_of_command(-1.0, 0.05) == -1.0
-    assert proportional.opening_of_command(0.525, 0.05) == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("damping_ratio", [0.2, 0.7, 1.0, 2.5])
-def test_spool_step_is_exact_whatever_its_length(damping_ratio: float) -> None:
-    settings = SPOOL._replace(spool_damping_ratio=damping_ratio)
-    valve = proportional.prepare_moving(settings)
-    state = proportional.SpoolState(0.8, 0.1, 3.0)
-    shares = []
-    after = state
-    for _ in range(40):
-        openings, after = proportional.advance_moving(valve, after, 0.8, 0.0, 1e-4)
-        shares.append(openings.source_1)
-    openings, at_once = proportional.advance_moving(valve, state, 0.8, 0.0, 4e-3)
-    assert at_once.opening == pytest.approx(after.opening, rel=1e-9)
-    assert at_once.rate == pytest.approx(after.rate, rel=1e-9)
-    if damping_ratio >= 1.0:
-        assert openings.source_1 == pytest.approx(sum(shares) / 40, rel=1e-9)
-
-
 def closed_spool_step(angular: float, damping_ratio: float, step: float) -> tuple[complex, ...]:
     """The numbers of ``SpoolStep`` from the eigenvalues of the spool, with x'/w instead of x'; not near damping 1."""
     root = cmath.sqrt(damping_ratio * damping_ratio - 1.0)
@@ -70,17 +47,6 @@ def test_spool_step_is_the_closed_form_for_any_frequency_damping_and_length(deca
         assert [*scaled, mean_by_opening, mean_by_rate * angular] == pytest.approx(
             [number.real for number in expected], rel=0.0, abs=1e-12 if decade < 2 else 1e-11
         )
-
-
-def test_spool_answers_a_step_as_a_second_order_system() -> None:
-    settings = SPOOL._replace(spool_damping_ratio=0.2)
-    valve = proportional.prepare_moving(settings)
-    state, highest = proportional.SpoolState(), 0.0
-    for _ in range(1000):
-        _, state = proportional.advance_moving(valve, state, 0.5, 0.0, 1e-4)
-        highest = max(highest, state.opening)
-    overshoot = math.exp(-math.pi * 0.2 / math.sqrt(1 - 0.04))
-    assert highest == pytest.approx(0.5 * (1 + overshoot), rel=1e-3)
 
 
 def test_slew_limit_bounds_the_rate_of_the_opening() -> None:
@@ -125,16 +91,6 @@ def test_pulse_shorter_than_the_opening_delay_never_reaches_the_flow() -> None:
     assert run_pair(settings, {0.0: 1.0, 0.002: 0.0}, 0.2) == []
 
 
-def test_no_command_vents_both_chambers() -> None:
-    openings = solenoid.instant_ideal(solenoid.prepare_ideal(PAIR), solenoid.PairPositions(), 0.0)
-    assert openings == (0.0, 1.0, 0.0, 1.0)
-
-
-def test_command_above_zero_feeds_chamber_1_and_vents_chamber_2() -> None:
-    openings = solenoid.instant_ideal(solenoid.prepare_ideal(PAIR), solenoid.PairPositions(), 1.0)
-    assert openings == (1.0, 0.0, 0.0, 1.0)
-
-
 def parts_of_a_step(settings: solenoid.TimedSolenoid, command: float, step: float) -> list[float]:
     """Lengths of the parts of a step that begins with a pair energised for chamber 1 long ago."""
     valve = solenoid.prepare_timed(settings)
@@ -153,7 +109,3 @@ def parts_of_a_step(settings: solenoid.TimedSolenoid, command: float, step: floa
 def test_step_is_cut_at_every_switching_inside_it() -> None:
     settings = solenoid.TimedSolenoid(opening_delay=0.0003, closing_delay=0.0007, switching_interval=0.0)
     assert parts_of_a_step(settings, -1.0, 1e-3) == pytest.approx([0.0003, 0.0004, 0.0003])
-
-
-def test_step_without_a_switching_is_whole() -> None:
-    assert parts_of_a_step(PAIR, 1.0, 1e-3) == [1e-3]
