@@ -2,6 +2,7 @@
 
 import contextlib
 import difflib
+import math
 import re
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -26,6 +27,15 @@ def number_text(text: str) -> str:
     if not text.isascii() or "_" in text:
         raise ValueError(f"{one_line(repr(text))[:LONGEST_SHOWN]} is not a number")
     return text
+
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+
+
+def finite_number(text: str) -> float | None:
+    """Return the number in a table cell, None if the cell is no finite number."""
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    return value if math.isfinite(value) else None
 
 
 def without_exponent(value: float, form: str) -> str:

@@ -26,7 +26,7 @@ from ppafo.parameters.number_table import LONGEST, NumberedLine, lines_of_table,
 from ppafo.signals.recording import Floats
 from ppafo.units import to_si
 from ppafo.units.shown import counted_from, shown_in, shown_text
-from ppafo.wording import nearest_name, number_text, one_line, said_missing
+from ppafo.wording import nearest_name, one_line, said_missing
 
 _POWERS = 4
 """Number of coefficients of the cubic polynomial in the first intervals of a spline."""
@@ -132,7 +132,7 @@ def _columns(
                 f"{declared.largest:g} {declared.unit.removesuffix('_a')}"
             )
         columns[name] = column
-        step = _step([Decimal(number_text(cells[index])) for _, cells in lines])
+        step = _step([Decimal(cells[index]) for _, cells in lines])
         digits[name] = abs(to_si(step, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
     return columns, digits
 

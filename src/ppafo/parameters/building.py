@@ -33,7 +33,7 @@ from ppafo.parameters.device import (
 )
 from ppafo.parameters.effects import number_under
 from ppafo.parameters.graph import ATMOSPHERE_PATH, DISPLACEMENT_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH, Graph
-from ppafo.parameters.natural_laws import check_laws
+from ppafo.parameters.natural_laws import broken_laws
 from ppafo.parameters.overrides import FORMS, either, in_two_forms
 from ppafo.parameters.parameter_set import (
     ParameterSet,
@@ -78,7 +78,8 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         growth = shape_and_growth(device)[1]
         sizes = {"torque_constant": growth, "displacement_per_radian": growth}
         device = replace(device, actuator=replace(device.actuator, **sizes))
-    check_laws(device, parameter_set.file)
+    for line in broken_laws(device):
+        raise ParameterError(f"{parameter_set.file}: {line}")
     return device
 
 

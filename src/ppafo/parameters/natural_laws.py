@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from itertools import product
 from typing import Any, NamedTuple
 
-from ppafo.errors import ParameterError
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.effects.kind import Effect, PlantSnapshot
@@ -189,12 +188,6 @@ def broken_laws(device: Device) -> Iterator[str]:
         (f"effect '{effect.name}'", effect_departure(effect, effect_row(effect, device), plant)) for effect in effects
     ]
     yield from (f"{one_line(name)}: {found.text}" for name, found in departures if not found.size <= ALLOWED)
-
-
-def check_laws(device: Device, file: str) -> None:
-    """Raise ParameterError, naming the parameter set, for a user's kind that breaks a law of nature."""
-    for line in broken_laws(device):
-        raise ParameterError(f"{file}: {line}")
 
 
 def _kilopascals(pressure: float) -> str:

@@ -1,12 +1,11 @@
 """Table of numbers in a CSV file beside a parameter set: a header, and a line for each row; # begins a comment."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.errors import ParameterError, PpafoError, noted_in, raise_noted
-from ppafo.wording import number_text, one_line, reason
+from ppafo.wording import finite_number, one_line, reason
 
 LONGEST = 40
 """Maximum length of a cell in characters, in messages and as a number."""
@@ -51,10 +50,7 @@ def numbers_of_table(rows: Sequence[NumberedLine], names: Sequence[str], file: s
 
 def _number(cell: str, place: str) -> float:
     """Return the number of a cell. Raises ParameterError for one that is not finite."""
-    try:
-        number = float(number_text(cell)) if len(cell) <= LONGEST else math.nan
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
+    number = finite_number(cell) if len(cell) <= LONGEST else None
+    if number is None:
         raise ParameterError(f"{place} = '{one_line(cell)[:LONGEST]}' is not a finite number")
     return number

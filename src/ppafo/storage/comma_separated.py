@@ -25,7 +25,7 @@ from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, text_of, write_file
-from ppafo.wording import LONGEST_SHOWN, argument_text, first_twice, nearest_name, one_line
+from ppafo.wording import LONGEST_SHOWN, argument_text, finite_number, first_twice, nearest_name, one_line
 
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
@@ -138,7 +138,6 @@ _MARKS: dict[RecordingKind, str] = {
 """Comment lines that mark the kind of a recording; when read, only the word before the colon counts."""
 
 _MARK = re.compile(r"#\s*(\w+):.*")
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _SIMILAR = 0.8
 """Similarity [-] above which a word counts as a misspelt kind; 'measurement: run 3' in a comment stays below."""
@@ -316,9 +315,3 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
             raise DataError(f"line {line}, column '{name}': {cell!r} is not a finite number, such as 1.5")
         numbers.extend(values)
     return np.array(numbers).reshape(-1, len(header))
-
-
-def finite_number(text: str) -> float | None:
-    """Return the number in a table cell, None if the cell is no finite number."""
-    value = float(text) if NUMBER.fullmatch(text) else math.nan
-    return value if math.isfinite(value) else None

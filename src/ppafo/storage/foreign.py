@@ -32,14 +32,13 @@ from ppafo.storage.column_map import (
 from ppafo.storage.comma_separated import (
     HeaderColumn,
     check_clock,
-    finite_number,
     header_cells,
     in_si,
     kind_of_comments,
 )
 from ppafo.storage.files import read_bytes, text_of
 from ppafo.storage.matlab import MATLAB_SUFFIX, read_mapped_matlab, read_matlab
-from ppafo.wording import LONGEST_SHOWN, nearest_name, one_line
+from ppafo.wording import LONGEST_SHOWN, finite_number, nearest_name, one_line
 
 _SHORTEST = 1e-12
 """Least time [s] between the two means of samples that give a slope; a shorter time is rounding."""

@@ -7,7 +7,6 @@ name them.
 """
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +18,7 @@ from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.signals.recording import TIME, Floats
 from ppafo.storage.column_map import ColumnMap, MappedTable, in_map, shown_names
 from ppafo.storage.files import read_bytes
+from ppafo.storage.netcdf_reading import own_items
 from ppafo.storage.trial_reading import check_can_be_read
 from ppafo.wording import nearest_name, one_line
 
@@ -84,12 +84,12 @@ def open_matlab(path: str | Path) -> _MatlabFile:
             import h5py
 
             with h5py.File(path, "r") as file:
-                for name, node in _own_items(file):
+                for name, node in own_items(file):
                     if not name.startswith("#"):
                         _add(name, _tree_of_hdf5(node, file, 0), 0, contents)
         else:
             _read_older(path, contents)
-    except _OF_DAMAGE as error:
+    except (DataError, *_OF_DAMAGE) as error:
         raise DataError(f"{path}: cannot be read as a .mat file: {one_line(error)}") from error
     if not contents.columns and not contents.texts:
         raise DataError(f"{path}: has no numeric variable{contents.advice_on_objects()}")
@@ -153,21 +153,6 @@ def _tree_of(value: Any) -> Tree:
     return value
 
 
-def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
-    """Yield name and content of each item. Raises ValueError for links and external data, before they are opened."""
-    import h5py
-
-    for name in group:
-        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise ValueError(f"'{one_line(name)}' is an HDF5 link; save its numbers in the file itself")
-        node = group[name]
-        if isinstance(node, h5py.Dataset) and (node.is_virtual or node.external):
-            raise ValueError(
-                f"the numbers of '{one_line(name)}' are stored in another file; save them in the file itself"
-            )
-        yield name, node
-
-
 def _tree_of_hdf5(node: Any, file: Any, depth: int) -> Tree:
     """Convert a variable read by h5py to plain data; arrays are transposed with respect to HDF5."""
     import h5py
@@ -179,7 +164,7 @@ def _tree_of_hdf5(node: Any, file: Any, depth: int) -> Tree:
     if node.attrs.get("MATLAB_object_decode", 0):
         return _Object(kind)
     if isinstance(node, h5py.Group):
-        fields = {name: _tree_of_hdf5(field, file, depth + 1) for name, field in _own_items(node)}
+        fields = {name: _tree_of_hdf5(field, file, depth + 1) for name, field in own_items(node)}
         # Of an array of structures each field has the values of all.
         is_array = fields and all(
             isinstance(field, h5py.Dataset) and field.dtype == h5py.ref_dtype and not field.attrs.get("MATLAB_class")

@@ -8,6 +8,7 @@ import contextlib
 import io
 import math
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -79,22 +80,29 @@ def read_netcdf(path: str | Path) -> Recording:
         raise DataError(f"{path}: {error}") from error
 
 
-def _own_variables(file: Any) -> dict[str, Any]:
-    """Return the variables of a file by name. Raises DataError for links and external data before they are opened."""
+def own_items(group: Any) -> Iterator[tuple[str, Any]]:
+    """Yield name and content of each item of a group. Raises DataError for links and external data, before opening."""
     import h5py
 
-    names = [str(name) for name in file]
-    if TIME not in names:
+    for name in map(str, group):
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise DataError(f"'{one_line(name)}' is an HDF5 link; save its numbers in the file itself")
+        node = group[name]
+        if isinstance(node, h5py.Dataset) and (node.is_virtual or node.external):
+            raise DataError(
+                f"the numbers of '{one_line(name)}' are stored in another file; save them in the file itself"
+            )
+        yield name, node
+
+
+def _own_variables(file: Any) -> dict[str, Any]:
+    """Return the variables of a file by name. Raises DataError for others than numbers over time."""
+    variables = dict(own_items(file))
+    if TIME not in variables:
         raise DataError(f"has no variable '{TIME}'")
-    for name in names:
-        if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-            raise DataError(f"'{name}' is an HDF5 link; save its numbers in the file itself")
-    variables = {name: file[name] for name in names}
     for name, variable in variables.items():
         if len(getattr(variable, "shape", None) or ()) != 1 or variable.dtype.kind not in _KINDS_OF_NUMBERS:
             raise DataError(f"'{name}' must be numeric and one-dimensional over '{TIME}'")
-        if variable.is_virtual or variable.external:
-            raise DataError(f"the numbers of '{name}' are stored in another file; save them in the file itself")
     for name, variable in variables.items():
         if variable.size != variables[TIME].size:
             raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")

@@ -11,9 +11,9 @@ from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError, refused_as
 from ppafo.gait.recorded.table import MotionTable, marker_of
 from ppafo.signals.recording import Floats
-from ppafo.storage.comma_separated import check_clock, finite_number
+from ppafo.storage.comma_separated import check_clock
 from ppafo.storage.files import read_bytes, text_of
-from ppafo.wording import LONGEST_SHOWN, count_of, one_line
+from ppafo.wording import LONGEST_SHOWN, count_of, finite_number, one_line
 
 _UNSEEN = ("", "nan", "-nan", "n/a", "na", "null")
 """Cell texts of a missing value, in lower case."""

@@ -19,10 +19,9 @@ from ppafo.gait.recorded.forms.comma_separated import plain_names, read_plain_cs
 from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import TIME
-from ppafo.storage.comma_separated import finite_number
 from ppafo.storage.files import read_bytes
 from ppafo.storage.opensim import END, KIND
-from ppafo.wording import LONGEST_SHOWN, one_line
+from ppafo.wording import LONGEST_SHOWN, finite_number, one_line
 
 _CSV = ".csv"
 _STATE = re.compile(r".*/([^/]+)/value")
