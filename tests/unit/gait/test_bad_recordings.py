@@ -78,14 +78,6 @@ CASES: dict[str, tuple[Change, str]] = {
         changed(MOMENT, lambda x: np.roll(x, 104)),
         "ankle_moment peaks at 98 % of the stride, but the foot is off the ground from 64 % on: the moment is of",
     ),
-    "moment of the other foot, without a force": (
-        lambda columns: {
-            name: np.roll(values, 104) if name == MOMENT else values
-            for name, values in columns.items()
-            if name != FORCE
-        },
-        "on: the moment is of the other foot",
-    ),
     "moment on a later clock": (
         changed(MOMENT, lambda x: np.roll(x, 21)),
         "ankle_moment peaks at 58 % of the stride and is 0.57 N m/kg in swing, but the foot is off the ground from 64",

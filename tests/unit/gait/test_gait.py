@@ -103,38 +103,10 @@ def test_a_wrong_gait_file_is_refused_with_key_and_value(normative: Gait, old: s
         parse_gait(text.replace(old, new, 1).encode(), "bad.toml")
 
 
-def negative(curve: GaitCurve) -> GaitCurve:
-    return curve.scale(-1.0)
-
-
-def turned(amplitudes: tuple[float, ...]) -> tuple[float, ...]:
-    """Amplitudes of the curve half a stride later."""
-    return tuple((-1.0) ** order * value for order, value in enumerate(amplitudes, 1))
-
-
-IMPLAUSIBLE = {
-    "ankle": (
-        {"ankle_angle": lambda c: dataclasses.replace(negative(c), mean=math.pi - c.mean)},
-        "the sign is reversed",
-    ),
-    "moment of the other foot": (
-        {"ankle_moment": lambda c: dataclasses.replace(c, cosines=turned(c.cosines), sines=turned(c.sines))},
-        "peaks at 98 % of the stride, but the foot is off the ground from 64 % on: the moment is of the other foot",
-    ),
-    "knee in g": (
-        {"knee_forward": lambda c: c.scale(1.0 / 9.80665), "knee_up": lambda c: c.scale(1.0 / 9.80665)},
-        "multiply both by 9.80665",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", IMPLAUSIBLE)
-def test_a_gait_file_that_no_leg_walks_is_refused(normative: Gait, case: str) -> None:
-    changes, message = IMPLAUSIBLE[case]
-    wrong = dataclasses.replace(normative, **{name: change(normative.curves[name]) for name, change in changes.items()})
-    with pytest.raises(DataError, match=f"^bad.toml: .*{re.escape(message)}") as refused:
-        parse_gait(gait_toml(wrong).encode(), "bad.toml")
-    assert "\n" not in str(refused.value)
+def test_a_gait_file_that_no_leg_walks_is_refused(normative: Gait) -> None:
+    ankle = dataclasses.replace(normative.ankle_angle.scale(-1.0), mean=math.pi - normative.ankle_angle.mean)
+    with pytest.raises(DataError, match=r"^bad.toml: .*the sign is reversed"):
+        parse_gait(gait_toml(dataclasses.replace(normative, ankle_angle=ankle)).encode(), "bad.toml")
 
 
 def test_a_gait_file_needs_no_knee_but_not_half_of_one(normative: Gait) -> None:

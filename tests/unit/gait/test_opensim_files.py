@@ -36,11 +36,6 @@ def test_both_styles_of_header_are_read(tmp_path: Path, head: str, said: int) ->
     assert len(found.remarks) == said
 
 
-def test_line_ends_of_every_system_are_read(tmp_path: Path) -> None:
-    found = read_opensim(table((NEW + ROWS).replace("\n", "\r\n"), tmp_path))
-    assert found.time.size == 3
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -101,19 +96,6 @@ def test_the_written_format_is_that_of_opensim(tmp_path: Path, recording: Record
     end = lines.index("endheader")
     assert lines[end + 1] == "time\tangle\ttorque"
     assert len(lines[end + 2 :]) == 3
-
-
-@pytest.mark.parametrize(
-    ("name", "rows", "columns"),
-    [
-        ("subject01_walk1_ik.mot", 211, 23),
-        ("subject01_walk1_grf_15s.mot", 9009, 18),
-        ("std_subject01_InverseDynamics.sto", 73, 23),
-    ],
-)
-def test_real_files_of_opensim_are_read(shared_data: Path, name: str, rows: int, columns: int) -> None:
-    found = read_opensim(shared_data / "gait" / "opensim_subject01" / name)
-    assert (found.time.size, len(found.columns)) == (rows, columns)
 
 
 def test_two_columns_of_one_label_have_their_numbers(tmp_path: Path) -> None:
