@@ -233,14 +233,11 @@ def compare(
     from ppafo.simulation.tracking.pair_step import unlimited_switching
     from ppafo.studies.declaration import DEFAULT_SEED
     from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, study_of, uncertainty_of
-    from ppafo.studies.limits import CONFIDENCE, check_fraction
     from ppafo.studies.study import changes_of, choose_configurations, configurations_with
 
     count = DEFAULT_DRAWS if draws is None else draws
     if not FEWEST_DRAWS <= count <= MAXIMUM_DRAWS:
         raise StudyError(f"draws = {count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
-    check_fraction(confidence, *CONFIDENCE)
-    check_fraction(maximum_failed, "maximum_failed")
     loaded = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, loaded, overrides)
     names = [configuration.name for configuration in chosen]

@@ -38,13 +38,13 @@ def _quantity_word(metavar: str, si_unit: str, allowed: NumberRange = ANY) -> Wo
     return Word(metavar, read, taken_number(allowed, read), what)
 
 
-def fraction_word(help_text: str = "") -> Word:
-    """Return the argument type of a fraction from 0 to 1."""
+def fraction_word(help_text: str = "", lowest: float = 0.0, highest: float = 1.0) -> Word:
+    """Return the argument type of a fraction from ``lowest`` to ``highest``."""
     return Word(
         "FRACTION",
         fraction,
-        taken_number(NumberRange(0.0, highest=1.0), fraction),
-        "a number from 0 to 1, or a percentage such as '95%'",
+        taken_number(NumberRange(lowest, highest=highest), fraction),
+        f"a number from {lowest:g} to {highest:g}, or a percentage such as '95%'",
         help=help_text,
     )
 
@@ -102,9 +102,13 @@ Executor = Annotated[
     Word("MODULE:OBJECT", help="workers of concurrent.futures, such as a cluster's; default: this process"),
 ]
 Threads = Annotated[int, whole_word(1, "number of threads; default: all cores")]
-Confidence = Annotated[float, fraction_word("confidence of all intervals; default 95%")]
+# A level below a half, such as 0.05, is a mistake; at 1 an interval is infinite, and every study is accepted.
+Confidence = Annotated[float, fraction_word("confidence of all intervals; default 95%", 0.5, 0.999999)]
 MaximumFailed = Annotated[
-    float, fraction_word("fraction of the runs that may fail before the study is refused; default {default}")
+    float,
+    fraction_word(
+        "fraction of the runs that may fail before the study is refused; default {default}", highest=0.999999
+    ),
 ]
 Fraction = Annotated[float, fraction_word()]
 Side = Annotated[str, Word("right|left", help="which foot; default right")]

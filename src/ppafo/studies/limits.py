@@ -32,16 +32,6 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
         raise StudyError(f"metric '{repeated}' is named twice; name it once")
 
 
-def check_fraction(value: float, name: str, least: float = 0.0) -> None:
-    """Raise StudyError for a fraction below ``least`` or not below 1; ``name`` is its name in the message."""
-    if not least <= value < 1.0:
-        raise StudyError(f"{name} = {value!r}: must be at least {least:g} and less than 1")
-
-
-CONFIDENCE = "confidence", 0.5
-"""Name and lower limit of a confidence level for ``check_fraction``; a level below 0.5, such as 0.05, is a mistake."""
-
-
 def atmosphere_of(scenario: Scenario, varied: Collection[str]) -> float | None:
     """Return the atmospheric pressure [Pa absolute] for gauge pressures of a scenario; None if it is varied."""
     return None if ATMOSPHERE_PATH in varied else scenario.device.supply.atmospheric_pressure

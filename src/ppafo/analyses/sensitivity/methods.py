@@ -31,7 +31,6 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import Uncertainty, replicate_seed
 from ppafo.studies.intervals import jackknife_reach
-from ppafo.studies.limits import CONFIDENCE, check_fraction
 from ppafo.study.runs import Runs, tracking_violation
 from ppafo.wording import argument_text
 
@@ -415,10 +414,6 @@ def analyse(
         raise StudyError("sensitivity: the study has only one uncertain value; vary two or more")
     if not method.fewest <= samples <= method.most:
         raise StudyError(f"samples = {samples}: {method.name} needs {method.fewest} to {method.most:,} {method.noun}")
-    if seed < 0:
-        raise StudyError(f"seed = {seed}: must be 0 or more")
-    check_fraction(confidence, *CONFIDENCE)
-    check_fraction(maximum_failed, "maximum_failed")
     # Checked before anything runs: a design takes thousands of runs.
     design = method.design(uncertainty, samples, seed)
     columns = uncertainty.columns(design)
