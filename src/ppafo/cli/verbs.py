@@ -262,7 +262,7 @@ def sets_show(name: SetName, *, overrides: Overrides = ()) -> Finding[dict[str, 
     >>> sets_show("ppafo2011").said[0]
     'ppafo2011: Portable powered ankle-foot orthosis, completed'
     """
-    from ppafo.analyses.sets.values import shown_values
+    from ppafo.analyses.sets.audit import shown_values
     from ppafo.parameters import apply_overrides, load_parameter_set
 
     return shown_values(apply_overrides(load_parameter_set(name), overrides))

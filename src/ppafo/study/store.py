@@ -6,17 +6,24 @@ study that is killed at any moment resumes with what is there.
 """
 
 import contextlib
+import copy
 import hashlib
+import inspect
 import json
+import math
+import numbers
 import shutil
+import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import CodeType, FunctionType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import json_document, json_text, plain
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.documents.toml_text import quote
@@ -43,7 +50,6 @@ from ppafo.storage.result_folder import MANIFEST
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Study
 from ppafo.study.blocks import Chunk, chunks_of, drawn_values, samples_of, varied_columns
-from ppafo.study.controller_document import DIGITS, controller_document
 from ppafo.study.runs import excess, unvaried, with_companions
 from ppafo.version import __version__
 from ppafo.wording import argument_text
@@ -70,6 +76,84 @@ ASKED_ABOVE = 10_000_000_000
 _FIXED_BYTES_OF_ROW, _BYTES_OF_NUMBER, _BYTES_OF_SAMPLE, _BYTES_OF_FILE = 3, 8, 4, 12_000
 """Bytes of the texts of a row, each stored as an index into a list of texts, per number of a row, per sample of a trace
 (in single precision unless needed for bands), and of a chunk file and its note beside its rows."""
+DIGITS = 16
+"""Number of hexadecimal digits kept of a SHA-256 hash."""
+_DEEPEST, _LONGEST = 12, 64
+"""Largest nesting depth of settings, and number of elements up to which a list is stored itself and not its hash."""
+
+
+def controller_document(controller: PythonController) -> dict[str, Any]:
+    """Return type, source hash and settings of a controller after a reset, as plain data."""
+    try:
+        fresh = copy.deepcopy(controller)
+    except (TypeError, copy.Error, NotImplementedError, RecursionError):  # it holds what has no copy, such as a port
+        fresh = controller
+    else:
+        # What a run left behind is no setting: a study resumes with the same object too.
+        fresh.reset()
+    return dict(_plain(fresh, ()))
+
+
+def _source(code: type | FunctionType) -> dict[str, Any]:
+    """Return the name of a class or function, and a hash of its source files (of a class and all its base classes).
+
+    For a part without a file, the hash is of its compiled code.
+    """
+    digest = hashlib.sha256()
+    for part in code.__mro__ if isinstance(code, type) else (code,):
+        # The standard library is another one with another Python, which is no other controller.
+        if part.__module__ != "__main__" and part.__module__.partition(".")[0] in sys.stdlib_module_names:
+            continue
+        try:
+            text = Path(inspect.getfile(part)).read_bytes()
+        except (TypeError, OSError):  # from a notebook, or typed in
+            functions = [part] if isinstance(part, FunctionType) else vars(part).values()
+            codes = [list(_instructions(each.__code__)) for each in functions if isinstance(each, FunctionType)]
+            text = repr(codes).encode()
+        digest.update(text)
+    return {"type": f"{code.__module__}.{code.__qualname__}", "source": digest.hexdigest()[:DIGITS]}
+
+
+def _instructions(code: CodeType) -> Iterator[object]:
+    """Yield name, instructions, names and constants of compiled code, without file name and line numbers."""
+    yield from (code.co_name, code.co_code, code.co_names)
+    for constant in code.co_consts:
+        yield list(_instructions(constant)) if isinstance(constant, CodeType) else constant
+
+
+def _plain(value: Any, enclosing: tuple[int, ...]) -> Any:
+    """Return a setting as JSON data; one that contains itself or is too deep, by ``enclosing``, by its type's name."""
+    value = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    if value is None or isinstance(value, str | int):
+        return value
+    if isinstance(value, bytes):
+        return hashlib.sha256(value).hexdigest()[:DIGITS]
+    if isinstance(value, numbers.Number):
+        # JSON has no complex numbers, and no infinite ones.
+        return value if isinstance(value, float) and math.isfinite(value) else repr(value)
+    if isinstance(value, type | FunctionType):
+        return _source(value)
+    if id(value) in enclosing or len(enclosing) >= _DEEPEST:
+        return f"{type(value).__module__}.{type(value).__qualname__}"
+    inside = (*enclosing, id(value))
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner, inside) for key, inner in value.items()}
+    if isinstance(value, set | frozenset | tuple | list):
+        items = [
+            _plain(each, inside) for each in (sorted(value, key=repr) if isinstance(value, set | frozenset) else value)
+        ]
+        digest = hashlib.sha256(json.dumps(items).encode()).hexdigest()
+        # Weights of a network, a long table of gains: that they are the same matters, not every one of them.
+        return items if len(items) <= _LONGEST else {"items": len(items), "sha256": digest}
+    try:
+        state = object.__getstate__(value)
+    except TypeError:  # a class of compiled code
+        state = None
+    tables = [table for table in (state if isinstance(state, tuple) else (state,)) if isinstance(table, dict)]
+    return {
+        **_source(type(value)),
+        "settings": {str(k): _plain(v, inside) for table in tables for k, v in table.items()},
+    }
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.sets.values import shown_values
+from ppafo.analyses.sets.audit import shown_values
 from ppafo.errors import ParameterError
 from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.joint import JointNames
