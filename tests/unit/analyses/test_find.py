@@ -133,13 +133,6 @@ def test_a_limit_of_valid_values_is_told_from_the_limit_of_the_condition(noise: 
     assert further.found.value > 1.01 * static
 
 
-def test_the_lower_end_of_valid_values_is_no_limit_of_a_metric() -> None:
-    dynamic = ppafo.load_device("ppafo2011").friction.dynamic_torque
-    answer = find(TASK, vary="friction.static_torque=0.01..4 N m", such_that="rms_error <= 1000 N m", grid=5)
-    assert answer.found.value == pytest.approx(dynamic, rel=1e-3)
-    assert "must be at most friction.static_torque = " in answer.found.remarks[0]
-
-
 def test_the_value_meets_the_condition_in_a_run_of_its_own_and_its_neighbour_does_not(tmp_path: Path) -> None:
     heard: list[Progress] = []
     answer = find(

@@ -434,25 +434,6 @@ def test_a_suggested_run_that_stays_below_a_peak_of_either_sign_says_so(tmp_path
     assert reaches in suggestion_sentence(both)
 
 
-@pytest.mark.parametrize(
-    ("largest", "least", "said"),
-    [
-        (7.61, -7.61, ""),
-        (7.59, -7.61, "reaches 7.59 of 8 N m in the simulated run"),
-        (7.61, -7.59, "reaches -7.59 of -8 N m in the simulated run"),
-        (9.0, 0.5, "reaches 0.5 of -8 N m in the simulated run"),
-    ],
-)
-def test_a_peak_is_reached_from_95_percent_on(
-    tmp_path: Path, sizing: Sizing, largest: float, least: float, said: str
-) -> None:
-    (tmp_path / "both.toml").write_text(BOTH_SIGNS)
-    run = Recording("run", np.array([0.0, 1.0]), {"torque": Channel(np.array([largest, least]), "N m")}, "simulated")
-    changed = dataclasses.replace(sizing, problem=load_design(tmp_path / "both.toml"), recording=run)
-    parts = [part for part in suggestion_sentence(changed).split("; ") if "reaches" in part]
-    assert parts == ([said] if said else [])
-
-
 def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
     big = load_bottle(
         "paper-co2-9oz", ["bottle.gas_mass=567 g", "bottle.volume=834 cm^3", "bottle.wall_heat_capacity=889 J/K"]

@@ -87,15 +87,6 @@ def test_mistakes_in_a_file_are_named(tmp_path: Path, old: str, new: str, words:
     assert str(caught.value).startswith(str(path))
 
 
-def test_a_missing_value_is_named(tmp_path: Path) -> None:
-    start = TEXT.index("[regulator.droop]")
-    end = TEXT.index("[regulator.pressure_margin]")
-    path = tmp_path / "mine.toml"
-    path.write_text(TEXT[:start] + TEXT[end:], encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"'regulator.droop' is missing"):
-        load_bottle(path)
-
-
 def test_both_ways_of_saying_how_full_a_bottle_is_are_one_too_many(tmp_path: Path) -> None:
     extra = (
         '[bottle.fill_pressure]\nvalue = 8.0\nunit = "bar_a"\norigin = "assumed"\nsource = "test"\n\n[bottle.volume]'
