@@ -313,11 +313,11 @@ def claim(
     """
     names, asked, chunks = folder.names(), manifest(study), chunks_of(study)
     if MANIFEST in names:
-        if difference := next(_differences("", read_manifest(folder), asked), ""):
-            raise StudyError(
-                f"{folder.path}: contains the results of another study: {difference}; undo the change or choose "
-                "another folder"
-            )
+        before, now = _leaves("", read_manifest(folder)), _leaves("", asked)
+        if changed := [name for name in {**now, **before} if before.get(name) != now.get(name)]:
+            said = f"{changed[0]} was {quote(before.get(changed[0]))} and is now {quote(now.get(changed[0]))}"
+            other = f"{folder.path}: contains the results of another study"
+            raise StudyError(f"{other}: {said}; undo the change or choose another folder")
     elif names:
         raise StudyError(
             f"{folder.path}: is not empty and contains no study results (it has no {MANIFEST}); choose another folder"
@@ -342,22 +342,14 @@ def claim(
     return chunks, folder.finished(chunks)
 
 
-def _differences(path: str, before: Any, now: Any) -> Iterator[str]:
-    """Yield a text for each key at which two documents differ."""
-    if isinstance(before, dict) and isinstance(now, dict):
-        pairs = [(key, before.get(key), now.get(key)) for key in dict.fromkeys((*now, *before))]
-    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        pairs = [
-            (new.get("path", new.get("name", number)) if isinstance(new, dict) else number, old, new)
-            for number, (old, new) in enumerate(zip(before, now, strict=True), start=1)
-        ]
-    elif before != now:
-        yield f"{path} was {quote(before)} and is now {quote(now)}"
-        return
-    else:
-        return
-    for key, old, new in pairs:
-        yield from _differences(f"{path}.{key}" if path else key, old, new)
+def _leaves(path: str, value: Any) -> dict[str, Any]:
+    """Return the values of a document by their dotted paths; a table of an array has its path or name there."""
+    if isinstance(value, list) and any(isinstance(each, dict) for each in value):
+        value = {each.get("path", each.get("name", str(number))): each for number, each in enumerate(value, start=1)}
+    if not isinstance(value, dict):
+        return {path: value}
+    parts = (_leaves(f"{path}.{key}" if path else key, each) for key, each in value.items())
+    return {name: leaf for part in parts for name, leaf in part.items()}
 
 
 def estimate_bytes(study: Study) -> int:
