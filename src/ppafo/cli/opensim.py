@@ -53,16 +53,23 @@ def export_opensim(
         if value is not None:
             other = "a walk, not for a recording" if is_recording else "a recording; a walk states the body mass"
             raise DataError(f"{option} is allowed only for {other}")
-    from ppafo.exports.opensim import files_of_walk
+    from ppafo.exports.opensim import FEW_STRIDES, check_strikes, opensim_files
     from ppafo.storage.opensim import opensim_bytes, opensim_recording
     from ppafo.storage.reading import read_recording
+    from ppafo.walking.loading import check_duration_once, load_walk
+    from ppafo.walking.walk import walk as walked
 
     # Known once the files are made, and said after that.
     missing: list[str] = []
 
     def make() -> dict[str, bytes]:
         if not is_recording:
-            return files_of_walk(walk, tuple(overrides), gait, minutes, side, strikes)
+            if strikes is not None:
+                check_strikes(strikes)
+            check_duration_once(overrides, minutes)
+            chosen = load_walk(walk, overrides, gait=gait)
+            result = walked(chosen, minutes=FEW_STRIDES if minutes is None else minutes)
+            return opensim_files(result, side, strikes or ())
         recording, found = opensim_recording(read_recording(path), side, body_mass)
         missing.extend(found)
         return {"recording.sto": opensim_bytes(recording)}

@@ -6,7 +6,6 @@ alike, to 1e-4 N m. Static optimisation controls every actuator itself and set t
 
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
@@ -14,11 +13,9 @@ from ppafo.errors import ScenarioError
 from ppafo.gait.recorded.mapping import Side
 from ppafo.signals import Channel, Recording
 from ppafo.storage.opensim import opensim_bytes, opensim_recording
-from ppafo.walking.loading import check_duration_once, load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import walk
 from ppafo.wording import argument_text
 
 FEW_STRIDES = 0.2
@@ -27,7 +24,7 @@ SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
 """Accepted time [s] between two heel strikes of one foot."""
 
 
-def opensim_files(result: WalkResult, side: Side = "right", strikes: Sequence[float] = ()) -> dict[str, bytes]:
+def opensim_files(result: WalkResult, side: Side, strikes: Sequence[float]) -> dict[str, bytes]:
     """Return the OpenSim files of a walk by name; ``strikes`` [s] are heel strikes at which to place its mean stride.
 
     Raises ScenarioError for a failed walk, a walk without an assisted stride, and invalid heel strikes.
@@ -37,24 +34,7 @@ def opensim_files(result: WalkResult, side: Side = "right", strikes: Sequence[fl
     return {"device_torque.sto": opensim_bytes(torque), "walk.sto": opensim_bytes(named)}
 
 
-def files_of_walk(
-    name: str,
-    overrides: Sequence[str],
-    gait: str | Path | None,
-    minutes: float | None,
-    side: Side,
-    strikes: tuple[float, ...] | None,
-) -> dict[str, bytes]:
-    """Return the OpenSim files of a walk by name, over ``minutes`` [min], by default ``FEW_STRIDES``."""
-    if strikes is not None:
-        check_strikes(strikes)
-    check_duration_once(overrides, minutes)
-    chosen = load_walk(name, overrides, gait=gait)
-    result = walk(chosen, minutes=FEW_STRIDES if minutes is None else minutes)
-    return opensim_files(result, side, strikes or ())
-
-
-def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[float] = ()) -> Recording:
+def device_torque(result: WalkResult, side: Side, strikes: Sequence[float]) -> Recording:
     """Return the device torque on OpenSim's ankle [N m], positive in dorsiflexion; see ``opensim_files``."""
     if result.status.time is not None:
         raise ScenarioError(f"{result.scenario.name}: {result.status.message}")

@@ -1,7 +1,7 @@
 """Common interface of results with a recording: channels in any unit, tables, and display in a notebook."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ppafo.engine.lanes import Floats
 from ppafo.signals.recording import Recording
@@ -16,66 +16,79 @@ if TYPE_CHECKING:
     from ppafo.metrics.metric import Metric
 
 
-class RecordedResult(Protocol):
+in_own_units = in_units(lambda result, *_, **__: result.scenario.device.shown)
+"""Texts and figures of a result in the display units of its device."""
+
+
+class RecordedResult:
     """Result of a scenario or a walk, with its recording."""
 
-    @property
-    def scenario(self) -> Scenario:
-        """Scenario of the run."""
+    __slots__ = ()
 
-    @property
-    def recording(self) -> Recording:
-        """Channels of the run."""
+    if TYPE_CHECKING:
 
-    @property
-    def metrics(self) -> "Mapping[str, Metric]":
-        """Metrics of the run by name."""
+        @property
+        def scenario(self) -> Scenario:
+            """Scenario of the run."""
 
-    @property
-    def status(self) -> Any:
-        """End of the run: a ``Status``."""
+        @property
+        def recording(self) -> Recording:
+            """Channels of the run."""
 
+        @property
+        def metrics(self) -> "Mapping[str, Metric]":
+            """Metrics of the run by name."""
+
+        @property
+        def status(self) -> Any:
+            """End of the run: a ``Status``."""
+
+    @in_own_units
     def plot(self, width: float | str | None = None) -> "Figure":
-        """Return the figure of the result at a width in print."""
+        """Return the figure of the run; ``.savefig(...)`` saves it.
 
+        ``width`` is the width in print, such as "84 mm", or a number [m]; by default 145 mm.
+        """
+        from ppafo.report.notebook import shown
+        from ppafo.report.style import drawn_at
 
-def channel_values(self: RecordedResult, channel: str | tuple[str, str]) -> Floats:
-    """Return a channel's values, in SI (``result["torque"]``) or in a given unit (``result["pressure_1", "psi_g"]``).
+        with drawn_at(width):
+            return shown(self._figure())
 
-    ``result["time"]`` are the times of the samples [s]. Raises DataError for an unknown channel, and UnitError for a
-    unit that does not fit the channel.
-    """
-    return self.recording.values_of(channel, self.scenario.device.supply.atmospheric_pressure)
+    def _figure(self) -> "Figure":
+        raise NotImplementedError
 
+    def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
+        """Return a channel's values, in SI (``result["torque"]``) or a given unit (``result["pressure_1", "psi_g"]``).
 
-def channel_names(self: RecordedResult) -> list[str]:
-    """Return ``time`` and the channel names, which a notebook offers as completions between brackets."""
-    return ["time", *self.recording.names]
+        ``result["time"]`` are the times of the samples [s]. Raises DataError for an unknown channel, and UnitError for
+        a unit that does not fit the channel.
+        """
+        return self.recording.values_of(channel, self.scenario.device.supply.atmospheric_pressure)
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return ["time", *self.recording.names]
 
-@in_units(lambda result: result.scenario.device.shown)
-def html(self: RecordedResult) -> str:
-    """Return metrics and figure as HTML, which a notebook displays."""
-    from ppafo.report.notebook import result_html
+    @in_own_units
+    def _repr_html_(self) -> str:
+        from ppafo.report.notebook import result_html
 
-    return result_html(str(self).partition("\n")[0], self.metrics, self.plot())
+        return result_html(str(self).partition("\n")[0], self.metrics, self.plot())
 
+    def dataset(self, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
+        """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON.
 
-def dataset(self: RecordedResult, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
-    """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON.
+        Channels are in SI units unless ``units`` gives another unit for them, such as ``{"pressure_1": "psi_g"}``.
+        """
+        from ppafo.storage import dataset_of
 
-    Channels are in SI units unless ``units`` gives another unit for them, such as ``{"pressure_1": "psi_g"}``.
-    """
-    from ppafo.storage import dataset_of
+        atmosphere = self.scenario.device.supply.atmospheric_pressure
+        return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
 
-    atmosphere = self.scenario.device.supply.atmospheric_pressure
-    return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
-
-
-def dataframe(self: RecordedResult, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
-    """Return the channels as columns indexed by time [s]; ``units`` as in ``dataset``."""
-    table = dataset(self, units)
-    frame = table.to_dataframe()
-    # pandas keeps no attributes of columns.
-    frame.attrs = {**table.attrs, "units": {str(name): table[name].attrs["units"] for name in table.data_vars}}
-    return frame
+    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+        """Return the channels as columns indexed by time [s]; ``units`` as in ``dataset``."""
+        table = self.dataset(units)
+        frame = table.to_dataframe()
+        # pandas keeps no attributes of columns.
+        frame.attrs = {**table.attrs, "units": {str(name): table[name].attrs["units"] for name in table.data_vars}}
+        return frame

@@ -15,11 +15,10 @@ from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together, state_row_numbers
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
-from ppafo.simulation import at_hand
+from ppafo.simulation.at_hand import RecordedResult, in_own_units
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario, scenario_document
-from ppafo.units.shown import in_units
 from ppafo.version import __version__
 from ppafo.wording import changed_text
 
@@ -82,11 +81,8 @@ class DeferredResult:
         return DeferredResult, (self(),)
 
 
-_in_own_units = in_units(lambda result, *_, **__: result.scenario.device.shown)
-
-
 @dataclass(frozen=True, slots=True, repr=False)
-class Result:
+class Result(RecordedResult):
     """Result of a finished run; ``versions`` are package versions, ``engine`` has step size and numbers of steps.
 
     ``tries(scenario, verdict)`` returns the verdict with a remedy that was tried; without it remedies are untried.
@@ -122,7 +118,7 @@ class Result:
         no_warnings = (self.tracking.said, changed_text(changes_in(self.scenario)))
         return tuple(sentence for sentence in self.to_dict()["verdict"] if sentence not in no_warnings)
 
-    @_in_own_units
+    @in_own_units
     def sentences(self, verdict: "Tracking") -> list[str]:
         """Sentences of ``run.json``: tracking, remarks, a too coarse pair of valves, and changed values.
 
@@ -135,7 +131,7 @@ class Result:
         said = (verdict.sentence, *remarks, coarse_pair(self.scenario), changed_text(changes_in(self.scenario)))
         return list(filter(None, said))
 
-    @_in_own_units
+    @in_own_units
     def __repr__(self) -> str:
         """Return name, status, duration and one line per metric, in display units."""
         from ppafo.report.kind import name_lines
@@ -144,7 +140,7 @@ class Result:
         head = f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}"
         return "\n".join([head, *name_lines(self.metrics)])
 
-    @_in_own_units
+    @in_own_units
     def __str__(self) -> str:
         """Return the output of ``ppafo simulate``: status, verdict, warnings and metrics in the units of the device."""
         from ppafo.report.kind import metrics_lines
@@ -152,22 +148,14 @@ class Result:
         head = [f"{self.scenario.name}: {self.status.kind}", *self.to_dict()["verdict"]]
         return "\n".join([*head, "", *metrics_lines(self.metrics)])
 
-    @_in_own_units
-    def plot(self, width: float | str | None = None) -> "Figure":
-        """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` saves it.
-
-        ``width`` is the width in print, such as "84 mm", or a number [m]; by default 145 mm.
-        """
-        from ppafo.report.notebook import shown
+    def _figure(self) -> "Figure":
         from ppafo.report.recording_figure import recording_figure
-        from ppafo.report.style import drawn_at
 
         remark = "" if self.status.is_completed else self.status.message
         valve, joint = self.scenario.device.valve.kind, self.scenario.device.joint
-        with drawn_at(width):
-            return shown(recording_figure(self.recording, self.scenario.name, remark, valve, joint))
+        return recording_figure(self.recording, self.scenario.name, remark, valve, joint)
 
-    @_in_own_units
+    @in_own_units
     def error(self) -> "ErrorEstimate":
         """Return the estimated time-stepping error [SI], from a second run with a sixteenth of the allowed error.
 
@@ -181,7 +169,7 @@ class Result:
         (fine,) = rerun([finer(plan_run(self.scenario))])
         return with_tolerance(self.scenario, estimated_error(self, fine), rerun)
 
-    @_in_own_units
+    @in_own_units
     def check(self) -> "Check":
         """Return the repeatability of this run: with finer steps, and with perturbed start and measurements.
 
@@ -194,7 +182,7 @@ class Result:
 
         return checked(self, plan_run(self.scenario), partial(results_of, self.scenario))
 
-    @_in_own_units
+    @in_own_units
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``run.json`` as plain data in SI units, except the fields added by storage."""
         verdict = self.tracking if self.tries is None else self.tries(self.scenario, self.tracking)
@@ -208,12 +196,6 @@ class Result:
             "scenario": scenario_document(self.scenario),
             "shown": dict(self.scenario.device.shown),
         }
-
-    __getitem__ = at_hand.channel_values
-    _ipython_key_completions_ = at_hand.channel_names
-    _repr_html_ = at_hand.html
-    dataset = at_hand.dataset
-    to_dataframe = at_hand.dataframe
 
     def save(self, folder: str | Path, attachments: Mapping[str, bytes] | None = None) -> Path:
         """Write ``recording.nc``, ``recording.csv``, ``run.json`` and any attachments (contents by file name).

@@ -26,7 +26,7 @@ from ppafo.simulation.document import DocumentReader, ScenarioRequest
 from ppafo.simulation.hardware import read_device, read_hardware
 from ppafo.simulation.loading import FILE as SCENARIO_FILE
 from ppafo.simulation.loading import Layout, list_scenarios, request_again, request_of_file, scenario_of
-from ppafo.simulation.motion_kind import MOTIONS, WALK
+from ppafo.simulation.motion_kind import WALK
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
 from ppafo.simulation.scenario import Assumption, Control, Initial, RunSettings, Scenario, Sensors
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
@@ -124,7 +124,7 @@ def _motion(
         gait = load_gait(request.folder / name if Path(name).suffix == ".toml" else name)
     is_named = "gait" in reading.document
     return WalkMotion(
-        motion_kind=MOTIONS[kind_at(reading.document, "motion") or WALK],
+        kind=kind_at(reading.document, "motion") or WALK,
         gait=gait,
         wearer=read_wearer(reading, gait, is_named),
         forces={name: sensors[name] for name in FORCES},

@@ -15,7 +15,7 @@ from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import quantities_in
 from ppafo.simulation.declaration import THERMAL
-from ppafo.simulation.motion_kind import MotionKind, RunTimes
+from ppafo.simulation.motion_kind import MOTIONS, MotionKind, RunTimes
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BottleSupply
 from ppafo.walking.declaration import FORCES, declared
@@ -28,7 +28,7 @@ class WalkMotion:
 
     The numbers of ``wearer`` and ``forces`` may be arrays (runs,).
 
-    - ``motion_kind``: functions of this type of motion
+    - ``kind``: name of this type of motion
     - ``gait``: prescribed gait
     - ``wearer``: leg of the wearer
     - ``forces``: settings [SI] of the force sensors, by name
@@ -36,13 +36,18 @@ class WalkMotion:
     - ``wearer_origin``: description of the origin of the body mass
     """
 
-    motion_kind: MotionKind = field(compare=False)
+    kind: str = field(compare=False)
     gait: Gait
     wearer: Wearer
     forces: Mapping[str, Any]
     bottle: BottleSupply | None = None
     wearer_origin: str = "the paper's subject"
     locked_angle: ClassVar[None] = None
+
+    @property
+    def motion_kind(self) -> MotionKind:
+        """Kind of this motion: its contribution to the runs."""
+        return MOTIONS[self.kind]
 
     @property
     def stride_time(self) -> float:

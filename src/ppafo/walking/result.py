@@ -15,7 +15,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
 from ppafo.parameters.graph import Asked
 from ppafo.signals import Recording
-from ppafo.simulation import at_hand
+from ppafo.simulation.at_hand import RecordedResult, in_own_units
 from ppafo.simulation.default_gains import loop_parts
 from ppafo.simulation.numbers import changes_in, number_at
 from ppafo.simulation.scenario import Scenario
@@ -25,7 +25,6 @@ from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.simulation.tracking.remedies import level_text
 from ppafo.simulation.tracking.verdict import TOO_SHORT
 from ppafo.storage.opensim import opensim_recording, write_opensim
-from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import Curves
@@ -37,11 +36,9 @@ if TYPE_CHECKING:
 WALK_FORMAT = "ppafo walk"
 """Format name in saved walk results, by which analyses recognise them."""
 
-_in_own_units = in_units(lambda walked, *_, **__: walked.scenario.device.shown)
-
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
-class WalkResult:
+class WalkResult(RecordedResult):
     """Result of a walk. Averages and metrics use strides after the first ones, in which the controller adapts.
 
     - ``scenario``: scenario of the walk
@@ -78,7 +75,7 @@ class WalkResult:
             return Tracking(None, self.scenario.controlled, TOO_SHORT)
         return tracking_in(self)
 
-    @_in_own_units
+    @in_own_units
     def __repr__(self) -> str:
         """Return name, status, duration and a line for each metric, in display units."""
         from ppafo.report.kind import name_lines
@@ -86,7 +83,7 @@ class WalkResult:
         head = f"Walk '{self.scenario.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
         return "\n".join([head, *name_lines(self.metrics)])
 
-    @_in_own_units
+    @in_own_units
     def __str__(self) -> str:
         """Return status, verdict and metrics in display units, as printed by ``ppafo simulate``."""
         from ppafo.report.kind import metrics_lines
@@ -100,24 +97,10 @@ class WalkResult:
                 head.append("the toes would drag in mid-swing: the ankle is not lifted enough")
         return "\n".join([*filter(None, head), "", *metrics_lines(self.metrics)])
 
-    @_in_own_units
-    def plot(self, width: float | str | None = None) -> "Figure":
-        """Return a figure of the mean stride and of the healthy gait; ``.savefig(...)`` writes the figure to a file.
-
-        ``width`` is the width in print, such as "84 mm", or a number [m]; by default 145 mm.
-        """
-        from ppafo.report.notebook import shown
-        from ppafo.report.style import drawn_at
+    def _figure(self) -> "Figure":
         from ppafo.walking.figures.mean_stride import walk_figure
 
-        with drawn_at(width):
-            return shown(walk_figure({self.scenario.name: self}))
-
-    __getitem__ = at_hand.channel_values
-    _ipython_key_completions_ = at_hand.channel_names
-    _repr_html_ = at_hand.html
-    dataset = at_hand.dataset
-    to_dataframe = at_hand.dataframe
+        return walk_figure({self.scenario.name: self})
 
     def save_opensim(self, path: str | Path) -> Path:
         """Write the recording as a ``.sto`` file with OpenSim's names, zeros and signs (right leg); return the path."""

@@ -21,7 +21,7 @@ def walked() -> WalkResult:
 
 
 def test_the_whole_walk_is_in_opensims_sign(walked: WalkResult, tmp_path: Path) -> None:
-    for name, content in opensim_files(walked, "left").items():
+    for name, content in opensim_files(walked, "left", ()).items():
         (tmp_path / name).write_bytes(content)
     device = read_opensim(tmp_path / "device_torque.sto")
     torques = device.columns["ankle_angle_l_device"]

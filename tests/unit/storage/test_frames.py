@@ -8,7 +8,6 @@ import pytest
 import ppafo
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.at_hand import dataframe
 from ppafo.storage import dataset_of
 from ppafo.storage.reading import read_recording
 
@@ -37,7 +36,7 @@ def test_a_table_of_pandas_is_a_recording_however_it_is_given(form: str, tmp_pat
 
 def test_what_a_result_gives_pandas_and_xarray_comes_back_to_the_bit(tmp_path: Path) -> None:
     result = ppafo.simulate("torque-task-proportional", {"run.duration": "0.05 s"})
-    own, table = result.recording, dataframe(result)
+    own, table = result.recording, result.to_dataframe()
     assert table.attrs["units"]["pressure_1"] == "Pa"
     table.to_csv(tmp_path / "back.csv")
     table.to_parquet(tmp_path / "back.parquet")
