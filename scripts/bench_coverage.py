@@ -24,9 +24,10 @@ if not __package__:
     sys.path[0] = str(Path(__file__).parents[1])
 
 from ppafo.errors import PpafoError
+from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.problem import parse_problem
-from ppafo.identification.procedures import PROCEDURES, ProcedureContext, run_procedure
+from ppafo.identification.procedures import LAWS, run_procedure
 from ppafo.identification.source import RecordingSource
 from ppafo.parameters import load_parameter_set
 from ppafo.rig import record
@@ -35,7 +36,7 @@ from scripts.interval_coverage import KINDS, disturbed
 from scripts.processes import add_processes, results_of
 
 DEVICE = "ppafo2011"
-EXPERIMENTS = {**{kind: kind for kind in PROCEDURES}, "vane-leak-steady": "vane-leak"}
+EXPERIMENTS = {**{kind: kind for kind in LAWS}, "vane-leak-steady": "vane-leak"}
 """Experiments of the rig, and the procedure for each."""
 
 EXTRA = {"vane-leak": 'angle = "90 deg"\n'}
@@ -105,7 +106,7 @@ def identified(experiment: str, preset: str, seed: int, noise: str = "") -> Iden
     made = record(experiment, preset, seed, DEVICE)
     text = f'{HEAD}[[procedure]]\nkind = "{kind}"\nrecordings = ["made.csv"]\n{EXTRA.get(experiment, "")}'
     problem = parse_problem(text.encode(), "bench").procedure[0]
-    setting = ProcedureContext(load_parameter_set(DEVICE), "proportional", experiment)
+    setting = BenchContext(load_parameter_set(DEVICE), "proportional", experiment)
     try:
         found, refused = (
             run_procedure((RecordingSource(with_noise(made.recording, noise, seed)),), problem, setting).estimates,

@@ -35,12 +35,11 @@ from ppafo.identification.trajectory.experiment import (
     stated_by,
     tolerance_parameters,
 )
-from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
-from ppafo.identification.trajectory.runs import Floats, numbers_in, prepare, signals_of
+from ppafo.identification.trajectory.fitting import TrajectoryFit, fit, numbers_in, prepare, signals_of
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.rig.experiments import record
 from ppafo.running import simulate
-from ppafo.signals.recording import Channel, Recording
+from ppafo.signals.recording import Channel, Floats, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from scripts.processes import add_processes, results_of

@@ -25,10 +25,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from ppafo.errors import PpafoError
+from ppafo.identification.bench.law import BenchContext
 from ppafo.identification.problem import load_problem
-from ppafo.identification.procedures import ProcedureContext, run_procedure
+from ppafo.identification.procedures import run_procedure
 from ppafo.identification.source import source_of
-from ppafo.identification.tolerances import tolerances_of
+from ppafo.identification.tolerances import DEFAULTS
 from ppafo.model.orifice import isentropic_flow_function
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.report.style import BLACK, COLOURS, GREY, house_style
@@ -152,9 +153,7 @@ def is_line(files: list[Path]) -> bool:
     """Return whether `ppafo identify cylinder.toml` finds friction linear in pressure in these recordings."""
     problem = load_problem(EXAMPLE / "cylinder.toml")
     sources = tuple(source_of(file, read_foreign(file, problem.columns["rig"])) for file in files)
-    setting = ProcedureContext(
-        load_parameter_set(problem.device.set), "", "cylinder.toml", tolerances_of(problem.bench, "")
-    )
+    setting = BenchContext(load_parameter_set(problem.device.set), "", "cylinder.toml", problem.bench or DEFAULTS)
     return all(one.is_identified for one in run_procedure(sources, problem.procedure[0], setting).estimates)
 
 

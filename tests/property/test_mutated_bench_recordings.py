@@ -9,16 +9,12 @@ from hypothesis import strategies as st
 
 from ppafo.errors import PpafoError
 from ppafo.identification.bench.flow import GasAt
-from ppafo.identification.bench.free_decay import free_decay
-from ppafo.identification.bench.open_valve_flow import open_valve_flow
-from ppafo.identification.bench.static_torque import static_torque
-from ppafo.identification.bench.valve_map import valve_map
-from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.source import RecordingSource
 from ppafo.storage import read_csv
 from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.foreign import read_foreign
 from tests.repeatable import TOO_SLOW
+from tests.unit.identification.planted import free_decay, open_valve_flow, static_torque, valve_map, vane_leak
 
 CO2 = GasAt(0.044, 1.3, 298.0)
 RUNS = {
@@ -26,7 +22,7 @@ RUNS = {
     "free-decay": free_decay,
     "open-valve-flow": lambda sources: open_valve_flow(sources, CO2),
     "valve-map": lambda sources: valve_map(sources, CO2),
-    "vane-leak": lambda sources: vane_leak(sources, CO2, 4e-5, 4e-5, 0.1),
+    "vane-leak": lambda sources: vane_leak(sources, CO2, 4e-5, 4e-5, discharge_coefficient=0.1),
 }
 UNITS = {
     "static-torque": {"time": "s", "torque": "N m", "pressure_difference": "psi_d", "direction": "-"},

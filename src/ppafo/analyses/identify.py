@@ -21,10 +21,9 @@ if TYPE_CHECKING:
     from ppafo.identification.bench.law import BenchResult
     from ppafo.identification.new_set import NewSet
     from ppafo.identification.problem import ExperimentSection, ProblemFile
-    from ppafo.identification.procedures import ProcedureProblem
+    from ppafo.identification.procedures import BenchProblem
     from ppafo.identification.source import RecordingSource, UsedRecording
     from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
-    from ppafo.identification.trajectory.section import TrajectoryOutcome
     from ppafo.parameters.parameter_set import ParameterSet
     from ppafo.report.finding import Finding, Section
     from ppafo.report.panels import Panel
@@ -39,8 +38,6 @@ _FILES_IN_TITLE = 4
 """Largest number of recordings named in the title of the new set; the notes of the set name all."""
 _REPORTED = "reported."
 """Prefix of the paths of values that a publication reports about its own device."""
-_ROW_TIMES = dict.fromkeys(("static-torque", "open-valve-flow", "valve-map"), 1.0)
-"""Time between rows of a table without a time column [s], for procedures whose laws do not depend on time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +53,14 @@ class Identification:
 
     name: str
     results: tuple[BenchResult, ...]
-    trajectory: TrajectoryOutcome | None
+    trajectory: TrajectoryFit | None
     before: ParameterSet
     new_set: NewSet
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Estimates of all procedures, followed by the estimates of the trajectory fit."""
-        fitted = () if self.trajectory is None else self.trajectory.fit.estimates
+        fitted = () if self.trajectory is None else self.trajectory.estimates
         return (*(estimate for result in self.results for estimate in result.estimates), *fitted)
 
     @property
@@ -79,7 +76,7 @@ class Identification:
         """Paths that the new set keeps as they were, although its new values were fitted together with them."""
         from ppafo.parameters.parameter_set import number_in_si
 
-        fitted_together = () if self.trajectory is None else self.trajectory.fit.estimates
+        fitted_together = () if self.trajectory is None else self.trajectory.estimates
         new = {*self.new_set.written, *self.new_set.fitted}
         if not any(estimate.path in new for estimate in fitted_together):
             return []
@@ -96,7 +93,7 @@ class Identification:
         """Common origin of all recordings: measured, simulated or synthetic."""
         from ppafo.identification.source import kind_of
 
-        parts = [*self.results, *(() if self.trajectory is None else (self.trajectory.fit,))]
+        parts = [*self.results, *(() if self.trajectory is None else (self.trajectory,))]
         return kind_of(part.kind for part in parts)
 
     def json_document(self) -> dict[str, Any]:
@@ -130,7 +127,7 @@ class Identification:
         # A problem without a fit has no such key, so that its document says what was asked.
         if self.trajectory is None:
             return document
-        fit = self.trajectory.fit
+        fit = self.trajectory
         recordings = [
             {
                 **fields_of(experiment, "label", "source"),
@@ -154,8 +151,8 @@ class Identification:
             "channels": [plain(channel) for channel in fit.channels],
             "conflict": None if fit.fit.conflict is None else plain(fit.fit.conflict),
             "not_identifiable": [dict(combination) for combination in fit.fit.unidentified],
-            "remarks": list(self.trajectory.remarks),
-            "next_experiments": [plain(experiment) for experiment in self.trajectory.expected],
+            "remarks": list(fit.notes),
+            "next_experiments": [plain(experiment) for experiment in fit.expected],
         }
         return document
 
@@ -260,7 +257,7 @@ class _RecordingReader(NamedTuple):
 class _Task(NamedTuple):
     """Identification procedure with its recordings, and the name used in error messages."""
 
-    procedure: ProcedureProblem
+    procedure: BenchProblem
     sources: tuple[RecordingSource, ...]
     label: str
 
@@ -270,9 +267,10 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
 
     Paths are relative to ``folder``; ``file`` is the name used in error messages.
     """
+    from ppafo.identification.bench.law import BenchContext
     from ppafo.identification.new_set import with_estimates
-    from ppafo.identification.procedures import ProcedureContext, run_procedure
-    from ppafo.identification.tolerances import tolerances_of
+    from ppafo.identification.procedures import run_procedure
+    from ppafo.identification.tolerances import DEFAULTS
     from ppafo.identification.trajectory.section import SectionContext, solve_section
     from ppafo.parameters.loading import load_parameter_set
     from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
@@ -289,10 +287,10 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
         reader = _RecordingReader(problem=problem, folder=folder, file=file, parameter_set=before)
         tasks = _tasks_in_order(reader)
         used = _used_recordings(tasks, file)
-        tolerances = tolerances_of(problem.bench, file)
+        tolerances = problem.bench or DEFAULTS
         results: list[BenchResult] = []
         for task in tasks:
-            context = ProcedureContext(current, valve, task.label, tolerances)
+            context = BenchContext(current, valve, task.label, tolerances)
             results.append(run_procedure(task.sources, task.procedure, context))
             # Each procedure finds the estimates of earlier ones in the set.
             current = with_estimates(current, results[-1].estimates).parameter_set
@@ -310,7 +308,7 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
                 tolerances=tolerances,
             )
             trajectory = solve_section(problem.trajectory, section, progress)
-            estimates += trajectory.fit.estimates
+            estimates += trajectory.estimates
         new_set = with_estimates(before, estimates, valve)
         identification = Identification(problem.name, tuple(results), trajectory, before, new_set)
         described = replace(new_set, parameter_set=_described_set(identification, problem))
@@ -319,12 +317,12 @@ def _solved(problem: ProblemFile, folder: Path, file: str, progress: Report) -> 
 
 def _tasks_in_order(reader: _RecordingReader) -> list[_Task]:
     """Return the procedures of a problem with their recordings, each after the procedures whose results it uses."""
-    from ppafo.identification.procedures import PROCEDURES, FlowProcedure, check_needed_channels
+    from ppafo.identification.procedures import LAWS, check_needed_channels
     from ppafo.signals.recording import TIME
 
     tasks = []
     for number, procedure in enumerate(reader.problem.procedure, start=1):
-        row_time, gas = _ROW_TIMES.get(procedure.kind), procedure.gas if isinstance(procedure, FlowProcedure) else None
+        row_time, gas = procedure.row_time, getattr(procedure, "gas", None)
         sources: list[RecordingSource] = []
         for recording in procedure.recordings:
             wrong = list[PpafoError]()
@@ -338,7 +336,7 @@ def _tasks_in_order(reader: _RecordingReader) -> list[_Task]:
                     check_needed_channels(recording, procedure, [*names, *(["direction"] if mapped.direction else [])])
             raise_noted(wrong)
         tasks.append(_Task(procedure, tuple(sources), f"{reader.file}: procedure {number}, {procedure.kind}"))
-    return sorted(tasks, key=lambda task: PROCEDURES.index(task.procedure.kind))
+    return sorted(tasks, key=lambda task: [*LAWS].index(task.procedure.kind))
 
 
 def _used_recordings(tasks: Sequence[_Task], file: str) -> tuple[UsedRecording, ...]:
@@ -346,14 +344,13 @@ def _used_recordings(tasks: Sequence[_Task], file: str) -> tuple[UsedRecording, 
 
     A recording may serve two different procedures. Raises IdentificationError if a procedure uses a recording twice.
     """
-    from ppafo.identification.procedures import TimedProcedure
     from ppafo.identification.source import UsedRecording, double_use
 
     by_procedure: dict[str, list[UsedRecording]] = {}
     for task in tasks:
         kind = task.procedure.kind
         # Steady readings have no times: each counts by itself.
-        first, last = task.procedure.times(task.label) if isinstance(task.procedure, TimedProcedure) else (None, None)
+        first, last = (getattr(task.procedure, name, None) for name in ("start", "end"))
         ends = -math.inf if first is None else first, math.inf if last is None else last
         for number, source in enumerate(task.sources, start=1):
             name = f"recording {number} of procedure {kind}"
@@ -433,9 +430,9 @@ def finding_of(identification: Identification) -> Finding[Identification]:
             for result in identification.results
         ]
         if trajectory is not None:
-            fit = trajectory.fit
-            more = [*_tolerances(fit.known, before), *(f"remark: {remark}" for remark in trajectory.remarks)]
-            for number, item in enumerate(trajectory.expected, start=1):
+            fit = trajectory
+            more = [*_tolerances(fit.known, before), *(f"remark: {remark}" for remark in fit.notes)]
+            for number, item in enumerate(fit.expected, start=1):
                 fraction = 1.0 - item.shrinkage[item.most_helped]
                 more.append(
                     f"next experiment {number}: {item.label}: gain {item.gain:.2f}; largest for {item.most_helped}, "
@@ -457,10 +454,10 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     if kept := identification.kept_beside_fitted:
         problem.append(
             f"not passed (exit code 1): the new set keeps its own {' and '.join(kept)}, with which its other values "
-            "were not fitted: fix these by device.overrides, and fit the others again"
+            "were not fitted"
         )
     # As they are remarks among others, these that prevent a pass are repeated at the end.
-    of_fit = () if trajectory is None else trajectory.fit.remarks
+    of_fit = () if trajectory is None else trajectory.remarks
     problem += [f"not passed (exit code 1): {remark}" for remark in of_fit]
     return Finding(
         name="identify",
@@ -505,14 +502,14 @@ def _part(heading: str, part: BenchResult | TrajectoryFit, more: Iterable[str], 
             continue
         if not 1.0 / _FAR_FROM_SET < (ratio := value / entry.value) < _FAR_FROM_SET:
             times = f"{ratio:.3g} times the value of the set, {entry.value:.4g} {unit}".rstrip()
-            far.append(f"remark: {item.path} is {times}; if the devices are alike, check the units")
+            far.append(f"remark: {item.path} is {times}")
     origin = "" if part.kind == "measured" else f" ({part.kind})"
     return Section(heading.replace("{}", origin, 1), columns_of(("",) * 4, rows), remarks=[*said, *far, *more])
 
 
 def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> list[str]:
     """Return sentences on the tolerances that widen an interval most, and on those that contradict the recordings."""
-    from ppafo.identification.estimate import NAMED, with_error
+    from ppafo.identification.estimate import NAMED, digits_of
 
     is_far = {number.name: abs(number.after - number.before) > _FAR * number.before_error for number in known}
     by_share = sorted(known, key=lambda number: (-float(f"{number.share:.2g}"), number.name))
@@ -527,7 +524,8 @@ def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> lis
                 _shown(number, tolerance.name.partition(" of ")[0], tolerance.unit, before)
                 for number in (value, error, 0.0)
             )
-            texts.append(f"{with_error(level, upper - zero)} {unit}".rstrip(" -"))
+            width = upper - zero
+            texts.append(f"{digits_of(level, width)} +- {digits_of(width, width)} {unit}".rstrip(" -"))
         entry = before.numbers.get(tolerance.name)
         default = " (the set states none)" if entry is not None and not entry.uncertainty else ""
         text = f"tolerance: {tolerance.name}: prior {texts[0]}{default}, fitted {texts[1]}"
@@ -559,7 +557,7 @@ def _figures(identification: Identification) -> list[Section]:
         name = result.procedure if number == 1 else f"{result.procedure}-{number}"
         draw = partial(bench_figure, result.panels, result.kind)
         figures.append(Section(name=name, caption=result.summary, is_detail=True, draw=draw))
-    fit = None if identification.trajectory is None else identification.trajectory.fit
+    fit = identification.trajectory
     for measurement, model in zip(fit.measurements, fit.models, strict=True) if fit else ():
         label = measurement.label
         panels = partial(trajectory_panels, measurement, model)

@@ -15,7 +15,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
-from ppafo.wording import argument_text, count_of
+from ppafo.wording import count_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame  # type: ignore[import-untyped]
@@ -227,9 +227,7 @@ def verdict(validation: Validation) -> str:
         share = f"{100 * worst.fraction:.2g} % of full range"
         texts = [f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"]
         if not passes and causes.found is None and any(row.motion == "free" for row in validation.recordings):
-            # A cause is searched with the motion as it was said, which is wrong for a device that something else moved.
-            motion = argument_text("motion", "leg")
-            texts.append(f"if the device was on a leg, locked or driven, give {motion}, locked or measured first")
+            texts.append("the vane was taken to be free")
         texts.append(_why(causes, worst.in_noise, passes))
     texts.append(_removed_delay(validation))
     explanation = "; ".join(filter(None, texts))
@@ -274,11 +272,7 @@ def _removed_delay(validation: Validation) -> str:
     removed = max(agreement.delay.correction for agreement in validation.recordings)
     if removed <= PRESSURE_ERRORS.delay:
         return ""
-    delay = validation.device.valve.settings.get("delay")
-    of_valve = (
-        "" if delay is None else f", of the sensors or of the valve (valve.delay = {1.0e3 * (delay + removed):.3g} ms)"
-    )
-    return f"a delay of {1.0e3 * removed:.3g} ms was removed{of_valve}"
+    return f"a delay of {1.0e3 * removed:.3g} ms was removed"
 
 
 def _times(size: float) -> str:

@@ -1,5 +1,6 @@
 """Building blocks of closed file layouts: strict tables, their validation with all problems by path, JSON Schema."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,13 +8,15 @@ from types import UnionType
 from typing import Annotated, Any, Literal, TypeGuard, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
-from pydantic_core import ErrorDetails, PydanticKnownError
+from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, PydanticKnownError
+from pydantic_core.core_schema import no_info_after_validator_function, str_schema
 
 from ppafo.documents.faults import line_of, no_table, refuse, unknown_key
 from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import NAME, NAME_RULE, SCHEMA, TomlKind, label, quote
-from ppafo.errors import PpafoError
+from ppafo.errors import PpafoError, UnitError
 from ppafo.plugins import nearest_kind
+from ppafo.units import parse_quantity
 from ppafo.wording import nearest_name, one_line
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -129,7 +132,7 @@ def _message(key: _Key, detail: ErrorDetails) -> str:
     # "Input should be less than 5" becomes "must be less than 5".
     _, separator, requirement = detail["msg"].partition(" should ")
     requirement = requirement if separator else f"be {detail['msg']}"
-    return f"{assignment}: must {one_line(requirement)}"
+    return f"{assignment}: {detail['msg'] if detail['type'] == 'quantity' else f'must {one_line(requirement)}'}"
 
 
 def _allowed_words(word: object, allowed: str, nearest: Callable[[str, list[str]], str] = nearest_name) -> str:
@@ -155,6 +158,43 @@ SchemaVersion = Annotated[Literal[1], BeforeValidator(_no_flag), Field(descripti
 """Version of a file layout; all layouts have version 1 so far."""
 Text = Annotated[str, Field(min_length=1)]
 Texts = Annotated[tuple[Text, ...], Field(strict=False)]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantified:
+    """Quantity of a file, a text with its unit, as a number in ``unit`` from ``low`` to ``high``, or above ``above``.
+
+    The text ``nothing`` stands for 0, whatever the limits are.
+
+    >>> from pydantic import TypeAdapter
+    >>> TypeAdapter(Annotated[float, Quantified("s", above=0.0)]).validate_python("5 ms")
+    0.005
+    """
+
+    unit: str
+    low: float = -math.inf
+    high: float = math.inf
+    above: float = -math.inf
+    nothing: str = ""
+
+    def read(self, text: str) -> float:
+        """Return the number of a text. Raises PydanticCustomError for another unit, or beyond the limits."""
+        if self.nothing and text == self.nothing:
+            return 0.0
+        try:
+            value = parse_quantity(text, self.unit)
+        except UnitError as error:
+            raise PydanticCustomError("quantity", "{why}", {"why": str(error)}) from error
+        if not (self.low <= value <= self.high and value > self.above):
+            above = f"above {self.above:g}" if self.above > -math.inf else f"at least {self.low:g}"
+            below = f" and at most {self.high:g}" if self.high < math.inf else ""
+            limits = f"must be {above}{below} {self.unit}".removesuffix(" 1")
+            raise PydanticCustomError("quantity", "{why}", {"why": limits})
+        return value
+
+    def __get_pydantic_core_schema__(self, *_: object) -> CoreSchema:
+        """Return the schema of a text that is read."""
+        return no_info_after_validator_function(self.read, str_schema(min_length=1))
 
 
 def read_model(kind: TomlKind, model: type[Model], name_or_path: str | Path) -> tuple[Model, str]:

@@ -4,9 +4,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import NormalDist
-from typing import Literal, get_args
+from typing import Literal
 
-from ppafo.errors import IdentificationError
 from ppafo.units import split_pressure_kind
 from ppafo.units.shown import shown_unit, shown_value
 from ppafo.wording import percentage
@@ -25,7 +24,6 @@ Verdict = Literal["identified", "holds for this model only", "not identifiable",
 A value is "identified" only if the model explains the recordings. A value that "holds for this model only" is written
 into a set with the origin ``fitted``, and is not to be taken as a property of the device.
 """
-_VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 WRONG_UNIT: Verdict = "unit probably wrong"
 """Verdict where the recordings do better in another unit of pressure; the value is not used in a set."""
 _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only")
@@ -46,19 +44,6 @@ def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, st
     if stated and si_unit == "Pa_d":
         shown = f"{split_pressure_kind(stated)[0]}_d"
     return shown_value(float(number), si_unit, shown), shown.removesuffix("_d")
-
-
-def with_error(value: float, error: float) -> str:
-    """Return a value with its standard error, ``480.5 +- 6.9``: two significant digits of the error, value to match."""
-    if not (math.isfinite(value) and math.isfinite(error) and error > 0.0):
-        return f"{value:.4g} +- {error:.2g}"
-    size = max(abs(value), error)
-    power = 0 if _SMALLEST <= size < _LARGEST else math.floor(math.log10(size))
-    scaled, scaled_error = value / 10.0**power, error / 10.0**power
-    digits = max(0, 1 - math.floor(math.log10(scaled_error)))
-    # A zero that was rounded from below has no sign.
-    text = f"{round(scaled, digits) + 0.0:.{digits}f} +- {scaled_error:.{digits}f}"
-    return f"({text})e{power:+03d}" if power else text
 
 
 def digits_of(number: float, error: float) -> str:
@@ -130,17 +115,6 @@ class Estimate:
     confidence: float = 0.95
     size: float | None = None
     beside: Mapping[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if self.verdict not in _VERDICTS:
-            raise IdentificationError(f"verdict '{self.verdict}' is unknown; allowed: {', '.join(_VERDICTS)}")
-        if not 0.0 < self.confidence < 1.0:
-            raise IdentificationError(f"confidence must be between 0 and 1, not {self.confidence!r}")
-        if self.is_usable and not (math.isfinite(self.value) and self.low <= self.value <= self.high):
-            raise IdentificationError(
-                f"{self.path}: value {self.value!r} with verdict '{self.verdict}' must lie inside its interval, "
-                f"{self.low!r} to {self.high!r}"
-            )
 
     @property
     def is_usable(self) -> bool:

@@ -210,16 +210,13 @@ class Fit:
     """Result of a fit in SI units, in the order of ``numbers``; a variable with a base includes its base here.
 
     ``numbers``: variables of the fit. ``values``: estimates. ``covariance``: their covariance. ``low``, ``high``: ends
-    of the confidence intervals at ``confidence``. ``noise``: standard deviation by channel. ``correlation``: order of
-    the noise autoregression by channel. ``residuals``: measured - model. ``outliers``: rows of residuals left out as
-    isolated outliers. ``conflict``: part of the data that contradicts the rest, if any. ``unidentified``: combinations
-    that the recordings do not determine, as weights of variables relative to their values. ``shares``: for each
-    variable, the tolerances that contribute to its variance, with fractions [-], largest first. ``evaluations``: number
-    of model runs.
+    of the confidence intervals at ``confidence``. ``outliers``: rows of residuals left out as isolated outliers.
+    ``conflict``: part of the data that contradicts the rest, if any. ``unidentified``: combinations that the recordings
+    do not determine, as weights of variables relative to their values. ``shares``: for each variable, the tolerances
+    that contribute to its variance, with fractions [-], largest first. ``evaluations``: number of model runs.
     ``log_likelihood``: log-likelihood [-] of whitened residuals and priors, up to a constant of the readings.
-    ``sensors``: noise model by channel. ``jacobian``: whitened Jacobian [1/SI]. ``edge``: unknowns that the search
-    drives to values at which no run succeeds, with the direction, 1 upwards or -1 downwards; such a search has not
-    converged.
+    ``sensors``: noise model by channel. ``edge``: unknowns that the search drives to values at which no run succeeds,
+    with the direction, 1 upwards or -1 downwards; such a search has not converged.
     """
 
     numbers: tuple[FitVariable, ...]
@@ -227,9 +224,6 @@ class Fit:
     covariance: Floats
     low: Floats
     high: Floats
-    noise: Mapping[str, float]
-    correlation: Mapping[str, int]
-    residuals: Floats
     outliers: tuple[int, ...]
     conflict: Conflict | None
     unidentified: tuple[Mapping[str, float], ...]
@@ -238,7 +232,6 @@ class Fit:
     has_converged: bool
     log_likelihood: float
     sensors: Mapping[str, Noise]
-    jacobian: Floats
     confidence: float
     edge: Mapping[str, int]
 
@@ -268,11 +261,6 @@ def fit(
     from slow signals. Raises IdentificationError if no run succeeds, if there are no more samples than unknowns, or if
     the bounds of a variable do not enclose its start.
     """
-    if not numbers or not blocks:
-        raise IdentificationError(
-            f"a fit needs at least one parameter and one block of residuals, not {len(numbers)} parameters and "
-            f"{len(blocks)} blocks"
-        )
     for number in numbers:
         if not (number.low <= number.start <= number.high and number.low < number.high):
             raise IdentificationError(
@@ -283,7 +271,7 @@ def fit(
     samples = sum(block.rows.stop - block.rows.start for block in blocks)
     sought = sum(math.isinf(number.deviation) for number in numbers)
     if samples <= sought:
-        raise IdentificationError(f"{samples} samples cannot determine {sought} parameters; give more samples")
+        raise IdentificationError(f"{samples} samples cannot determine {sought} parameters")
     best = _fit_from(runs, runs.start, confidence)
     if best.conflict is None and best.has_converged:
         return best
@@ -322,7 +310,7 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
             limits[row] = point[row] + point[base] + sign * width
         low[row] = max(low[row], low[base] + runs.low[row])
     covariance = covariance + runs.base @ covariance + (covariance + runs.base @ covariance) @ runs.base.T
-    jacobian, point = jacobian - jacobian @ runs.base, point + runs.base @ point
+    point = point + runs.base @ point
     # Unknowns count relative to their estimates, because a start may be far off; those that may be 0 or of either sign
     # relative to the start where it is larger. After a conflict an estimate may be far too large: the start limits it.
     estimated = np.abs(point) if conflict is None else np.minimum(np.abs(point), 1.0)
@@ -336,15 +324,15 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if runs.prior[other] > 0.0)
         for name, row in zip(names, fractions, strict=True)
     }
+    # Up to a constant of the readings.
+    counts = [(linear.sensors[block.channel], block.rows.stop - block.rows.start) for block in runs.blocks]
+    size = sum(count * (math.log(noise.deviation) + math.log(noise.innovation)) for noise, count in counts)
     return Fit(
         numbers=runs.numbers,
         values=point * runs.scale,
         covariance=covariance * np.outer(runs.scale, runs.scale),
         low=low * runs.scale,
         high=high * runs.scale,
-        noise={channel: noise.deviation for channel, noise in linear.sensors.items()},
-        correlation={channel: len(noise.reflection) + (noise.gain > 0.0) for channel, noise in linear.sensors.items()},
-        residuals=end.residuals,
         outliers=tuple(outliers.tolist()),
         conflict=conflict,
         unidentified=tuple(unidentified(covariance / np.outer(typical, typical), names)),
@@ -352,9 +340,8 @@ def _fit_from(runs: FitRuns, start: Floats, confidence: float) -> Fit:
         evaluations=runs.evaluations,
         # A search whose steps all leave the region in which runs succeed has no minimum.
         has_converged=-math.inf < end.gain < _CONVERGED,
-        log_likelihood=_log_likelihood(runs, point, linear.sensors),
+        log_likelihood=-size - 0.5 * float(np.square((point - runs.start) * runs.prior).sum()),
         sensors=linear.sensors,
-        jacobian=jacobian / runs.scale,
         confidence=confidence,
         edge={} if math.isfinite(end.gain) else _edge(runs, end.point, end.step),
     )
@@ -369,9 +356,7 @@ def _search(runs: FitRuns, start: Floats) -> tuple[Floats, Indices]:
     point, outliers = np.clip(start, runs.low, runs.high), np.zeros(0, dtype=np.intp)
     residuals = runs.residuals_at(point)
     if not np.isfinite(residuals).all():
-        raise IdentificationError(
-            "every run fails at the start values; give other start values, or check the recordings"
-        )
+        raise IdentificationError("every run fails at the start values")
     started = time.monotonic()
     for number, (loss, least) in enumerate([("soft_l1", _ROUGH), ("linear", _FINE)]):
         runs.report(Progress("fit", number, 2, noun="passes", elapsed=time.monotonic() - started))
@@ -430,13 +415,12 @@ def _outliers(runs: FitRuns, residuals: Floats) -> Indices:
 
 
 class _SearchEnd(NamedTuple):
-    """End of a search: scaled point, residuals [SI], linearisation at this point, and the step to its minimum.
+    """End of a search: scaled point, linearisation at this point, and the step to its minimum.
 
     ``gain`` is the decrease of the squares in the last step [-], -inf if no run succeeds after a short step.
     """
 
     point: Floats
-    residuals: Floats
     linear: Linear
     step: Floats
     gain: float
@@ -469,7 +453,7 @@ def _settle(runs: FitRuns, point: Floats, outliers: Indices) -> _SearchEnd:
             leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
             highest = np.argsort(-leverage)[: int(_LEFT_OUT * len(leverage))]
             left_out = np.union1d(outliers, highest[leverage[highest] > _LEVERAGE])
-    return _SearchEnd(point=point, residuals=residuals, linear=linear, step=step, gain=min(gain, fall))
+    return _SearchEnd(point=point, linear=linear, step=step, gain=min(gain, fall))
 
 
 def _edge(runs: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
@@ -483,15 +467,6 @@ def _edge(runs: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
     fails = ~np.isfinite(residuals).all(axis=0)
     indices = sought[fails] if fails.any() else sought
     return {runs.numbers[index].name: int(np.sign(step[index])) for index in indices.tolist()}
-
-
-def _log_likelihood(runs: FitRuns, point: Floats, sensors: Mapping[str, Noise]) -> float:
-    """Return the log-likelihood [-] of whitened residuals and priors at a scaled point, up to a constant."""
-    size = 0.0
-    for block in runs.blocks:
-        noise, count = sensors[block.channel], block.rows.stop - block.rows.start
-        size += count * (math.log(noise.deviation) + math.log(noise.innovation))
-    return -size - 0.5 * float(np.square((point - runs.start) * runs.prior).sum())
 
 
 def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:
@@ -510,7 +485,9 @@ def _other_starts(runs: FitRuns, fitted: Fit) -> Iterator[Floats]:
     points = np.repeat(point[:, None], _OTHER_STARTS + 1 + int(is_excess.any()), axis=1)
     points[sought, :_OTHER_STARTS] = np.where(is_ratio[:, None], np.exp(np.where(is_ratio[:, None], drawn, 0.0)), drawn)
     points[is_excess, :-1] = 0.0
-    noise = [np.full(block.rows.stop - block.rows.start, fitted.noise[block.channel]) for block in runs.blocks]
+    noise = [
+        np.full(block.rows.stop - block.rows.start, fitted.sensors[block.channel].deviation) for block in runs.blocks
+    ]
     residuals = runs.residuals_at_points(points)
     costs = np.sum(np.log1p(np.square(residuals / np.concatenate(noise)[:, None])), axis=0)
     costs[~np.isfinite(costs)] = np.inf
@@ -526,23 +503,23 @@ def widened_by(fitted: Fit, name: str) -> str:
     return f"variance from {', '.join(f'{part} ({percentage(share, 2)})' for part, share in parts[:NAMED])}"
 
 
-def conflict_in_words(fitted: Fit, remedy: str) -> str:
-    """Return a sentence on the readings that contradict the others, with a remedy; empty if all agree."""
-    conflict = fitted.conflict
+def conflict_in_words(fitted: Fit, reason: str = "") -> str:
+    """Return a sentence on the readings that contradict the others, with a reason if known; empty if all agree."""
+    conflict, reason = fitted.conflict, reason and f"; {reason}"
     if conflict is None:
         return ""
     errors = conflict.standard_errors
     if conflict.group == STATED:
-        return f"{conflict.number} is {errors:.1f} standard errors beyond its stated limit; {remedy}"
+        return f"{conflict.number} is {errors:.1f} standard errors beyond its stated limit{reason}"
     if conflict.number == SMOOTH:
-        return f"the residual of {conflict.group} is {errors:.0f} times its noise and too smooth to be noise; {remedy}"
+        return f"the residual of {conflict.group} is {errors:.0f} times its noise and too smooth to be noise{reason}"
     if conflict.number == SHAPE:
         return (
-            f"the residuals of {conflict.group} have a shape that the law has not, by {errors:.1f} standard errors; "
-            f"{remedy}"
+            f"the residuals of {conflict.group} have a shape that the law has not, by {errors:.1f} standard "
+            f"errors{reason}"
         )
     give = "give" if _SEVERAL & set(conflict.group.split()) else "gives"
     return (
         f"{conflict.group}, fitted alone, {give} different values: {conflict.number} by {errors:.1f} standard "
-        f"errors; {remedy}"
+        f"errors{reason}"
     )

@@ -158,10 +158,7 @@ class FitRuns:
         failing = np.flatnonzero(~(runs_above | runs_below) | (first == second))
         if failing.size:
             number = self.numbers[failing[0]]
-            raise IdentificationError(
-                f"{number.name}: every run fails near {point[failing[0]] * number.scale:.6g}; give other bounds "
-                "or another start value"
-            )
+            raise IdentificationError(f"{number.name}: every run fails near {point[failing[0]] * number.scale:.6g}")
         at_first = np.where(runs_above, values_above, values_below)
         at_second = np.where(runs_both, values_below, self.residuals_at(point)[:, None])
         return np.ascontiguousarray((at_first - at_second) / (first - second))

@@ -34,6 +34,11 @@ class Noise:
     gain: float = 0.0
     innovation: float = 1.0
 
+    @property
+    def order(self) -> int:
+        """Number of coefficients, 0 for white noise."""
+        return len(self.reflection) + (self.gain > 0.0)
+
 
 def burg(series: Sequence[Floats], highest: int = HIGHEST_ORDER, wanted_order: int | None = None) -> tuple[float, ...]:
     """Return the reflection coefficients [-] of an autoregression of several series (Burg), with order from AIC.

@@ -7,12 +7,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.models import Quantified, SchemaVersion, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import NAME, TomlKind, label
 from ppafo.errors import IdentificationError
-from ppafo.identification.procedures import ProcedureProblem
-from ppafo.identification.tolerances import BenchSection, Columns, Confidence
+from ppafo.identification.procedures import BenchProblem
+from ppafo.identification.tolerances import Columns, Confidence, Tolerances
 from ppafo.identification.trajectory.experiment import ALL_INPUTS
+from ppafo.simulation.recorded.channels import LONGEST_STEP
 from ppafo.storage.column_map import ColumnMap
 from ppafo.wording import known_names
 
@@ -20,6 +21,8 @@ _Label = Annotated[
     str, Field(pattern=NAME, max_length=60, description="name of the experiment, also used in file names")
 ]
 _Noise = dict[str, Text]
+SHORTEST_STEP = 1.0e-6
+"""Shortest time step that a problem file may request [s]."""
 _FILE = TomlKind(
     "identification problem", "identification", resources.files("ppafo.identification"), IdentificationError
 )
@@ -59,10 +62,12 @@ class ExperimentSection(StrictTable):
     columns: Columns = None
     scenario: Text | None = Field(None, description="name or relative file of a scenario; default: the recorded inputs")
     overrides: Texts = Field((), description="changes to the scenario, or to the device without one")
-    start: Text | None = Field(
+    start: Annotated[float, Quantified("s")] | None = Field(
         None, description="time of the recording at which the run begins; 0 s, or the first sample"
     )
-    step: Text | None = Field(None, description="longest step of time in the run, such as '0.1 ms'")
+    step: Annotated[float, Quantified("s", SHORTEST_STEP, LONGEST_STEP)] | None = Field(
+        None, description="longest step of time in the run, such as '0.1 ms'"
+    )
     channels: Texts | None = Field(
         None, description="compared channels; default: angle and pressures, unless locked or prescribed"
     )
@@ -70,15 +75,19 @@ class ExperimentSection(StrictTable):
     inputs: Texts | None = Field(
         None, description=f"recorded channels used as inputs of the run: {', '.join(ALL_INPUTS)}"
     )
-    locked: Text | None = Field(
+    locked: Annotated[float, Quantified("rad")] | None = Field(
         None, description="angle at which the vane is locked, such as '75 deg'; without a scenario"
     )
-    volume: Text | None = Field(None, description="fixed volume in place of the vane, '60 cm^3'; without a scenario")
+    volume: Annotated[float, Quantified("m^3", above=0.0)] | None = Field(
+        None, description="fixed volume in place of the vane, '60 cm^3'; without a scenario"
+    )
     initial_state: Literal["scenario", "recording", "fitted"] | None = Field(
         None,
         description="state at the start; 'recording' and 'fitted' are one; default: the scenario, else the recording",
     )
-    time_offset: Text | None = Field(None, description="limit of a fitted delay of the samples behind the run, '20 ms'")
+    time_offset: Annotated[float, Quantified("s", above=0.0)] | None = Field(
+        None, description="limit of a fitted delay of the samples behind the run, '20 ms'"
+    )
 
 
 class CandidateSection(StrictTable):
@@ -88,7 +97,9 @@ class CandidateSection(StrictTable):
     scenario: Text = Field(description="name of a scenario, or a file relative to this one")
     overrides: Texts = Field((), description="changes to the scenario")
     noise: _Noise = Field({}, description="by channel; default: what the fit finds")
-    interval: Text = Field("1 ms", description="time between two samples")
+    interval: Annotated[float, Quantified("s", SHORTEST_STEP)] = Field(
+        default_factory=lambda: 1.0e-3, description="time between two samples; default 1 ms"
+    )
 
 
 class TrajectorySection(StrictTable):
@@ -131,8 +142,8 @@ class ProblemFile(StrictTable):
         None, description="authors of the measurements; default: as in the starting set"
     )
     columns: dict[str, ColumnMap] = Field({}, description="column maps by name, for files with columns of other names")
-    bench: BenchSection | None = Field(None, description="tolerances of the bench")
-    procedure: tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...] = Field(
+    bench: Tolerances | None = Field(None, description="tolerances of the bench")
+    procedure: tuple[Annotated[BenchProblem, Field(discriminator="kind")], ...] = Field(
         (), strict=False, min_length=1, description="bench procedures to apply"
     )
     trajectory: TrajectorySection | None = Field(
@@ -156,7 +167,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
     problem = validate(ProblemFile, _FILE.parse(content, file), file, IdentificationError, content)
     # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
-        raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]; give at least one")
+        raise IdentificationError(f"{file}: has neither a [[procedure]] nor a [trajectory]")
     fitted = () if problem.trajectory is None else problem.trajectory.experiments
     named = [(f"procedure {number}", item.columns) for number, item in enumerate(problem.procedure, start=1)]
     named += [(f"experiment '{item.label}'", item.columns) for item in fitted]

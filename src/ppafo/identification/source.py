@@ -5,12 +5,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
+from ppafo.errors import IdentificationError
 from ppafo.identification.estimate import in_shown_unit
 from ppafo.signals import Recording, RecordingKind
-from ppafo.signals.faults import FEWEST_AT_LIMIT, is_at_limit, longest_gap, plateaus, scatters
+from ppafo.signals.faults import FEWEST_AT_LIMIT, is_at_limit, plateaus, scatters
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 
@@ -22,10 +24,14 @@ _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 
 @dataclass(frozen=True, slots=True)
 class RecordingSource:
-    """Recording with its source: ``static.csv sha256:0123...``, or the recording's label if it has no file."""
+    """Recording with its source: ``static.csv sha256:0123...``, or the recording's label if it has no file.
+
+    ``user`` is the procedure that messages name.
+    """
 
     recording: Recording
     reference: str = ""
+    user: str = ""
 
     @property
     def name(self) -> str:
@@ -36,6 +42,15 @@ class RecordingSource:
     def trace(self) -> str:
         """Reference of the recording among the sources of an estimate."""
         return self.reference or self.recording.label
+
+    @property
+    def where(self) -> str:
+        """Beginning of a message: name of the recording, and its user."""
+        return f"{self.name}: {self.user}".removesuffix(": ")
+
+    def refuse(self, fault: str) -> NoReturn:
+        """Raise IdentificationError for a fault of the recording."""
+        raise IdentificationError(f"{self.where}: {fault}")
 
     def shown(self, name: str, value: float) -> str:
         """Return a channel value [SI] as text, in the unit of the file."""
@@ -121,12 +136,9 @@ def kind_of(kinds: Iterable[RecordingKind]) -> RecordingKind:
 
 
 def remarks_on_readings(sources: tuple[RecordingSource, ...]) -> tuple[str, ...]:
-    """Return remarks on gaps in time and on values at the limit of a sensor."""
+    """Return remarks on values at the limit of a sensor."""
     remarks = []
     for source in sources:
-        if (gap := longest_gap(source.recording.time)) is not None:
-            index, duration = gap
-            remarks.append(f"{source.name} has no reading for {duration:.4g} s after sample {index + 1}")
         for name in source.recording.names:
             if name in _NO_SENSORS:
                 continue

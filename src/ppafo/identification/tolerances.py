@@ -4,14 +4,12 @@ Usual errors of sensors and supply are defined in ``usual_errors.py``. A set sta
 which is 1.96 standard deviations.
 """
 
-import math
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import StrictTable, Text
+from ppafo.documents.models import Quantified, StrictTable, Text
 from ppafo.errors import IdentificationError, UnitError, refused_as
 from ppafo.identification.estimate import interval_factor
 from ppafo.parameters.parameter_set import CONFIDENCE
@@ -47,84 +45,72 @@ _OTHER_SETTING = 0.1
 """Default relative limit [-] of all other parameters, such as settings of valves and effects."""
 _LARGEST_FRACTION = 0.5
 """Largest relative limit [-] that may be stated; beyond it a sensor is broken rather than inaccurate."""
-_UNITS = {
-    **dict.fromkeys(("load", "gain", "gas_law", "zero_of_flow", "friction", "held"), "1"),
-    **dict.fromkeys(("supply", "zero_of_pressure", "start_of_pressure"), "Pa_d"),
-    **dict.fromkeys(("zero_of_angle", "start_of_angle"), "rad"),
-    **{"lag": "s", "gas_temperature": "K", "stribeck_velocity": "rad/s"},
-}
 Columns = Annotated[Text | None, Field(description="name of a column map; default: units in the header of the file")]
 Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals; default 0.95")]
 
 
-class BenchSection(StrictTable):
-    """Table [bench] of a problem file: tolerances as limits (+-); 0 for an exact value."""
+Limit = Annotated[float, Quantified("1", 0.0, _LARGEST_FRACTION)]
+PressureLimit = Annotated[float, Quantified("Pa_d", 0.0)]
+AngleLimit = Annotated[float, Quantified("rad", 0.0)]
 
-    load: Text | None = Field(None, description="tolerance of the external torque, for each recording; default 2 %")
-    supply: Text | None = Field(
-        None, description="tolerance of each supply pressure, for each recording; default 1 psi_d"
+
+class Tolerances(StrictTable):
+    """Table [bench] of a problem file: limits (+-) of uncertain quantities, in SI or as fractions; 0 for an exact one.
+
+    None means the default of the channel or parameter. Errors named in ``each_recording`` differ between recordings.
+    """
+
+    load: Limit = Field(
+        default_factory=lambda: 0.02, description="tolerance of the external torque, for each recording; default 2 %"
     )
-    zero_of_angle: Text | None = Field(None, description="tolerance of the zero of the angle sensor; default 0.5 deg")
-    zero_of_pressure: Text | None = Field(
-        None, description="tolerance of the zero of each pressure sensor; default 0.3 psi_d"
+    supply: PressureLimit = Field(
+        default_factory=lambda: SUPPLY_ERROR,
+        description="tolerance of each supply pressure, for each recording; default 1 psi_d",
     )
-    gain: Text | None = Field(
+    zero_of_angle: AngleLimit = Field(
+        default_factory=lambda: ANGLE_ERRORS.zero,
+        description="tolerance of the zero of the angle sensor; default 0.5 deg",
+    )
+    zero_of_pressure: PressureLimit = Field(
+        default_factory=lambda: PRESSURE_ERRORS.zero,
+        description="tolerance of the zero of each pressure sensor; default 0.3 psi_d",
+    )
+    gain: Limit | None = Field(
         None, description="tolerance of the gain of each sensor; default 0.5 %, 0 % for the angle sensor"
     )
-    lag: Text | None = Field(
+    lag: Annotated[float, Quantified("s", 0.0)] | None = Field(
         None, description="tolerance of the time constant of each sensor; default 20 ms, 1 ms for the angle sensor"
     )
-    start_of_angle: Text | None = Field(
+    start_of_angle: AngleLimit | None = Field(
         None,
         description="tolerance of the initial angle of each recording, unless at a stop; default 0.05 deg if it is "
         "read from the recording, else as zero_of_angle",
     )
-    start_of_pressure: Text | None = Field(
+    start_of_pressure: PressureLimit | None = Field(
         None, description="tolerance of both initial pressures; default: the noise of a sample if they are measured"
     )
     each_recording: tuple[Sensed, ...] = Field(
         (), strict=False, description="sensor errors that differ between recordings: 'zero', 'gain'; default: none"
     )
-    gas_temperature: Text | None = Field(
+    gas_temperature: Annotated[float, Quantified("K", 0.0)] | None = Field(
         None, description="tolerance of the gas temperature; default: from the set, else 15 K"
     )
-    gas_law: Text | None = Field(None, description="deviation of the gas from the ideal gas law; default 1 %")
-    stribeck_velocity: Text | None = Field(
-        None, description="speed up to which static friction may last, unless an effect gives it; default 0.5 rad/s"
+    gas_law: Limit | None = Field(None, description="deviation of the gas from the ideal gas law; default 1 %")
+    stribeck_velocity: Annotated[float, Quantified("rad/s", 0.0)] = Field(
+        default_factory=lambda: 0.5,
+        description="speed up to which static friction may last, unless an effect gives it; default 0.5 rad/s",
     )
-    zero_of_flow: Text | None = Field(
-        None, description="tolerance of the zero of the flow meter, relative to its largest reading; default 5 %"
+    zero_of_flow: Limit = Field(
+        default_factory=lambda: 0.05,
+        description="tolerance of the zero of the flow meter, relative to its largest reading; default 5 %",
     )
-    friction: Text | None = Field(
-        None, description="variation of friction between recordings; default 5 % if a procedure has several"
+    friction: Limit = Field(
+        default_factory=lambda: 0.05,
+        description="variation of friction between recordings; default 5 % if a procedure has several",
     )
-    held: Text | None = Field(
+    held: Limit | None = Field(
         None, description="uncertainty of values of the set that state none; default: 1 to 50 % by kind"
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Tolerances:
-    """Limits (+-) of the uncertain quantities of a bench, in SI units or as fractions; 0 for an exact quantity.
-
-    None means the default of the channel or parameter. Errors named in ``each_recording`` differ between recordings.
-    """
-
-    load: float = 0.02
-    supply: float = SUPPLY_ERROR
-    zero_of_angle: float = ANGLE_ERRORS.zero
-    zero_of_pressure: float = PRESSURE_ERRORS.zero
-    gain: float | None = None
-    lag: float | None = None
-    start_of_angle: float | None = None
-    start_of_pressure: float | None = None
-    gas_temperature: float | None = None
-    gas_law: float | None = None
-    stribeck_velocity: float = 0.5
-    zero_of_flow: float = 0.05
-    friction: float = 0.05
-    held: float | None = None
-    each_recording: tuple[Sensed, ...] = ()
 
     def zero_of(self, channel: str) -> float:
         """Return the limit of the zero error of a channel [rad], [Pa]."""
@@ -159,24 +145,8 @@ class Tolerances:
         return deviation_of_limit(abs(value) * (HELD.get(path, _OTHER_SETTING) if self.held is None else self.held))
 
 
-DEFAULTS = Tolerances()
+DEFAULTS = Tolerances.model_construct()
 """Tolerances of a bench without a table [bench]."""
-
-
-def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
-    """Return the tolerances of a table [SI], or the defaults. Raises IdentificationError for a negative limit."""
-    limits = {}
-    for name, unit in _UNITS.items():
-        text = None if section is None else getattr(section, name)
-        if text is None:
-            continue
-        where = f"{file}: bench: {name}"
-        limit = limits[name] = quantity_of(where, text, unit)
-        # Half of a number on either side is no tolerance of a bench any more, and a misplaced point in most cases.
-        if not 0.0 <= limit < math.inf or (unit == "1" and limit > _LARGEST_FRACTION):
-            most = f" and at most {_LARGEST_FRACTION:.0%}" if unit == "1" else ""
-            raise IdentificationError(f"{where} = '{text}': must be 0 or above{most}")
-    return Tolerances(**limits, each_recording=() if section is None else section.each_recording)
 
 
 def quantity_of(where: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
@@ -186,33 +156,3 @@ def quantity_of(where: str, text: str, unit: str, atmosphere: float = STANDARD_A
     """
     with refused_as(IdentificationError, f"{where} = '{text}'", UnitError):
         return parse_quantity(text, unit, atmosphere)
-
-
-def quantity_in(
-    table: StrictTable,
-    key: str,
-    unit: str,
-    where: str,
-    low: float = -math.inf,
-    high: float = math.inf,
-    atmosphere: float = STANDARD_ATMOSPHERE,
-) -> float | None:
-    """Return the value of a key in ``unit``, None if the key is absent; ``where`` is the prefix of messages.
-
-    Raises IdentificationError if the text does not fit the unit or the number is not from ``low`` to ``high``.
-    """
-    text = getattr(table, key)
-    if text is None:
-        return None
-    value = quantity_of(f"{where}: {key}", text, unit, atmosphere)
-    if not low <= value <= high:
-        raise IdentificationError(f"{where}: {key} = {text!r} must be from {low:g} to {high:g} {unit}")
-    return value
-
-
-def positive_in(table: StrictTable, key: str, unit: str, where: str) -> float | None:
-    """Return the positive value of a key in ``unit``, None if absent. Raises IdentificationError unless above zero."""
-    value = quantity_in(table, key, unit, where)
-    if value is not None and value <= 0.0:
-        raise IdentificationError(f"{where}: {key} = {getattr(table, key)!r} must be above zero")
-    return value

@@ -25,11 +25,12 @@ from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, text_of, write_file
-from ppafo.wording import LONGEST_SHOWN, argument_text, finite_number, first_twice, nearest_name, one_line
+from ppafo.wording import LONGEST_SHOWN, finite_number, first_twice, nearest_name, one_line
 
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
 _ONLY_SIMULATED = "supplied_mass"
+_MAPPED = "; other names are read through a column map"
 _NO_TIMES = f'for a table without a time column, give the sample rate in the map: {TIME} = {{ rate = "100 Hz" }}'
 
 
@@ -65,7 +66,7 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
             shown = one_line(cell if len(cell) <= 40 else f"{cell[:36]} ...")
             raise DataError(
                 f"the header must name columns as 'name [unit]', separated by commas, not as '{shown}'"
-                f"{_column_map_remedy()}, for another delimiter or a decimal comma too"
+                f"{_MAPPED}, for another delimiter or a decimal comma too"
             )
         name, unit, word = match[1], "Pa" if match[2] == _LEVEL else match[2], match[3]
         # Time itself does nothing between its samples.
@@ -76,18 +77,11 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
         columns.append(HeaderColumn(name, unit, between))
     names = [column.name for column in columns]
     if names[0] != TIME:
-        raise DataError(
-            f"the first column must be '{TIME} [{TIME_UNIT}]', not '{names[0]}'{_column_map_remedy()}; {_NO_TIMES}"
-        )
+        raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', not '{names[0]}'{_MAPPED}; {_NO_TIMES}")
     twice = first_twice(names)
     if twice is not None:
         raise DataError(f"the column '{twice}' occurs twice; rename or remove one of them")
     return columns
-
-
-def _column_map_remedy() -> str:
-    """Return the remedy, appended to messages, to read columns with other names through a column map."""
-    return f"; other names are read through a column map: {argument_text('columns', 'FILE.toml:NAME')}"
 
 
 def is_of_frame(cells: Sequence[str]) -> bool:

@@ -15,7 +15,7 @@ from ppafo.signals import Recording, recording_kind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.comma_separated import parse_header, read_csv, recording_of_columns
 from ppafo.storage.result_folder import CSV_FILE, MANIFEST, NETCDF_FILE, RUN_FILE, read_document, read_stored
-from ppafo.wording import argument_text, one_line
+from ppafo.wording import one_line
 
 if TYPE_CHECKING:
     from pandas import DataFrame  # type: ignore[import-untyped]
@@ -184,6 +184,6 @@ def read_recording(
     if not file.exists():
         raise DataError(f"{file}: no such file or folder")
     raise DataError(
-        f"{file}: must be a result folder or a .nc, .parquet, {', '.join(TEXT_SUFFIXES)} or (through a column map, "
-        f"{argument_text('columns', 'FILE.toml:NAME')}) .mat or other text file"
+        f"{file}: must be a result folder or a .nc, .parquet, {', '.join(TEXT_SUFFIXES)} or (through a column map) "
+        ".mat or other text file"
     )

@@ -27,7 +27,6 @@ from ppafo.validation.settings import (
     PRESSURE_DIFFERENCE,
     ErrorLimit,
     ReplaySettings,
-    initial_remedies,
 )
 from ppafo.wording import argument_text
 
@@ -247,7 +246,7 @@ def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySetti
     if motion == "measured" and ANGLE not in measured.recording:
         prescribed = argument_text("motion", "measured")
         raise DataError(f"{measured.file}: {prescribed} needs a channel '{ANGLE}', which the recording does not have")
-    start = start_of(measured.recording, device, initial, measured.file, initial_remedies())
+    start = start_of(measured.recording, device, initial, measured.file)
     return Replay(measured, device, start, motion, settings.longest_delay, settings.leg)
 
 
@@ -258,17 +257,6 @@ def compare_recording(measured: MeasuredRecording, device: Device, settings: Rep
     if isinstance(replayed, PpafoError):
         raise replayed
     return agreement_of(request, replayed, settings)
-
-
-def _late_command(recording: Recording) -> str:
-    """Return a clause on a command with zero-order hold that changes at most samples, if there is one; else ""."""
-    if "command" not in recording or not recording.is_held("command"):
-        return ""
-    if np.mean(np.diff(recording["command"]) != 0.0) <= 0.5:
-        return ""
-    # Half a sample, on average.
-    late = 500.0 * float(np.median(np.diff(recording.time)))
-    return f'; a command without steps is read {late:.3g} ms late: give between = "linear" in its column'
 
 
 def agreement_of(
@@ -289,8 +277,7 @@ def agreement_of(
     elif delay.value < 0.0:
         remarks.append(
             f"the recorded signals lead the model by {1.0e3 * -delay.value:.3g} ms; sensors lag, so this was not "
-            "removed: check the dynamics of the model (valve delay, friction, inertia), the clock and the columns"
-            f"{_late_command(measured.recording)}"
+            "removed"
         )
     return RecordingAgreement(
         file=measured.file,
@@ -341,7 +328,7 @@ def _curves(
                     model_values=model[name],
                     full_range=channel.full_range(device, gauge),
                     usual_zero=channel.usual_zero(device),
-                    limit=settings.thresholds.limit(name),
+                    limit=settings.thresholds.get(name, settings.thresholds.get("")),
                 )
             )
     if not curves:
@@ -352,7 +339,7 @@ def _curves(
 
 @in_units(lambda _, device, *__: device.shown)
 def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> tuple[str, ...]:
-    """Return remarks on assumptions that differ from set or recording: supply pressure, sample times, vane motion."""
+    """Return remarks on assumptions that differ from set or recording: supply pressure, sample times."""
     remarks = []
     gauge_of_set = device.supply.pressure - device.supply.atmospheric_pressure
     recorded_gauge = supply_gauge(measured.recording, device)
@@ -373,12 +360,4 @@ def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettin
         remarks.append(f"the supply pressure was not recorded; {' and '.join(shown)} {verb} used")
     if regular_interval(measured.recording.time) is None:
         remarks.append("samples are not equally spaced in time; changes of the command were moved to the nearest step")
-    if settings.volume is not None:
-        remarks.append(
-            f"chamber 1 was treated as a fixed volume of {shown_text(settings.volume, 'm^3', '.4g')} without a vane"
-        )
-    elif settings.motion == "locked":
-        remarks.append("the vane was locked at its initial angle; the angle is not compared")
-    if settings.motion == "measured":
-        remarks.append("the recorded angle was prescribed and is therefore not compared")
     return tuple(remarks)

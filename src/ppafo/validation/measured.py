@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
@@ -29,7 +28,7 @@ from ppafo.storage.reading import read_recording
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units.shown import in_units, shown_text
 from ppafo.validation.settings import COMPARED, PRESSURE_1, PRESSURE_2
-from ppafo.wording import count_of, nearest_name, override_text
+from ppafo.wording import count_of, nearest_name
 
 MINIMUM_SAMPLES = 10
 """Least number of samples of a recording."""
@@ -40,10 +39,6 @@ _ABOVE_SUPPLY = 0.05
 """Largest disagreement of two pressure sensors, as a fraction of the gauge supply pressure [-]."""
 _ROUNDING = 1.0e-9
 """Relative pressure difference [-] due to rounding, by which a settled chamber may exceed its supply."""
-_KILOPASCALS_AS_PSI = 1.0e3 / PASCALS_PER_PSI
-"""Factor [-] that corrects a pressure in kPa read as psi."""
-_LEAST_OF_SUPPLY = 0.5
-"""Least peak chamber pressure after correction of the unit, as a fraction of the supply [-], to suggest the unit."""
 _MAXIMUM_RANGES = 20.0
 """Largest plausible reading in full ranges [-]; a larger reading means a damaged line or a wrong unit."""
 _MINIMUM_CHANGE = 0.01
@@ -132,7 +127,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
             where = f"{recording.time[worst]:.6g} s (sample {worst + 1})"
             raise DataError(
                 f"{file}: '{name}' is {shown_text(recording[name][worst], recording.unit(name))} at {where}, more than "
-                f"{_MAXIMUM_RANGES:g} times what {device.name} can reach; check the unit of the channel"
+                f"{_MAXIMUM_RANGES:g} times what {device.name} can reach"
             )
     _check_pressures(recording, device, file)
     gauge = supply_gauge(recording, device)
@@ -148,7 +143,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     if max(fractions) < _MINIMUM_CHANGE:
         raise DataError(
             f"{file}: {', '.join(compared)} change by less than {_MINIMUM_CHANGE:.0%} of full range, which is too "
-            "little to test a model; give a recording with larger changes"
+            "little to test a model"
         )
     intervals = np.diff(recording.time)
     wide = np.flatnonzero(intervals > _REMARKED_GAP * np.median(intervals))
@@ -168,10 +163,7 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
             raise DataError(f"{file}: channel '{name}' is unknown{hint}")
     if COMMAND not in recording:
         names = ", ".join(recording.names)
-        remedy = f'for a constant command write {COMMAND} = {{ constant = "1" }} in a column map'
-        raise DataError(
-            f"{file}: there is no channel '{COMMAND}', which the replay needs; available: {names}; {remedy}"
-        )
+        raise DataError(f"{file}: there is no channel '{COMMAND}', which the replay needs; available: {names}")
     if not any(name in recording for name in COMPARED):
         raise DataError(f"{file}: has none of the channels to compare: {', '.join(COMPARED)}")
     return tuple(f"channel '{name}' is unknown and was ignored" for name in unknown)
@@ -189,15 +181,9 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
     for name in (name for name in (PRESSURE_1, PRESSURE_2) if name in recording):
         level = max(float(recording[name][0]), float(np.median(recording[name])))
         if level > allowed * (1.0 + _ROUNDING):
-            atmosphere, is_recorded = supply.atmospheric_pressure, SUPPLY in recording
-            shown = [shown_text(pressure, "Pa_a", ".4g", atmosphere) for pressure in (level, highest)]
-            owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
-            given = override_text([f"supply.pressure={shown[0]}"])
-            remedy = "check both sensors" if is_recorded else f"record the supply pressure, or give {given}"
-            top = float(recording[name].max()) - atmosphere
-            if _LEAST_OF_SUPPLY * (highest - atmosphere) < top * _KILOPASCALS_AS_PSI < allowed - atmosphere:
-                remedy += f"; '{name}' looks like kPa read as psi"
-            raise DataError(f"{file}: '{name}' stays at {shown[0]}, above {owner}, {shown[1]}: {remedy}")
+            shown = [shown_text(pressure, "Pa_a", ".4g", supply.atmospheric_pressure) for pressure in (level, highest)]
+            owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
+            raise DataError(f"{file}: '{name}' stays at {shown[0]}, above {owner}, {shown[1]}")
 
 
 def supply_gauge(recording: Recording, device: Device) -> float:

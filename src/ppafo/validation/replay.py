@@ -106,12 +106,8 @@ def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: 
     failure_time = float(ends[rows["result.failure_time"]])
     if failure_time < NEVER_FAILED or not np.isfinite(record).all():
         until = min(failure_time, run.step * run.step_count)
-        remedy = "check the volumes, the inertia and the valve of the set (ppafo sets audit)"
-        if ends[rows["result.too_many_parts"]]:
-            remedy = TOO_MANY_PARTS
-        return SimulationError(
-            f"{request.measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}"
-        )
+        why = f"; {TOO_MANY_PARTS}" if ends[rows["result.too_many_parts"]] else ""
+        return SimulationError(f"{request.measured.file}: the model diverged {until:.6g} s after the first sample{why}")
     recorded = request.measured.recording
     angle = record[:, rows["state.angle"]]
     mass_1, mass_2 = record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]]
@@ -164,8 +160,7 @@ def _plan(request: Replay) -> Run:
     if run.step_count > MAXIMUM_STEPS:
         raise DataError(
             f"{request.measured.file}: {scenario.run.duration:.4g} s would take {run.step_count} steps of "
-            f"{run.step:.2g} s, but at most {MAXIMUM_STEPS} are allowed; split the recording or, if its times are not "
-            "in seconds, give their unit"
+            f"{run.step:.2g} s, but at most {MAXIMUM_STEPS} are allowed"
         )
     supply = request.device.supply
     plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)

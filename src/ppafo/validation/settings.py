@@ -9,7 +9,7 @@ from ppafo.parameters.device import Device
 from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS
 from ppafo.simulation.scenario import Leg
 from ppafo.units import parse_quantity, split_quantity
-from ppafo.wording import argument_text, known_names, nearest_name, one_line
+from ppafo.wording import known_names, nearest_name, one_line
 
 ANGLE, PRESSURE_1, PRESSURE_2 = "angle", "pressure_1", "pressure_2"
 PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
@@ -64,7 +64,6 @@ EXPLAINED_FRACTION = 0.5
 """Least explained fraction of signal variance (R^2) [-] for an acceptable model; the mean explains 0."""
 
 _FRACTION_UNITS = ("%", "percent")
-_LIMIT_EXAMPLES = "for example 'angle=10%', 'pressure_1=3.7 psi_d', or '5%' for all channels"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,50 +78,26 @@ class ErrorLimit:
         return self.value if self.is_fraction else self.value / full_range
 
 
-@dataclass(frozen=True, slots=True)
-class Thresholds:
-    """Error limits by channel (``channels``), and limit of other channels (``others``, None for the default)."""
+def parse_thresholds(texts: Iterable[str] = ()) -> dict[str, ErrorLimit]:
+    """Parse thresholds such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%`` to limits by channel, "" for others.
 
-    others: ErrorLimit | None
-    channels: Mapping[str, ErrorLimit]
-
-    def limit(self, channel: str) -> ErrorLimit | None:
-        """Return the limit that the user set for a channel, None for the default limit."""
-        return self.channels.get(channel, self.others)
-
-
-def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
-    """Parse thresholds such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later texts override.
-
-    Raises DataError for a channel that is not compared, or a limit that is not above 0.
+    Later texts override. Raises DataError for a channel that is not compared, or a limit that is not above 0.
     """
-    others = None
-    channels: dict[str, ErrorLimit] = {}
+    limits: dict[str, ErrorLimit] = {}
     for text in texts:
-        name, separator, value = text.rpartition("=")
-        if separator:
-            channel = name.strip()
-            if channel not in COMPARED:
-                names = known_names(channel, COMPARED)
-                raise DataError(f"threshold '{one_line(text)}': there is no channel '{one_line(channel)}'{names}")
-            channels[channel] = _limit(value, text, COMPARED[channel].unit)
-        else:
-            others = _limit(value, text, "")
-    return Thresholds(others, channels)
-
-
-def _limit(value: str, text: str, unit: str) -> ErrorLimit:
-    """Parse a limit in ``value``: a fraction for percent, else SI; messages quote the whole ``text``."""
-    try:
-        is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
-        number = parse_quantity(value, "" if is_fraction else unit)
-    except UnitError as error:
-        raise DataError(f"threshold '{one_line(text)}': {error}; {_LIMIT_EXAMPLES}") from error
-    if not unit and not is_fraction:
-        raise DataError(f"threshold '{one_line(text)}': a limit for all channels must be in %, for example '5%'")
-    if number <= 0.0:
-        raise DataError(f"threshold '{one_line(text)}': must be above 0; {_LIMIT_EXAMPLES}")
-    return ErrorLimit(number, is_fraction)
+        channel, separator, value = (part.strip() for part in text.rpartition("="))
+        where = f"threshold '{one_line(text)}'"
+        if separator and channel not in COMPARED:
+            raise DataError(f"{where}: there is no channel '{one_line(channel)}'{known_names(channel, COMPARED)}")
+        with refused_as(DataError, where, UnitError):
+            is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
+            number = parse_quantity(value, COMPARED[channel].unit if separator and not is_fraction else "")
+        if not separator and not is_fraction:
+            raise DataError(f"{where}: a limit for all channels must be in %")
+        if number <= 0.0:
+            raise DataError(f"{where}: must be above 0")
+        limits[channel] = ErrorLimit(number, is_fraction)
+    return limits
 
 
 Motion = Literal["free", "measured", "locked", "leg"]
@@ -134,7 +109,6 @@ LARGEST_DELAY = 1.0
 """Largest delay limit that a user may set [s]."""
 _UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
 """Unit of an initial value by channel."""
-_EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2: "pressure_2=50 psi_g"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +125,7 @@ class ReplaySettings:
     motion: Motion = "free"
     initial: Mapping[str, float] = field(default_factory=dict)
     longest_delay: float = DEFAULT_LIMIT
-    thresholds: Thresholds = field(default_factory=parse_thresholds)
+    thresholds: Mapping[str, ErrorLimit] = field(default_factory=dict)
     volume: float | None = None
     leg: Leg | None = None
 
@@ -174,7 +148,7 @@ def replay_settings(
         hint = nearest_name(motion, MOTIONS)
         raise DataError(f"motion '{one_line(motion)}': must be one of {', '.join(MOTIONS)}{hint}")
     if volume is not None and chosen != "free":
-        raise DataError(f"motion '{chosen}': a fixed volume has no moving vane; give motion or volume, not both")
+        raise DataError(f"motion '{chosen}': a fixed volume has no moving vane")
     states = parse_initial(initial, device.supply.atmospheric_pressure)
     return ReplaySettings(chosen, states, longest_delay, parse_thresholds(thresholds), volume)
 
@@ -188,9 +162,7 @@ def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals:
-            raise DataError(
-                f"initial value '{one_line(text)}' is not of the form CHANNEL=VALUE, for example '{_EXAMPLES[ANGLE]}'"
-            )
+            raise DataError(f"initial value '{one_line(text)}' is not of the form CHANNEL=VALUE")
         if name not in _UNITS:
             raise DataError(
                 f"initial value '{one_line(text)}': there is no channel '{one_line(name)}'{known_names(name, _UNITS)}"
@@ -198,8 +170,3 @@ def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
         with refused_as(DataError, f"initial value '{one_line(text)}'", UnitError):
             values[name] = parse_quantity(value, _UNITS[name], atmosphere)
     return values
-
-
-def initial_remedies() -> dict[str, str]:
-    """Return by channel the remedy for an initial value that was not recorded."""
-    return {name: f"give its initial value, {argument_text('initial', example)}" for name, example in _EXAMPLES.items()}

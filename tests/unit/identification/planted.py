@@ -1,11 +1,20 @@
-"""Recordings with known values planted, for the tests of the bench procedures."""
+"""Recordings with known values planted, and the bench laws on a set that has no other numbers than a test gives."""
+
+import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ppafo.identification.bench.flow import GasAt, Opening, OpeningSizes, orifice_shape
+from ppafo.identification.bench.law import BenchContext, BenchResult
 from ppafo.identification.bench.valve_map import area_of_command, spool_of
 from ppafo.identification.bench.vane_leak import pressures_of_fall
+from ppafo.identification.procedures import LAWS
 from ppafo.identification.source import RecordingSource
+from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.parameters.loading import load_parameter_set
+from ppafo.parameters.parameter_set import Entry
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 
@@ -121,3 +130,73 @@ def sweep(dead_band: float = 0.12, width: float = 0.04, sign: float = 1.0, seed:
         upstream_pressure=(upstream, "Pa"),
         downstream_pressure=(downstream, "Pa"),
     )
+
+
+Sources = tuple[RecordingSource, ...]
+Numbers = dict[str, tuple[float | None, str]]
+"""Numbers of a set with their units, None for one that it lacks."""
+
+
+def of_law(kind: str, sources: Sources, tolerances: Tolerances, numbers: Numbers, **keys: Any) -> BenchResult:
+    """What a law makes of recordings, with keys of its table."""
+    entries = {
+        path: Entry(value, unit, "assumed", "a test") for path, (value, unit) in numbers.items() if value is not None
+    }
+    context = BenchContext(
+        replace(load_parameter_set("ppafo2011"), numbers=entries), "proportional", "here", tolerances
+    )
+    given = {name: value for name, value in keys.items() if value is not None}
+    sources = tuple(replace(source, user=kind) for source in sources)
+    return LAWS[kind].model_validate({"kind": kind, "recordings": ["a.csv"], **given}).run(sources, context)
+
+
+def in_gas(kind: str, sources: Sources, gas: GasAt, tolerances: Tolerances, more: Numbers, **keys: Any) -> BenchResult:
+    """What a law of flow makes of recordings with a gas."""
+    numbers: Numbers = {
+        "gas.molar_mass": (gas.molar_mass, "kg/mol"),
+        "gas.heat_capacity_ratio": (gas.heat_capacity_ratio, ""),
+        "gas.temperature": (gas.temperature, "K"),
+    }
+    tolerances = tolerances.model_copy(update={"gas_temperature": math.sqrt(3.0) * gas.temperature_deviation})
+    return of_law(kind, sources, tolerances, numbers | more, **keys)
+
+
+def static_torque(sources: Sources, tolerances: Tolerances = DEFAULTS) -> BenchResult:
+    return of_law("static-torque", sources, tolerances, {})
+
+
+def free_decay(
+    sources: Sources, inertia: str = "unknown", rise: float = 1.0, tolerances: Tolerances = DEFAULTS, **keys: Any
+) -> BenchResult:
+    numbers: Numbers = {
+        f"friction.{kind}_torque": (size, "N m") for kind, size in (("static", 1.0 + rise), ("dynamic", 1.0))
+    }
+    return of_law("free-decay", sources, tolerances, numbers, inertia=inertia, **keys)
+
+
+def open_valve_flow(
+    sources: Sources, gas: GasAt, law: str = "orifice", area: float | None = None, tolerances: Tolerances = DEFAULTS
+) -> BenchResult:
+    area_of_set: Numbers = {"valves.proportional.area": (area, "m^2")}
+    return in_gas("open-valve-flow", sources, gas, tolerances, area_of_set, law=law)
+
+
+def valve_map(sources: Sources, gas: GasAt, **keys: Any) -> BenchResult:
+    return in_gas("valve-map", sources, gas, DEFAULTS, {}, **keys)
+
+
+def vane_leak(
+    sources: Sources,
+    gas: GasAt,
+    *volumes: float,
+    discharge_coefficient: float | None = None,
+    critical_ratio: float | None = None,
+    law: str = "orifice",
+    tolerances: Tolerances = DEFAULTS,
+) -> BenchResult:
+    numbers: Numbers = {
+        "actuator.leak.discharge_coefficient": (discharge_coefficient, ""),
+        "actuator.leak.critical_ratio": (critical_ratio, ""),
+    }
+    stated = {f"volume_{number}": f"{volume!r} m^3" for number, volume in enumerate(volumes, 1)}
+    return in_gas("vane-leak", sources, gas, tolerances, numbers, law=law, **stated)

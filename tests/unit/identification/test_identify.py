@@ -12,10 +12,11 @@ import pytest
 from ppafo.analyses.identify import Identification, finding_of, identify
 from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
+from ppafo.identification.bench.free_decay import FreeDecayProblem
+from ppafo.identification.bench.law import BenchContext
+from ppafo.identification.bench.vane_leak import VaneLeakProblem
 from ppafo.identification.estimate import UNKNOWN, Estimate, relative_half_width
 from ppafo.identification.new_set import with_estimates
-from ppafo.identification.problem import json_schema, parse_problem
-from ppafo.identification.procedures import FreeDecayProblem, ProcedureContext, VaneLeakProblem
 from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import FittedExperiment, stated_by, tolerance_parameters
 from ppafo.parameters import apply_overrides, build_device
@@ -162,13 +163,6 @@ def test_every_planted_value_gets_into_the_new_set_with_interval_and_origin(solv
     assert "Before, the set had 0.3 mm^2 (published" in entry.note
 
 
-def test_values_are_counted_as_those_of_the_set_beside_others_that_are_identified(solved: Solve) -> None:
-    outcome = solved(STATIC)
-    count = len(outcome.new_set.written)
-    assert sum(item.is_identified for item in outcome.estimates) > count > 0
-    assert f"new set 'twin': {count} values of the set identified: " in text_of(finding_of(outcome))
-
-
 def test_an_identified_set_is_audited_without_what_was_reported_of_the_set_that_it_came_from(solved: Solve) -> None:
     before = load_parameter_set("ppafo2011")
     assert any(path.startswith("reported.") for path in before.numbers)
@@ -282,11 +276,6 @@ def test_figures_and_files_are_there_for_each_procedure_and_figure_3_for_both(so
     assert "figure-3.png" not in files_of(finding_of(solved(STATIC)))
 
 
-def test_the_published_schema_knows_every_procedure() -> None:
-    text = json.dumps(json_schema())
-    assert all(name in text for name in ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"))
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -295,15 +284,15 @@ def test_the_published_schema_knows_every_procedure() -> None:
         (f"{STATIC}colums = 'rig'\n", "did you mean 'columns'"),
         (f"{STATIC}columns = 'rig'\n", "procedure 1: there is no column map 'rig'; available: none"),
         (STATIC.replace("static.csv", "nowhere.csv"), "nowhere.csv"),
-        (STATIC.replace("static.csv", "decay.csv"), "decay.csv: static-torque needs a channel 'torque [N m]'"),
-        (f'{DECAY}start = "2 m"\n', "procedure 1, free-decay: start = '2 m': unit 'm' does not fit"),
-        (f'{DECAY}inertia = "0 kg m^2"\n', "must be above zero"),
+        (STATIC.replace("static.csv", "decay.csv"), "decay.csv: static-torque: needs a channel 'torque [N m]'"),
+        (f'{DECAY}start = "2 m"\n', "procedure.1.start = '2 m': unit 'm' does not fit"),
+        (f'{DECAY}inertia = "0 kg m^2"\n', "must be above 0 kg m^2"),
         (f'{FLOW}valve = "proportionl"\n', "did you mean 'proportional'"),
-        (f'{FLOW}temperature = "17 K"\n', "temperature = '17 K' must be from 150 to 600 K"),
+        (f'{FLOW}temperature = "17 K"\n', "temperature = '17 K': must be at least 150 and at most 600 K"),
         (f'{FLOW}temperature = "17 kg"\n', "temperature = '17 kg': unit 'kg' does not fit"),
         (f'{FLOW}gas = "CO3"\n', "gas = 'CO3' is unknown, did you mean 'CO2'"),
         (LEAK.replace('volume_1 = "60 cm^3"', 'angle = "200 deg"'), "lies beyond the stops"),
-        (LEAK.replace("60 cm^3", "0 cm^3"), "volume_1 = '0 cm^3' must be above zero"),
+        (LEAK.replace("60 cm^3", "0 cm^3"), "volume_1 = '0 cm^3': must be above 0 m^3"),
         ('procedure = "none"\n', "procedure"),
         (f"{STATIC}{MAPPED}direction.thresold = 3\n", "did you mean 'threshold'"),
         (f"{STATIC}{MAPPED}channels.time.colum = 3\n", "did you mean 'column'"),
@@ -340,11 +329,6 @@ def test_what_a_column_map_has_wrong_and_what_it_lacks_are_one_refusal(bench: Pa
         )
 
 
-def test_a_problem_without_a_device_is_refused() -> None:
-    with pytest.raises(PpafoError, match=r"p\.toml: .*device"):
-        parse_problem(b'schema_version = 1\nname = "a"\n', "p.toml")
-
-
 def test_a_refusal_about_all_recordings_names_the_procedure_of_the_file(solved: Solve, bench: Path) -> None:
     leak = read_recording(bench / "leak.csv", atmosphere=101325.0)
     first, second = (leak.channels[name] for name in ("pressure_1", "pressure_2"))
@@ -362,7 +346,7 @@ def test_the_leak_of_a_cylinder_is_identified_as_that_of_a_vane(bench: Path) -> 
     assert outcome.new_set.written == ("actuator.leak.area",)
     assert outcome.results[0].estimates[0].value == pytest.approx(0.3e-6 * 0.113 / 0.6, rel=0.05)
     (bench / "problem.toml").write_text(head + LEAK.partition("volume_1")[0] + 'angle = "60 deg"\n')
-    with pytest.raises(PpafoError, match="give volume_1 and volume_2"):
+    with pytest.raises(PpafoError, match="allowed: volume_1, volume_2"):
         identify(bench / "problem.toml")
 
 
@@ -423,7 +407,6 @@ def test_a_laminar_coefficient_of_another_gas_is_not_written_to_the_set(bench: P
     assert of_air.results[0]["vane_leak.laminar_coefficient"].is_identified
     (remark,) = of_air.results[0].remarks
     assert f"{gap} is not written to the set" in remark
-    assert "times 1.52 (molar masses)" in remark
 
 
 @pytest.mark.parametrize(
@@ -464,16 +447,18 @@ def test_the_gas_temperature_is_known_as_well_as_it_is_stated(solved: Solve, ben
 
 
 def test_bench_and_trajectory_hold_a_number_alike() -> None:
-    chosen, device = ProcedureContext(load_parameter_set("ppafo2011"), "proportional", "here"), load_device("ppafo2011")
+    chosen, device = BenchContext(load_parameter_set("ppafo2011"), "proportional", "here"), load_device("ppafo2011")
     scenario = load_scenario("step-response", ["motion.kind=free"])
     experiment = FittedExperiment("step", scenario, simulate(scenario).recording)
     stated = stated_by(chosen.parameter_set, scenario)
-    held = {one.path: one.deviation for one in tolerance_parameters(Tolerances(), (experiment,), (), stated)}
+    held = {
+        one.path: one.deviation for one in tolerance_parameters(Tolerances.model_construct(), (experiment,), (), stated)
+    }
     leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle="60 deg")
     decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",))
     told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2")
     assert decay.inertia_of(chosen)[1] == held["foot_plate.inertia"] == told.inertia_of(chosen)[1]
-    assert chosen.gas(leak, ()).temperature_deviation == held["gas.temperature"]
+    assert leak.gas_of((), chosen).temperature_deviation == held["gas.temperature"]
     # The displacement is known as well as the torque constant, which it follows.
     swept = math.radians(60.0) - device.actuator.angle_min
     volume = math.hypot(held["actuator.dead_volume_1"], swept * held["actuator.torque_constant"])
@@ -491,24 +476,8 @@ def test_a_measured_gas_temperature_takes_the_place_of_the_set_s(solved: Solve) 
     assert cool.value / plain.value == pytest.approx((290.0 / 298.0) ** 0.5, rel=1e-4)
 
 
-def test_a_procedure_that_is_spelt_with_underscores_is_answered_with_its_name() -> None:
-    former = f'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n{STATIC}'.replace("static-t", "static_t")
-    with pytest.raises(IdentificationError, match="kind = 'static_torque' is not known, did you mean 'static-torque'"):
-        parse_problem(former.encode(), "bench.toml")
-
-
 def estimate(value: float, low: float, high: float, verdict: str = "identified") -> Estimate:
     return Estimate("a.b", value, "m", low, high, verdict, "why", ("file sha256:0",))  # type: ignore[arg-type]
-
-
-def test_an_identified_value_outside_its_interval_is_refused() -> None:
-    with pytest.raises(IdentificationError, match="must lie inside its interval"):
-        estimate(4.0, 1.0, 3.0)
-
-
-def test_a_value_that_could_not_be_told_may_be_no_number() -> None:
-    nothing = estimate(math.nan, math.nan, math.nan, "not identifiable")
-    assert not nothing.is_usable
 
 
 @pytest.mark.parametrize(
@@ -530,11 +499,6 @@ def test_an_interval_that_holds_zero_or_twice_the_value_does_not_identify_it() -
     assert relative_half_width(2.0, 1.5, 4.0) >= UNKNOWN
     # The zero of a sensor is known although it may be zero.
     assert relative_half_width(0.0, -0.1, 0.1, 10.0) == pytest.approx(0.01)
-
-
-def test_an_unknown_verdict_is_refused() -> None:
-    with pytest.raises(IdentificationError, match="verdict 'fine' is unknown"):
-        estimate(2.0, 1.0, 3.0, "fine")
 
 
 @pytest.mark.parametrize(("apart", "second"), [([], 60.0), (["supply.dorsiflexion_pressure=45 psi_g"], 45.0)])

@@ -2,23 +2,7 @@
 
 import pytest
 
-from ppafo.identification.estimate import digits_of, in_shown_unit, interval_texts, with_error
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "text"),
-    [
-        (480.537, 6.89, "480.5 +- 6.9"),
-        (298.0, 8.7, "298.0 +- 8.7"),
-        (26.4, 1.91, "26.4 +- 1.9"),
-        (1.451e-5, 1.7e-7, "(1.451 +- 0.017)e-05"),
-        (-0.0004, 0.58, "0.00 +- 0.58"),
-        (480537.0, 6890.0, "(4.805 +- 0.069)e+05"),
-        (0.0, 1.2e-6, "(0.0 +- 1.2)e-06"),
-    ],
-)
-def test_a_value_has_as_many_digits_as_its_error_allows(value: float, error: float, text: str) -> None:
-    assert with_error(value, error) == text
+from ppafo.identification.estimate import digits_of, in_shown_unit, interval_texts
 
 
 @pytest.mark.parametrize(

@@ -20,11 +20,11 @@ from ppafo.analyses.reproduce.torque_task import (
     torque_task_observations,
 )
 from ppafo.errors import DataError, ScenarioError, SimulationError
-from ppafo.identification.bench.free_decay import free_decay
-from ppafo.identification.bench.law import BenchResult
-from ppafo.identification.bench.static_torque import static_torque
+from ppafo.identification.bench.law import BenchContext, BenchResult
+from ppafo.identification.procedures import LAWS
 from ppafo.identification.source import RecordingSource
-from ppafo.parameters import load_device, load_parameter_set
+from ppafo.identification.tolerances import Tolerances
+from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import AuditFinding, findings_of
 from ppafo.parameters.declared import value_at
 from ppafo.parameters.overrides import Override, override_set, read_overrides, with_overrides
@@ -287,9 +287,12 @@ def bench_figure() -> tuple[BenchResult, BenchResult]:
     Raises SimulationError if a run of the rig fails.
     """
     # Kept: it takes seconds, and no override reaches it.
-    inertia = load_device(PLANTED_SET).foot_plate.inertia
-    torque, decay = (
-        RecordingSource(record(experiment, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording)
-        for experiment in ("static-torque", "free-decay")
-    )
-    return static_torque((torque,)), free_decay((decay,), inertia=inertia)
+    planted, inertia = load_parameter_set(PLANTED_SET), "foot_plate.inertia"
+    # The inertia is exact, and nothing is known of the friction.
+    known = replace(planted, numbers={inertia: planted.numbers[inertia]})
+    context, results = BenchContext(known, "", "figure 3", Tolerances.model_construct(held=0.0)), list[BenchResult]()
+    for kind in ("static-torque", "free-decay"):
+        source = RecordingSource(record(kind, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording, user=kind)
+        table = LAWS[kind].model_validate({"kind": kind, "recordings": [source.name]})
+        results.append(table.run((source,), context))
+    return results[0], results[1]

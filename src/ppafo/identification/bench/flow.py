@@ -1,4 +1,4 @@
-"""Flow laws on arrays (orifice, ISO 6358, laminar; all antisymmetric), and tolerances of gas and sensors.
+"""Flow laws on arrays (orifice, ISO 6358, laminar; all antisymmetric), tolerances of gas and sensors; open valve.
 
 With r the ratio of downstream to upstream pressure and k the heat capacity ratio, the mass flow [kg/s] is
 
@@ -8,30 +8,85 @@ With r the ratio of downstream to upstream pressure and k the heat capacity rati
     laminar    c (P_a^2 - P_b^2)
     both       a laminar gap in parallel with an orifice, or with ISO 6358 of known critical ratio
 
-Of ISO 6358, C is the choked flow, and b is observable only from both choked and subsonic flow.
+Of ISO 6358, C is the choked flow, and b is observable only from both choked and subsonic flow. Procedure
+open-valve-flow fits a law to the flow through the fully open valve; temperature and law of the gas, gains and zeros of
+the sensors are tolerances.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
+from ppafo.documents.models import Quantified, Text
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import PooledReadings, ReportedNumber, Values, solve, sought, tolerance, within
+from ppafo.identification.bench.law import (
+    BenchContext,
+    BenchLaw,
+    BenchResult,
+    PooledReadings,
+    ReportedNumber,
+    Values,
+    recordings_of,
+    result_of,
+    solve,
+    sought,
+    tolerance,
+    within,
+)
+from ppafo.identification.bench.readings import (
+    check_moves,
+    check_no_wrong_reading,
+    check_not_clipped,
+    check_sources,
+    meter_readings,
+)
 from ppafo.identification.fit import Fit
 from ppafo.identification.least_squares import FitVariable
+from ppafo.identification.source import RecordingSource, pool
 from ppafo.identification.tolerances import GAS_LAW as LIMIT_OF_GAS_LAW
 from ppafo.identification.tolerances import Tolerances
-from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant
+from ppafo.model.gas import SPECIES, choked_flow_constant, critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import sonic_conductance_mass
+from ppafo.report.kind import Kind
+from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+from ppafo.units import from_si
+from ppafo.units.spelling import molar_mass_in
+from ppafo.wording import known_names
 
+CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
+MINIMUM_SAMPLES = 5
+"""Least number of readings at the open valve to separate the unknowns."""
+_FULLY_OPEN = 0.99
+"""Magnitude of the command [-] from which a valve is fully open."""
+_FEW = 10
+"""Reciprocal of the largest fraction of readings without flow or with crossed pressures that counts as noise."""
+_NEARLY_EQUAL = 0.9
+"""Pressure ratio [-] above which the pressures are nearly equal."""
+_REGIMES = "choked flow", "subsonic flow", "flow at nearly equal pressures"
+"""Names of the flow regimes, by pressure ratio."""
+_LARGEST_COEFFICIENT = 1.0
+"""Largest possible discharge coefficient [-]: the flow of a loss-free nozzle."""
+_GRAMS_PER_BAR = 1.0e8
+"""Conversion factor from kg/(s Pa) to g/s per bar."""
+_GAP = ReportedNumber("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
 Law = Literal["orifice", "iso6358", "laminar", "both"]
 
+VALVE = "name of a valve of the set; default: the chosen one"
+_COLDEST, _HOTTEST = 150.0, 600.0
+"""Lowest and highest gas temperature [K] of a bench."""
+_SAME_GAS = 0.01
+"""Relative difference of two molar masses up to which they are of one gas [-]."""
+_THERMOMETER = 1.0
+"""Error limit [K] of a gas temperature stated in the problem file."""
 LINEAR_RATIO = 0.99999
 """Pressure ratio [-] above which the flow falls linearly to zero; at the atmosphere a difference of about 1 Pa.
 
@@ -43,14 +98,6 @@ CRITICAL_RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358 [-] in an estimation: start, lowest and highest value."""
 _SPAN, _SUBSONIC = 0.15, 0.6
 """Least span and least maximum of the pressure ratios [-] needed to fit both parameters of ISO 6358."""
-NEXT_LAW: Mapping[Law, str] = {
-    "orifice": "try law = 'both' or law = 'iso6358'",
-    "laminar": "try law = 'both'",
-    "iso6358": "try law = 'both'",
-    "both": "neither an orifice nor a laminar gap nor both in parallel explain the readings",
-}
-"""Remedy by flow law, for readings that the law does not fit; the law ``both`` contains each of its parts."""
-
 LAW_NAMES: Mapping[Law, str] = {
     "orifice": "orifice",
     "laminar": "laminar gap",
@@ -88,6 +135,61 @@ class GasAt:
     def flow_per_sonic_conductance(self) -> float:
         """Choked mass flow divided by C and upstream pressure [kg/m^3], rho_0 sqrt(T_0 / T) of ISO 6358-1:2013."""
         return sonic_conductance_mass(1.0, self.specific_gas_constant, self.temperature)
+
+
+class FlowLaw(BenchLaw):
+    """Keys of a law in which gas flows."""
+
+    gas: Text | None = Field(None, description="species of the gas on the bench; default: the set's")
+    temperature: Annotated[float, Quantified("K", _COLDEST, _HOTTEST)] | None = Field(
+        None, description="of the gas on the bench, '17 degC'; default: the set's"
+    )
+
+    def gas_of(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> GasAt:
+        """Return the gas of the bench; species and temperature default to the values of the set.
+
+        Raises IdentificationError for an unknown species, and for a flow recorded as one of another gas.
+        """
+        if (temperature := self.temperature) is None:
+            (temperature,) = context.numbers("gas.temperature")
+            deviation = context.deviation("gas.temperature", temperature, "K")
+        else:
+            limit = context.tolerances.gas_temperature
+            deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
+        if self.gas is None:
+            kind = context.numbers("gas.molar_mass", "gas.heat_capacity_ratio")
+        elif (species := SPECIES.get(self.gas)) is None:
+            raise IdentificationError(f"{context.label}: gas = {self.gas!r} is unknown{known_names(self.gas, SPECIES)}")
+        else:
+            kind = [species.molar_mass, species.heat_capacity_ratio]
+        gas = GasAt(kind[0], kind[1], temperature, deviation)
+        for source in sources:
+            channel = source.recording.channels.get("mass_flow")
+            stated = "" if channel is None else channel.stated
+            metered = molar_mass_in(stated)
+            used = self.gas or f"the set's, {gas.molar_mass:.4g} kg/mol"
+            if metered is not None and not is_same_gas(metered, gas.molar_mass):
+                raise IdentificationError(
+                    f"{source.name}: mass_flow in '{stated}' is a flow of {species_of(metered) or 'another gas'}, "
+                    f"{metered:.4g} kg/mol, but the gas of {context.label} is {used}"
+                )
+        return gas
+
+    def gas_used(self, gas: GasAt) -> str:
+        """Return the gas of the bench in words."""
+        name = species_of(gas.molar_mass) or f"{gas.molar_mass:.4g} kg/mol"
+        origin = " of the set" if self.gas is None else ""
+        return f"; gas: {name}{origin}, {from_si(gas.temperature, 'degC', 'K'):.4g} degC"
+
+
+def species_of(molar_mass: float) -> str:
+    """Return the name of the species of a molar mass [kg/mol], empty if it is of none."""
+    return next((name for name, gas in SPECIES.items() if is_same_gas(gas.molar_mass, molar_mass)), "")
+
+
+def is_same_gas(molar_mass: float, other: float) -> bool:
+    """Return whether two molar masses [kg/mol] are of one gas."""
+    return abs(molar_mass / other - 1.0) < _SAME_GAS
 
 
 def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitVariable, ...]:
@@ -160,15 +262,12 @@ def has_both_regimes(ratio: Floats) -> bool:
     return bool(np.ptp(ratio) >= _SPAN and ratio.max() >= _SUBSONIC)
 
 
-def check_both_regimes(ratio: Floats, name: str, procedure: str) -> None:
-    """Raise IdentificationError if the pressure ratios [-] do not determine both C and b of ISO 6358.
-
-    ``name`` is the recording in the message.
-    """
+def check_both_regimes(ratio: Floats, source: RecordingSource) -> None:
+    """Raise IdentificationError if the pressure ratios [-] do not determine both C and b of ISO 6358."""
     if not has_both_regimes(ratio):
-        raise IdentificationError(
-            f"{name}: {procedure}: C and b need readings with choked and with subsonic flow: pressure ratios over "
-            f"{_SPAN:g} or more, up to {_SUBSONIC:g}, not from {ratio.min():.3g} to {ratio.max():.3g}"
+        source.refuse(
+            f"C and b need readings with choked and with subsonic flow: pressure ratios over {_SPAN:g} or more, up to "
+            f"{_SUBSONIC:g}, not from {ratio.min():.3g} to {ratio.max():.3g}"
         )
 
 
@@ -304,3 +403,119 @@ def solve_flow(
         *(within(APPARENT, tolerances.gain_of("mass_flow") * alone.beside) if opening.law == "both" else ()),
     )
     return solve(partial(shown_flow, opening, paths, pressures), readings, numbers, confidence)
+
+
+class OpenValveFlowProblem(FlowLaw):
+    """Table of procedure open-valve-flow: Cd, or C and b of ISO 6358, of the fully open valve."""
+
+    needed = CHANNELS
+    row_time = 1.0
+    kind: Literal["open-valve-flow"]
+    valve: Text | None = Field(None, description=VALVE)
+    law: Law = Field("orifice", description="flow law, also the form in which the set gives it")
+
+    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+        """Identify Cd [-] or Cd A [m^2], C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)] of the open valve.
+
+        The laws are equations (6) and (7), ISO 6358, and a laminar gap; ``both`` adds a gap to an orifice, or to ISO
+        6358 where the set has its b. With the area of the set, an orifice is its Cd. Raises IdentificationError for
+        recordings that do not determine the law.
+        """
+        gas, path = self.gas_of(sources, context), context.valve_path(self.valve)
+        area, critical_ratio = (context.number(f"{path}.{name}") for name in ("area", "critical_ratio"))
+        check_sources(sources, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS[:2])
+        for source in sources:
+            upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
+            # A saturated meter shows a constant flow although the pressures change the flow.
+            driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
+            check_not_clipped(source, "mass_flow", "orifice flow at these pressures", driving)
+        recordings = [source.recording for source in sources]
+        # In a recording without commands, the valve is taken to be open.
+        commands = [item["command"] if "command" in item else np.ones(len(item)) for item in recordings]
+        is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
+        if is_open.sum() < MINIMUM_SAMPLES:
+            sources[0].refuse(
+                f"needs at least {MINIMUM_SAMPLES} readings with the valve fully open "
+                f"(command 1 or -1), not {int(is_open.sum())}"
+            )
+        upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
+        is_crossed, zero, remarks = downstream >= upstream, context.tolerances.zero_of_flow, tuple[str, ...]()
+        # A log may begin before the gas supply is on: no flow without pressure difference is then no error of a column.
+        is_at_rest = is_open & is_crossed & (np.abs(flow) <= zero * float(np.abs(flow[is_open]).max()))
+        if is_at_rest.sum() > is_open.sum() // _FEW and (is_open & ~is_at_rest).sum() >= MINIMUM_SAMPLES:
+            remarks = (
+                f"left out: {is_at_rest.sum()} of {is_open.sum()} readings without flow and pressure difference",
+            )
+            is_open = is_open & ~is_at_rest
+        crossed = np.count_nonzero(is_crossed[is_open])
+        # Noise may exchange a few pressures that are nearly equal.
+        if crossed > is_open.sum() // _FEW:
+            sources[0].refuse(
+                f"downstream_pressure is at or above upstream_pressure in {crossed} of "
+                f"{is_open.sum()} readings; are the two columns swapped?"
+            )
+        if np.ptp(flow[is_open]) <= 0.0:
+            check_moves(sources[0], "mass_flow")
+        check_no_wrong_reading(sources, "mass_flow", (upstream, downstream), is_open)
+        _, used, meter_remarks = meter_readings(sources, upstream - downstream, zero, is_open)
+        upstream, downstream, flow = upstream[used], downstream[used], np.abs(flow[used])
+        ratio = downstream / upstream
+        if self.law == "iso6358":
+            check_both_regimes(ratio, sources[0])
+        # In parallel with a laminar gap, b selects ISO 6358; the law ``iso6358`` estimates b.
+        opening = Opening(gas, self.law, area or PRODUCT_ONLY, critical_ratio if self.law == "both" else None)
+        _, alone = opening.rough_sizes(upstream, downstream, flow)
+        reported, paths = reported_parts(opening, _size(opening, area, path), _GAP, alone)
+        # The nearer the pressures are to each other, the more their noise affects the computed flow.
+        limits = critical_pressure_ratio(gas.heat_capacity_ratio), _NEARLY_EQUAL
+        regimes = [_REGIMES[regime] for regime in np.digitize(ratio, limits).tolist()]
+        fitted, model = solve_flow(
+            opening,
+            paths,
+            {"upstream_pressure": upstream, "downstream_pressure": downstream},
+            PooledReadings(flow, regimes, np.array(recordings_of(sources))[used].tolist()),
+            context.tolerances,
+            self.confidence,
+        )
+        scatter = float(np.std(flow - model) / flow.max())
+        measured_ordinate, fitted_ordinate = (_GRAMS_PER_BAR * values / upstream for values in (flow, model))
+        # Densely, so that the curve has no kinks at the readings; between them the upstream pressure is interpolated.
+        dense, order = np.linspace(ratio.min(), ratio.max(), 200), np.argsort(ratio)
+        first = np.interp(dense, ratio[order], upstream[order])
+        shown = {"upstream_pressure": first, "downstream_pressure": dense * first}
+        law_flow = shown_flow(opening, paths, shown, defaultdict(float, fitted.by_name))
+        curve = curve_mark(LAW_NAMES[self.law], dense, _GRAMS_PER_BAR * law_flow / first)
+        marks = readings_mark("measured", ratio, measured_ordinate), curve
+        axes = Kind("Pressure ratio"), Kind("Flow over upstream pressure", "g/s per bar")
+        result = result_of(
+            sources,
+            fitted,
+            reported,
+            f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
+            f"scatter {scatter:.2%} of the largest flow",
+            with_residuals("Open-valve flow", *axes, marks, ratio, measured_ordinate - fitted_ordinate),
+            remarks=(*remarks, *meter_remarks),
+            scatter=scatter,
+        )
+        coefficient, *others = result.estimates
+        # Other sizes than a discharge coefficient have a unit.
+        if area is None or coefficient.unit or coefficient.low <= _LARGEST_COEFFICIENT:
+            return result
+        doubt = (
+            f"Cd = {coefficient.value:.3g} is impossible, above 1: mass_flow or a pressure has a wrong unit, or the "
+            f"valve is larger than the set's {area * 1e6:.4g} mm^2"
+        )
+        doubted = replace(coefficient, verdict="holds for this model only")
+        return replace(result, estimates=(doubted, *others), remarks=(doubt, *result.remarks))
+
+
+def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:
+    """Return the reported size of the opening: path in a set, unit and description."""
+    if opening.law == "laminar":
+        return replace(_GAP, text="Laminar coefficient of the open valve")
+    if opening.law == "iso6358" or opening.critical_ratio is not None:
+        return ReportedNumber(f"{path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
+    if area:
+        text = f"Discharge coefficient with the set's area of {area * 1e6:.4g} mm^2; only Cd A is identified"
+        return ReportedNumber(f"{path}.discharge_coefficient", "", text)
+    return ReportedNumber("open_valve_flow.effective_area", "m^2", "Effective area Cd A")

@@ -13,14 +13,17 @@ Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] can be estimated.
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
-from ppafo.errors import IdentificationError
+from ppafo.documents.models import Quantified
 from ppafo.identification.bench.law import (
+    BenchContext,
     BenchResult,
     ReportedNumber,
+    TimedLaw,
     Values,
     halved_readings,
     result_of,
@@ -32,7 +35,6 @@ from ppafo.identification.bench.law import (
 from ppafo.identification.bench.readings import check_moves, check_no_gap, check_sources, without_wrong_samples
 from ppafo.identification.least_squares import FitVariable
 from ppafo.identification.source import RecordingSource, window
-from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.residuals import curve_mark, readings_mark
@@ -41,7 +43,6 @@ from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 from ppafo.wording import count_of
 
-PROCEDURE = "free-decay"
 ANGLE = "angle"
 VELOCITY = "angular_velocity"
 """Channel fitted together with the angle, if recorded."""
@@ -63,15 +64,6 @@ _NOISE_NEAR = 6.0
 """Least such distance divided by the noise of the angle [-]."""
 _AT_ONCE = 2.0
 """Duration near the end of a swing, relative to the last half of the swing [-], below which the vane did not rest."""
-_SWING_SECTION = (
-    'trajectory = {parameters = [{path = "friction.viscous_damping"}, '
-    '{path = "friction.dynamic_torque", start = "0.01 N m"}, {path = "friction.static_torque", start = "0.01 N m"}], '
-    f'experiments = [{{label = "swing", channels = ["{ANGLE}"], initial_state = "recording", '
-    'scenario = "step-response", overrides = ["motion.kind=free", "effects.joint_load.stiffness=... N m/rad", '
-    '"effects.joint_load.rest_angle=... deg", "controller.command=0", "initial.pressure_1=atmosphere", '
-    '"initial.pressure_2=atmosphere", "actuator.dead_volume_1=10 L", "actuator.dead_volume_2=10 L"], recording = '
-)
-"""Fit of a swing on a spring, with chambers open to the atmosphere; with little friction the first run swings too."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 """Nodes and weights of three-point Gauss-Legendre quadrature, used in each step of the speed."""
 _STEPS = 240
@@ -84,6 +76,10 @@ _START_ANGLE, _START_SPEED = "start angle {}", "start speed {}"
 """Names of the variables for initial angle [rad] and speed [rad/s], by number of the decay."""
 _USUAL_RISE_VELOCITY, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY = 0.1, 1.0e-3, 2.0
 """Velocity at which the friction rise is halved [rad/s]: usual, lowest and highest value."""
+_STEPS_OF_DECAY = 5.0e-6, 0.2
+"""Times between samples of a free decay [s], which lasts seconds at most; others mean a wrong unit of time."""
+_MOST_OF_STOPS = 10.0
+"""Largest plausible ratio of swing in a free decay to angle between the stops [-]; more means a wrong unit."""
 _UNIT_INERTIA = 1.0
 """Inertia [kg m^2] in place of an unknown one: the fitted parameters are then parameters divided by the inertia."""
 _LEAST_SPEED, _LEAST_SWEPT = 1.0e-6, 1.0e-9
@@ -115,18 +111,14 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     Raises IdentificationError, with file, sample and remedy, if there are too few samples, if nothing moves, or if the
     sensor is saturated or contradicts the velocity.
     """
-    check_moves(source, PROCEDURE, ANGLE)
+    check_moves(source, ANGLE)
     part = window(source.recording, start, end)
     if len(part) < MINIMUM_SAMPLES:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} samples from start to end, not {len(part)}"
-        )
+        source.refuse(f"needs at least {MINIMUM_SAMPLES} samples from start to end, not {len(part)}")
     swept, noise = float(np.ptp(part[ANGLE])), noise_of(part[ANGLE])
     if swept < _MINIMUM_OVER_NOISE * noise:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: no motion: the angle changes by {swept:.3g} rad at a noise of {noise:.3g} rad"
-        )
-    skipped = check_no_gap(source, PROCEDURE, part)
+        source.refuse(f"no motion: the angle changes by {swept:.3g} rad at a noise of {noise:.3g} rad")
+    skipped = check_no_gap(source, part)
     # A start that the user gave is after the push.
     has_start = start is not None
     speeds, _ = smoothed_rates(part.time, part[ANGLE])
@@ -138,17 +130,17 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
     back = np.flatnonzero(sign * speeds[first:] < -_REVERSAL * np.abs(speeds).max())
     last = first + int(back[0]) if back.size else part.time.size
     if last - first < MINIMUM_SAMPLES:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: {last - first} samples lie between the highest speed and the first reversal "
+        source.refuse(
+            f"{last - first} samples lie between the highest speed and the first reversal "
             f"(or the end), but {MINIMUM_SAMPLES} are needed"
         )
     rows = slice(first, last)
     angle = part[ANGLE][rows]
     for plateau in plateaus(angle):
         if is_at_limit(angle, plateau):
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel 'angle' stays at {plateau.value:g} rad in {plateau.count} rows, "
-                f"from sample {skipped + first + plateau.first + 1}: saturated, or at a stop; give an end before"
+            source.refuse(
+                f"channel 'angle' stays at {plateau.value:g} rad in {plateau.count} rows, "
+                f"from sample {skipped + first + plateau.first + 1}: saturated, or at a stop"
             )
     time, velocity = part.time[rows], None
     if VELOCITY in part:
@@ -158,9 +150,7 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
         deviation = angle - angle.mean()
         gain = float(deviation @ moved / (deviation @ deviation))
         if abs(gain - 1.0) > _VELOCITY_MAY_DIFFER:
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times the derivative of 'angle'"
-            )
+            source.refuse(f"channel '{VELOCITY}' is {gain:.3g} times the derivative of 'angle'")
     return FreeDecay(time=time - time[0], angle=angle, sign=sign, velocity=velocity)
 
 
@@ -176,11 +166,9 @@ def _check_comes_to_rest(source: RecordingSource, time: Floats, angle: Floats, n
     if back.size:
         halfway, reached = (time[np.flatnonzero(distance[:end] > far)[-1]] for far in (0.5 * distance.max(), near))
         if time[back[0]] - reached < _AT_ONCE * (reached - halfway):
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: the vane turns back at {time[end]:.3g} s without coming to rest, so "
-                "another torque acts, such as a spring or gravity; instead of the procedure write above the tables of "
-                f'the problem file {_SWING_SECTION}"{source.name}"}}]}} (fill in the load; columns as in '
-                "the procedure); if a stop or a hand turned the vane, give an end before"
+            source.refuse(
+                f"the vane turns back at {time[end]:.3g} s without coming to rest, so "
+                "another torque acts, such as a spring, gravity, a stop or a hand"
             )
 
 
@@ -254,88 +242,99 @@ def course(times: Floats, speed: float, slowing: Slowing) -> _DecayCurve:
     return _DecayCurve(times, np.asarray(angle(inside)), np.asarray(angle.derivative()(inside)))
 
 
-def free_decay(
-    sources: tuple[RecordingSource, ...],
-    start: float | None = None,
-    end: float | None = None,
-    inertia: float | None = None,
-    inertia_deviation: float = 0.0,
-    rise: float = 1.0,
-    confidence: float = 0.95,
-    tolerances: Tolerances = DEFAULTS,
-) -> BenchResult:
-    """Identify viscous damping [N m s/rad] and dynamic friction [N m], or both over inertia [1/s, rad/s^2].
+class FreeDecayProblem(TimedLaw):
+    """Table of procedure free-decay: viscous damping and Coulomb friction from the decay after an impulse."""
 
-    The model is equation (1), fitted to angle and, if recorded, angular velocity. Several recordings are several
-    impulses to the same device, with common parameters and separate initial states.
-
-    Arguments:
-        sources: recordings of the angle
-        start, end: interval in which the vane turns freely [s]; default start: the largest speed
-        inertia: inertia about the joint [kg m^2]; None to estimate only ratios to the inertia
-        inertia_deviation: standard deviation of the inertia [kg m^2]
-        rise: largest friction near standstill over dynamic friction, minus 1 [-]
-        confidence: confidence level of the intervals [-]
-        tolerances: limits of the errors of the bench
-
-    Returns:
-        the estimates with intervals and verdicts, a summary and two panels
-
-    Raises:
-        IdentificationError: recordings that determine neither parameter; names file, sample and remedy
-    """
-    check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
-    sources, remarks = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)
-    decays = tuple(decay_of(source, start, end) for source in sources)
-    damping, friction = _OF_THE_DEVICE if inertia else _OVER_INERTIA
-    paths, assumed_inertia = (damping.path, friction.path), inertia or _UNIT_INERTIA
-    numbers = (
-        *_unknowns(decays, paths, assumed_inertia, rise),
-        *tolerance(_INERTIA, inertia_deviation / assumed_inertia),
-        *within(_GAIN, tolerances.gain_of(ANGLE)),
+    needed = (ANGLE,)
+    kind: Literal["free-decay"]
+    inertia: Annotated[float, Quantified("kg m^2", above=0.0, nothing="unknown")] | None = Field(
+        None, description="such as '8.4 g m^2', or 'unknown'; default: the set's"
     )
-    # A wrong law gives different parameters for fast and for slow motion.
-    parts = []
-    for decay in decays:
-        moved = np.abs(decay.angle - decay.angle[0])
-        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
-        speeds = [] if decay.velocity is None else [(VELOCITY, decay.velocity)]
-        parts.append((half, [(ANGLE, decay.angle), *speeds]))
-    readings = halved_readings(sources, parts, ("the first half of the travel", "the second half of the travel"))
 
-    def slowing_of(at: Values, inertia: float) -> Slowing:
-        damping_rate, deceleration = (max(at[path], 0.0) / inertia for path in paths)
-        return Slowing(damping_rate, deceleration, math.expm1(at.get(_RISE, 0.0)), at.get(_RISE_VELOCITY, 0.0))
+    def inertia_of(self, context: BenchContext) -> tuple[float | None, float]:
+        """Return the inertia and its standard deviation [kg m^2], by default from the set; None or 0 if unknown."""
+        path = "foot_plate.inertia"
+        if self.inertia is not None:
+            return self.inertia, context.tolerances.deviation_of(path, self.inertia, 0.0)
+        inertia = context.number(path)
+        return inertia, 0.0 if inertia is None else context.deviation(path, inertia, "kg m^2")
 
-    def law(at: Values) -> Floats:
-        slowing, series = slowing_of(at, assumed_inertia * (1.0 + at[_INERTIA])), []
-        for number, decay in enumerate(decays, start=1):
-            _, swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
-            series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
-            if decay.velocity is not None:
-                series.append(decay.sign * speed)
-        return np.concatenate(series)
+    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+        """Identify viscous damping [N m s/rad] and dynamic friction [N m], or both over inertia [1/s, rad/s^2].
 
-    fit, model = solve(law, readings, numbers, confidence)
-    slowing = slowing_of(fit.by_name, assumed_inertia)
-    at_rest = sum(
-        float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
-        for number, decay in enumerate(decays, start=1)
-    )
-    used = TIME.text(sum(float(decay.time[-1]) for decay in decays), ".3g")
-    recorded = TIME.text(sum(float(np.ptp(source.recording.time)) for source in sources), ".3g")
-    unknown = "" if inertia else "; the inertia is unknown, so only ratios to the inertia are identified"
-    return result_of(
-        PROCEDURE,
-        sources,
-        fit,
-        (damping, friction),
-        f"{count_of(len(decays), 'decay')} ({used} of {recorded}), {at_rest} to standstill; beta/I = "
-        f"{slowing.damping_rate:.4g} 1/s, T_c/I = {slowing.deceleration:.4g} rad/s^2{unknown}",
-        _panels(decays, model, slowing),
-        "another torque acts, such as gravity, an end stop or friction that depends differently on speed",
-        remarks,
-    )
+        The model is equation (1), fitted to angle and, if recorded, angular velocity. Several recordings are several
+        impulses to the same device, with common parameters and separate initial states. Raises IdentificationError for
+        recordings that determine neither parameter, or times or angles in a wrong unit.
+        """
+        low, high = (context.number(f"actuator.angle_{end}") for end in ("min", "max"))
+        for source in sources:
+            step = float(np.median(np.diff(source.recording.time))) if len(source.recording) > 1 else 0.0
+            if step and not _STEPS_OF_DECAY[0] < step < _STEPS_OF_DECAY[1]:
+                source.refuse(
+                    f"the times of the samples are {step:.3g} s apart; is the unit of time "
+                    f"{'ms' if step > 1.0e-3 else 's'}?"
+                )
+            angles = source.recording[ANGLE] if ANGLE in source.recording else source.recording.time[:1]
+            turned = float(angles.max() - angles.min())
+            if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
+                source.refuse(
+                    f"'angle' covers {turned:.4g} rad ({turned / math.tau:.3g} turns), but "
+                    f"the stops are {math.degrees(high - low):.4g} deg apart; in degrees, give it the unit deg"
+                )
+        static, dynamic = (context.number(f"friction.{kind}_torque") for kind in ("static", "dynamic"))
+        # Near standstill, the friction of a seal is at most the static friction.
+        rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
+        inertia, inertia_deviation = self.inertia_of(context)
+        check_sources(sources, (ANGLE,), MINIMUM_SAMPLES)
+        sources, remarks = without_wrong_samples(sources, (ANGLE, VELOCITY), self.start, self.end)
+        decays = tuple(decay_of(source, self.start, self.end) for source in sources)
+        damping, friction = _OF_THE_DEVICE if inertia else _OVER_INERTIA
+        paths, assumed_inertia = (damping.path, friction.path), inertia or _UNIT_INERTIA
+        numbers = (
+            *_unknowns(decays, paths, assumed_inertia, rise),
+            *tolerance(_INERTIA, inertia_deviation / assumed_inertia),
+            *within(_GAIN, context.tolerances.gain_of(ANGLE)),
+        )
+        # A wrong law gives different parameters for fast and for slow motion.
+        parts = []
+        for decay in decays:
+            moved = np.abs(decay.angle - decay.angle[0])
+            half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
+            speeds = [] if decay.velocity is None else [(VELOCITY, decay.velocity)]
+            parts.append((half, [(ANGLE, decay.angle), *speeds]))
+        readings = halved_readings(sources, parts, ("the first half of the travel", "the second half of the travel"))
+
+        def slowing_of(at: Values, inertia: float) -> Slowing:
+            damping_rate, deceleration = (max(at[path], 0.0) / inertia for path in paths)
+            return Slowing(damping_rate, deceleration, math.expm1(at.get(_RISE, 0.0)), at.get(_RISE_VELOCITY, 0.0))
+
+        def law(at: Values) -> Floats:
+            slowing, series = slowing_of(at, assumed_inertia * (1.0 + at[_INERTIA])), []
+            for number, decay in enumerate(decays, start=1):
+                _, swept, speed = course(decay.time, at[_START_SPEED.format(number)], slowing)
+                series.append(at[_START_ANGLE.format(number)] + (1.0 + at[_GAIN]) * decay.sign * swept)
+                if decay.velocity is not None:
+                    series.append(decay.sign * speed)
+            return np.concatenate(series)
+
+        fit, model = solve(law, readings, numbers, self.confidence)
+        slowing = slowing_of(fit.by_name, assumed_inertia)
+        at_rest = sum(
+            float(decay.time[-1]) > course_to_standstill(fit.by_name[_START_SPEED.format(number)], slowing).time[-1]
+            for number, decay in enumerate(decays, start=1)
+        )
+        used = TIME.text(sum(float(decay.time[-1]) for decay in decays), ".3g")
+        recorded = TIME.text(sum(float(np.ptp(source.recording.time)) for source in sources), ".3g")
+        unknown = "" if inertia else "; the inertia is unknown, so only ratios to the inertia are identified"
+        return result_of(
+            sources,
+            fit,
+            (damping, friction),
+            f"{count_of(len(decays), 'decay')} ({used} of {recorded}), {at_rest} to standstill; beta/I = "
+            f"{slowing.damping_rate:.4g} 1/s, T_c/I = {slowing.deceleration:.4g} rad/s^2{unknown}",
+            _panels(decays, model, slowing),
+            remarks=remarks,
+        )
 
 
 def _unknowns(

@@ -1,23 +1,30 @@
-"""Fit of a bench law by the common estimator: readings, tolerances with priors, result with verdicts and two panels."""
+"""Bench law: a table of a problem file that makes a result of recordings; readings, priors, fit, verdicts, panels."""
 
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
+from pydantic import Field
 
+from ppafo.documents.models import Quantified, StrictTable, Text
+from ppafo.errors import IdentificationError
 from ppafo.identification.estimate import UNKNOWN, Estimate, Verdict, relative_half_width
 from ppafo.identification.fit import Fit, conflict_in_words, fit, widened_by, wrong_shape
 from ppafo.identification.least_squares import FitVariable, ResidualBlock
+from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
 from ppafo.identification.source import RecordingSource, kind_of, remarks_on_readings
+from ppafo.identification.tolerances import DEFAULTS, Columns, Confidence, Tolerances
+from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si, with_followers
 from ppafo.report.panels import Panel, draw_panels
 from ppafo.signals import RecordingKind
 from ppafo.signals.faults import resolution_of, rounding_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+from ppafo.wording import said_missing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,6 +80,65 @@ class BenchResult:
 
 
 @dataclass(frozen=True, slots=True)
+class BenchContext:
+    """Context of a bench law: parameter set, chosen valve, ``label`` of the section in messages, bench tolerances."""
+
+    parameter_set: ParameterSet
+    valve: str
+    label: str
+    tolerances: Tolerances = DEFAULTS
+
+    def number(self, path: str) -> float | None:
+        """Return the value of a parameter [SI]; None if the set lacks it."""
+        return number_in_si(self.parameter_set, path)
+
+    def numbers(self, *paths: str) -> list[float]:
+        """Return the values of parameters [SI]. Raises IdentificationError with every one that the set lacks."""
+        found = {path: number_in_si(with_followers(self.parameter_set), path) for path in paths}
+        if missing := [path for path, value in found.items() if value is None]:
+            raise IdentificationError(f"{self.label}: {said_missing(missing)} in {self.parameter_set.file}")
+        return [value for value in found.values() if value is not None]
+
+    def deviation(self, path: str, value: float, unit: str) -> float:
+        """Return the standard deviation [unit] of a parameter of given ``value``: from bench, set, or defaults."""
+        entry = with_followers(self.parameter_set).numbers.get(path)
+        return self.tolerances.deviation_of(path, value, 0.0 if entry is None else stated_half_width(entry, unit))
+
+    def valve_path(self, name: str | None) -> str:
+        """Return the path of a valve in the set, such as ``valves.main``; None means the chosen valve."""
+        return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
+
+
+class BenchLaw(StrictTable):
+    """Table of a bench law: the keys that every law has, and what is declared of it.
+
+    ``needed``: channels of every recording. ``row_time``: time [s] between rows of a table without a time column; None
+    for a law over time. ``own_errors``: errors of sensors that may differ between its recordings.
+    """
+
+    needed: ClassVar[tuple[str, ...]]
+    row_time: ClassVar[float | None] = None
+    own_errors: ClassVar[tuple[str, ...]] = ()
+    recordings: tuple[Text, ...] = Field(strict=False, min_length=1, description="files, relative to this one")
+    columns: Columns = None
+    confidence: Confidence = 0.95
+
+    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+        """Identify what the law has from recordings.
+
+        Raises IdentificationError, with file and sample, for recordings that do not determine it.
+        """
+        raise NotImplementedError
+
+
+class TimedLaw(BenchLaw):
+    """Keys of a law over time."""
+
+    start: Annotated[float, Quantified("s")] | None = Field(None, description="first time to use, such as '2 s'")
+    end: Annotated[float, Quantified("s")] | None = Field(None, description="last time to use, such as '8 s'")
+
+
+@dataclass(frozen=True, slots=True)
 class ReportedNumber:
     """Estimated quantity to report: path (its name in the fit), SI unit, and description as a sentence.
 
@@ -87,19 +153,18 @@ class ReportedNumber:
 
 
 def result_of(
-    procedure: str,
     sources: tuple[RecordingSource, ...],
     fitted: Fit,
     reported: Sequence[ReportedNumber],
     summary: str,
     panels: tuple[Panel, ...],
-    remedy: str,
+    reason: str = "",
     remarks: tuple[str, ...] = (),
     scatter: float = math.nan,
 ) -> BenchResult:
     """Return the result of a procedure: an estimate for each reported quantity, and remarks on the recordings.
 
-    ``remedy`` is the advice if some readings contradict the others; ``scatter`` is the field of the result.
+    ``reason`` says more of a conflict, if readings contradict the others; ``scatter`` is the field of the result.
     """
     origin = tuple(source.trace for source in sources)
     estimates = list[Estimate]()
@@ -130,12 +195,12 @@ def result_of(
         path, unit, size = item.path, item.unit, item.size
         estimates.append(Estimate(path, value, unit, low, high, verdict, sentence, origin, fitted.confidence, size))
     return BenchResult(
-        procedure=procedure,
+        procedure=sources[0].user,
         summary=summary,
         estimates=tuple(estimates),
         panels=panels,
         kind=kind_of(source.recording.kind for source in sources),
-        conflict=conflict_in_words(fitted, remedy),
+        conflict=conflict_in_words(fitted, reason),
         remarks=(*remarks, *remarks_on_readings(sources)),
         scatter=scatter,
     )
@@ -260,12 +325,14 @@ def solve(
         residuals, numbers, blocks, confidence, memory=min(_MEMORY, int(counts.min()) // SAMPLES_PER_COEFFICIENT)
     )
     model = law(at(fitted.values))
-    tested = (name for name in resolutions if fitted.correlation[name] == 0)
-    for sensor in (name for name in tested if fitted.noise[name] > _TELLING * float(np.ptp(measured[sensors == name]))):
+    tested = (name for name in resolutions if fitted.sensors[name].order == 0)
+    for sensor in (
+        name for name in tested if fitted.sensors[name].deviation > _TELLING * float(np.ptp(measured[sensors == name]))
+    ):
         series = []
         for block in (block for block in blocks if block.channel == sensor):
             samples = order[block.rows]
             by_law = samples[np.argsort(model[samples], kind="stable")]
-            series.append((measured - model)[by_law] / fitted.noise[sensor])
+            series.append((measured - model)[by_law] / fitted.sensors[sensor].deviation)
         fitted = replace(fitted, conflict=fitted.conflict or wrong_shape(sensor, series))
     return fitted, model

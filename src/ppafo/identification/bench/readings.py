@@ -42,7 +42,7 @@ _LARGEST_NUMBER = 1.0e12
 
 
 def without_wrong_samples(
-    sources: tuple[RecordingSource, ...], procedure: str, names: Sequence[str], start: float | None, end: float | None
+    sources: tuple[RecordingSource, ...], names: Sequence[str], start: float | None, end: float | None
 ) -> tuple[tuple[RecordingSource, ...], tuple[str, ...]]:
     """Return recordings over time without outliers in the channels ``names``, and remarks on the samples left out.
 
@@ -67,7 +67,7 @@ def without_wrong_samples(
             first = int(wrong[0])
             if wrong.size > most:
                 around = float(np.median(values[max(first - 2, 0) : first + 3]))
-                _refuse_outlier(source, procedure, name, inside[wrong].tolist(), float(values[first]), around)
+                _refuse_outlier(source, name, inside[wrong].tolist(), float(values[first]), around)
             is_right[inside[wrong]] = False
             remarks.append(
                 f"left out: {wrong.size} of {inside.size} samples where '{name}' is an outlier; the "
@@ -97,7 +97,7 @@ def _outliers(values: Floats, most: int, share: float) -> Flags:
     return is_out
 
 
-def check_not_alone(source: RecordingSource, procedure: str, name: str) -> None:
+def check_not_alone(source: RecordingSource, name: str) -> None:
     """Raise IdentificationError, naming the sample, for an isolated extreme value of a channel.
 
     A value is isolated if its distance from the next one exceeds twice the range of all others and their median
@@ -108,11 +108,11 @@ def check_not_alone(source: RecordingSource, procedure: str, name: str) -> None:
     for wrong, others in ((order[-1], order[:-1]), (order[0], order[1:][::-1])):
         away = abs(float(values[wrong] - values[others[-1]])) if others.size >= _FEWEST_ALIKE else 0.0
         if away > max(2.0 * float(np.ptp(values[others])), float(np.median(np.abs(values)))):
-            _refuse_outlier(source, procedure, name, [int(wrong)], float(values[wrong]), float(values[others[-1]]))
+            _refuse_outlier(source, name, [int(wrong)], float(values[wrong]), float(values[others[-1]]))
 
 
 def check_no_wrong_reading(
-    sources: tuple[RecordingSource, ...], procedure: str, name: str, drivers: Sequence[Floats], used: Flags
+    sources: tuple[RecordingSource, ...], name: str, drivers: Sequence[Floats], used: Flags
 ) -> None:
     """Raise IdentificationError for a reading far off the six readings with the most similar driving quantities.
 
@@ -146,11 +146,11 @@ def check_no_wrong_reading(
         in_recording = numbers[(numbers >= 0) & (numbers < len(source.recording))]
         # The worst one first, which the message describes.
         worst_first = sorted(in_recording.tolist(), key=lambda sample: sample != samples[first] - before)
-        _refuse_outlier(source, procedure, name, worst_first, float(values[first]), float(middle[first]))
+        _refuse_outlier(source, name, worst_first, float(values[first]), float(middle[first]))
 
 
 def meter_readings(
-    sources: tuple[RecordingSource, ...], procedure: str, direction: Floats, zero: float, used: Flags | None = None
+    sources: tuple[RecordingSource, ...], direction: Floats, zero: float, used: Flags | None = None
 ) -> tuple[Floats, Flags, tuple[str, ...]]:
     """Return flow meter readings with sign [kg/s], flags of possible readings, and remarks on the others.
 
@@ -169,13 +169,12 @@ def meter_readings(
     against = counted & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if has_sign else 0.0))
     many = _MOST_IMPOSSIBLE * np.count_nonzero(counted)
     if not has_sign and np.count_nonzero(against) > many:
-        remark = f"{procedure}: the flow meter gives no direction; the direction is taken from pressures and command"
-        return np.where(direction < 0.0, -flow, flow), counted, (remark,)
+        return np.where(direction < 0.0, -flow, flow), counted, ()
     wrong = np.flatnonzero(against)
     if wrong.size > many:
-        raise IdentificationError(
-            f"{sources[0].name}: {procedure}: the flow is opposite to the direction of pressures and command "
-            f"in {wrong.size} of {np.count_nonzero(counted)} readings; reverse the sign of 'mass_flow'"
+        sources[0].refuse(
+            f"the flow is opposite to the direction of pressures and command "
+            f"in {wrong.size} of {np.count_nonzero(counted)} readings: a wrong sign of 'mass_flow'"
         )
     if not wrong.size:
         return flow, counted, ()
@@ -199,20 +198,17 @@ def usual_range(values: Floats) -> float:
     return float(np.subtract(*np.quantile(values, (0.95, 0.05))))
 
 
-def _refuse_outlier(
-    source: RecordingSource, procedure: str, name: str, samples: list[int], value: float, around: float
-) -> NoReturn:
+def _refuse_outlier(source: RecordingSource, name: str, samples: list[int], value: float, around: float) -> NoReturn:
     """Raise IdentificationError for outliers of a channel: the first one with its value, the others by number."""
     others = f", and so are samples {', '.join(str(sample + 1) for sample in samples[1:4])}" if samples[1:] else ""
-    raise IdentificationError(
-        f"{source.name}: {procedure}: '{name}' is {source.shown(name, value)} at sample {samples[0] + 1}, but "
-        f"{source.shown(name, around)} around it: a wrong reading{others}; correct or remove this reading"
+    source.refuse(
+        f"'{name}' is {source.shown(name, value)} at sample {samples[0] + 1}, but "
+        f"{source.shown(name, around)} around it: a wrong reading{others}"
     )
 
 
 def check_sources(
     sources: tuple[RecordingSource, ...],
-    procedure: str,
     channels: Sequence[str],
     fewest: int,
     moving: Iterable[str] = (),
@@ -222,67 +218,51 @@ def check_sources(
 
     A ``moving`` channel must change, and an ``absolute`` pressure must be positive. The message names the recording.
     """
-    if not sources:
-        raise IdentificationError(f"{procedure}: no recording was given")
     for source in sources:
         recording = source.recording
-        check_channels(source.name, procedure, channels, recording.names)
+        check_channels(source.where, channels, recording.names)
         for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
             worst = int(np.argmax(np.abs(values)))
             if abs(values[worst]) > _LARGEST_NUMBER:
-                raise IdentificationError(
-                    f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}: impossible"
-                )
+                source.refuse(f"'{name}' is {values[worst]:g} at sample {worst + 1}: impossible")
         if len(recording) < fewest:
-            raise IdentificationError(
-                f"{source.name}: {procedure} needs at least {fewest} samples, not {len(recording)}"
-            )
+            source.refuse(f"needs at least {fewest} samples, not {len(recording)}")
         for name in moving:
-            check_moves(source, procedure, name)
+            check_moves(source, name)
         for name in absolute:
             # Gauge pressures, passed for absolute, are 0 or less where the other side is open.
             low = int(np.argmin(recording[name]))
             if recording[name][low] <= 0.0:
-                raise IdentificationError(
-                    f"{source.name}: {procedure}: '{name}' is {source.shown(name, recording[name][low])} at sample "
-                    f"{low + 1}, which is impossible for an absolute pressure; gauge is psi_g, bar_g, kPa_g"
+                source.refuse(
+                    f"'{name}' is {source.shown(name, recording[name][low])} at sample "
+                    f"{low + 1}, which is impossible for an absolute pressure"
                 )
-            check_not_alone(source, procedure, name)
+            check_not_alone(source, name)
 
 
-def check_channels(where: str, procedure: str, needed: Sequence[str], read: Sequence[str]) -> None:
+def check_channels(where: str, needed: Sequence[str], read: Sequence[str]) -> None:
     """Raise IdentificationError with all channels that a procedure needs and a recording or column map lacks."""
-    spare, asked, maps = [name for name in read if name not in needed], list[str](), list[str]()
-    for name in needed:
-        if name in read:
-            continue
-        known = CHANNELS[name]
-        asked.append(f"a channel '{name} [{known.unit}]', {known.summary}{nearest_name(name, spare)}")
-        unit, others = known.unit, ""
-        if unit == "Pa":
-            unit, others = "kPa_g", ', or { constant = "0 kPa_g" } at atmospheric pressure'
-        elif name == "direction":
-            others = ', or derive it: direction.of = "pressure_difference", with a threshold and a window'
-        maps.append(f'{name} = {{ column = "HEADER", unit = "{unit}" }}{others}')
+    spare = [name for name in read if name not in needed]
+    asked = [
+        f"a channel '{name} [{CHANNELS[name].unit}]', {CHANNELS[name].summary}{nearest_name(name, spare)}"
+        for name in needed
+        if name not in read
+    ]
     if asked:
         raise IdentificationError(
-            f"{where}: {procedure} needs {' and '.join(asked)}; channels read: {', '.join(read) or 'only time'}; a "
-            f"column map must list every channel to be read: {'; '.join(maps)}"
+            f"{where}: needs {' and '.join(asked)}; channels read: {', '.join(read) or 'only time'}"
         )
 
 
-def check_moves(source: RecordingSource, procedure: str, name: str) -> None:
+def check_moves(source: RecordingSource, name: str) -> None:
     """Raise IdentificationError, naming the recording, for a constant channel, which carries no information."""
     values = source.recording[name]
     if values.max() == values.min():
-        raise IdentificationError(
-            f"{source.name}: {procedure}: channel '{name}' is {source.shown(name, values[0])} throughout"
-        )
+        source.refuse(f"channel '{name}' is {source.shown(name, values[0])} throughout")
 
 
 def check_not_clipped(
     source: RecordingSource,
-    procedure: str,
     name: str,
     driver: str,
     driving: Floats,
@@ -298,13 +278,13 @@ def check_not_clipped(
     # A reading that stays where nothing moves is right.
     moves = float(np.ptp(driving[longest.first : longest.last + 1])) > fraction * float(np.abs(driving).max())
     if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
-        raise IdentificationError(
-            f"{source.name}: {procedure}: channel '{name}' stays at {source.shown(name, values.max())} for "
+        source.refuse(
+            f"channel '{name}' stays at {source.shown(name, values.max())} for "
             f"{longest.count} samples, up to sample {longest.last + 1}, while '{driver}' moves: it is saturated"
         )
 
 
-def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> int:
+def check_no_gap(source: RecordingSource, part: Recording) -> int:
     """Return the number of samples before ``part`` of a recording. Raises IdentificationError for a gap in the part.
 
     The message gives the time of the gap.
@@ -312,8 +292,8 @@ def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> in
     skipped = int(np.searchsorted(source.recording.time, part.time[0]))
     if (gap := longest_gap(part.time)) is not None:
         index, duration = gap
-        raise IdentificationError(
-            f"{source.name}: {procedure}: gap of {duration:.4g} s after {part.time[index]:.6g} s (sample "
+        source.refuse(
+            f"gap of {duration:.4g} s after {part.time[index]:.6g} s (sample "
             f"{skipped + index + 1}), between start and end"
         )
     return skipped

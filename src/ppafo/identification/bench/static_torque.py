@@ -13,12 +13,15 @@ area [m^2] and forces, for which a set has no entry.
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import (
+    BenchContext,
+    BenchLaw,
     BenchResult,
     PooledReadings,
     ReportedNumber,
@@ -38,13 +41,11 @@ from ppafo.identification.bench.readings import (
 )
 from ppafo.identification.estimate import in_shown_unit
 from ppafo.identification.source import RecordingSource, pool
-from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 from ppafo.wording import count_of, percentage
 
-PROCEDURE = "static-torque"
 TORQUE, FORCE = "torque", "force"
 _MOVING = ("position", "angle")
 """Channels by which sliding of the actuator is detected."""
@@ -101,20 +102,20 @@ def torque_readings(sources: tuple[RecordingSource, ...], zero_of_pressure: floa
     """
     is_force = bool(sources) and all(FORCE in item.recording and TORQUE not in item.recording for item in sources)
     channel = FORCE if is_force else TORQUE
-    check_sources(sources, PROCEDURE, (channel, "pressure_difference", "direction"), 1, moving=(channel,))
+    check_sources(sources, (channel, "pressure_difference", "direction"), 1, moving=(channel,))
     for source in sources:
-        check_not_alone(source, PROCEDURE, "pressure_difference")
-        check_not_clipped(source, PROCEDURE, channel, "pressure_difference", source.recording["pressure_difference"])
+        check_not_alone(source, "pressure_difference")
+        check_not_clipped(source, channel, "pressure_difference", source.recording["pressure_difference"])
         directions = source.recording["direction"]
         wrong = np.flatnonzero(~np.isin(directions, (-1.0, 0.0, 1.0)))
         if wrong.size:
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel 'direction' is {directions[wrong[0]]:g} at sample "
+            source.refuse(
+                f"channel 'direction' is {directions[wrong[0]]:g} at sample "
                 f"{wrong[0] + 1}; must be 1 while the pressure rises, -1 while it falls, 0 otherwise"
             )
     pressure, load, direction = (pool(sources, name) for name in ("pressure_difference", channel, "direction"))
     is_used = direction != 0.0
-    check_no_wrong_reading(sources, PROCEDURE, channel, (pressure, direction), is_used)
+    check_no_wrong_reading(sources, channel, (pressure, direction), is_used)
     # A scale that only pulls shows nothing until friction is overcome: the rising branch then has a flat start, a
     # lowest reading that belongs to two pressures or more, or is nothing at all.
     lowest = load.min()
@@ -126,7 +127,7 @@ def torque_readings(sources: tuple[RecordingSource, ...], zero_of_pressure: floa
     _check_separable(sources, pressure, direction, zero_of_pressure)
     for source in sources:
         loads = source.recording[channel]
-        check_not_clipped(source, PROCEDURE, "pressure_difference", channel, loads, _MORE_THAN_FRICTION)
+        check_not_clipped(source, "pressure_difference", channel, loads, _MORE_THAN_FRICTION)
 
     # A repetition of a recording is one cluster; so is a recording without repetitions.
     recordings = [source.recording for source in sources]
@@ -168,17 +169,15 @@ def _check_separable(
 ) -> None:
     """Raise IdentificationError for too few readings, a missing branch, or too few different pressures."""
     if pressure.size < _MINIMUM_SAMPLES:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE} needs at least {_MINIMUM_SAMPLES} readings, not {pressure.size}"
-        )
+        sources[0].refuse(f"needs at least {_MINIMUM_SAMPLES} readings, not {pressure.size}")
     for sign, name in ((1.0, "rising"), (-1.0, "falling")):
         if not (direction == sign).any():
             raise IdentificationError(
-                f"{', '.join(source.name for source in sources)}: {PROCEDURE}: the {name} branch is missing: no "
+                f"{', '.join(source.name for source in sources)}: the {name} branch is missing: no "
                 f"reading has direction {sign:+.0f}"
             )
     if pressure.max() == pressure.min():
-        check_moves(sources[0], PROCEDURE, "pressure_difference")
+        check_moves(sources[0], "pressure_difference")
     # Two levels fix a line, but do not show whether it is one. Slope, zero and growth of the friction are extrapolated
     # from the spread of the pressures to zero, which the jitter about one commanded pressure does not carry.
     highest = _SAME_LEVEL * float(np.abs(pressure).max())
@@ -192,7 +191,7 @@ def _check_separable(
         shown, unit = in_shown_unit(width, "Pa_d")
         why = f"{percentage(_SAME_LEVEL, 2)} of the highest" if width > zero_of_pressure else "[bench] zero_of_pressure"
         raise IdentificationError(
-            f"{', '.join(source.name for source in sources)}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} "
+            f"{', '.join(source.name for source in sources)}: needs readings at {_MINIMUM_LEVELS} "
             f"different pressures or more, not {levels}; pressures closer than {shown:.3g} {unit} ({why}) count as one"
         )
 
@@ -218,109 +217,110 @@ def _change_per_sweep(source: RecordingSource, name: str) -> float:
     return abs(float(np.sum((direction[1:] * np.diff(source.recording[name]))[is_inside]))) / sweeps
 
 
-def static_torque(
-    sources: tuple[RecordingSource, ...], confidence: float = 0.95, tolerances: Tolerances = DEFAULTS
-) -> BenchResult:
-    """Identify torque constant [m^3], friction without pressure [N m], its growth [m^3], and scale zero [N m].
+class StaticTorqueProblem(BenchLaw):
+    """Table of procedure static-torque: torque constant and static friction from rising and falling pressure.
 
-    The model is equation (2). The friction is static, or kinetic if the actuator slid. For a force the units are m^2
-    and N. Readings with direction 0 belong to no branch and are left out. So is a flat start of the rising branch,
-    where a scale that only pulls shows nothing until friction is overcome.
-
-    Arguments:
-        sources: recordings of pressure difference, direction, and torque or force
-        confidence: confidence level of the intervals [-]
-        tolerances: limits of the errors of the bench
-
-    Returns:
-        the estimates with intervals and verdicts, a summary and two panels
-
-    Raises:
-        IdentificationError: recordings that cannot separate the unknowns; names file, sample and remedy
+    The friction is kinetic if the actuator slid. Readings with direction 0 belong to no branch and are left out. So is
+    a flat start of the rising branch, where a scale that only pulls shows nothing until friction is overcome.
     """
-    readings = torque_readings(sources, tolerances.zero_of_pressure)
-    channel, is_force, files = readings.channel, readings.channel == FORCE, [source.name for source in sources]
-    # An actuator that slides has kinetic friction. A set has no entry for a force or an area.
-    key, friction = ("dynamic", "friction in motion") if readings.slides else ("static", "static friction")
-    load_unit, slope, slope_unit = ("N", "area", "m^2") if is_force else ("N m", "torque constant", "m^3")
-    slope_path = "static_torque.area" if is_force else "actuator.torque_constant"
-    friction_path = f"static_torque.{key}_friction" if is_force else f"friction.{key}_torque"
-    growth_path = f"effects.seal_friction.{key}_per_pressure"
-    growth_path = "static_torque.friction_per_pressure" if is_force else growth_path
-    start_slope, start_zero, start_friction, scale = _straight_line(readings, ", ".join(files))
-    frictions = [f"friction of {file}" for file in files] if len(files) > 1 else []
-    has_zeros = "zero" in tolerances.each_recording and len(files) > 1
-    zeros = [f"{_SENSOR_ZERO} of {file}" for file in files] if has_zeros else [_SENSOR_ZERO]
-    load_gain = f"gain of the {channel} sensor"
-    numbers = (
-        sought(slope_path, start_slope),
-        sought(friction_path, start_friction, scale=scale),
-        sought(growth_path, 0.0, scale=scale / float(np.abs(readings.pressure).max())),
-        sought(_ZERO, start_zero, scale=scale),
-        *(number for name in zeros for number in within(name, tolerances.zero_of_pressure)),
-        *within(_GAIN, tolerances.gain_of("pressure")),
-        *within(load_gain, tolerances.gain_of(channel)),
-        *(number for name in frictions for number in within(name, tolerances.friction, "friction")),
-    )
 
-    def of_files(at: Values, names: list[str]) -> Floats:
-        values = np.array([at[name] for name in names] or [0.0])
-        return np.asarray(values[readings.files] if len(names) > 1 else values)
+    needed = (TORQUE, "pressure_difference", "direction")
+    row_time = 1.0
+    own_errors = ("zero",)
+    kind: Literal["static-torque"]
 
-    def law(at: Values) -> Floats:
-        pressure = (readings.pressure - of_files(at, zeros)) / (1.0 + at[_GAIN])
-        resisting = readings.branch * (at[friction_path] + at[growth_path] * np.abs(pressure))
-        resisting = resisting * (1.0 + of_files(at, frictions))
-        load = (1.0 + at[load_gain]) * (at[slope_path] * pressure - resisting)
-        return np.asarray(readings.weight * (load + at[_ZERO]))
+    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+        """Identify torque constant [m^3], friction without pressure [N m], its growth [m^3], and scale zero [N m].
 
-    middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
-    groups = (
-        np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist(),
-        np.where(readings.pressure > middle, "readings at higher pressures", "readings at lower pressures").tolist(),
-    )
-    # Loads over their noise.
-    weighted = PooledReadings(
-        readings.weight * readings.load, [channel] * readings.pressure.size, readings.recordings, groups
-    )
-    fitted, weighted_model = solve(law, weighted, numbers, confidence)
-    values, residuals = fitted.by_name, readings.load - weighted_model / readings.weight
-    marks = []
-    for role, sign, motion in (("rising", 1.0, "with"), ("falling", -1.0, "against")):
-        # An actuator that slides at constant pressure has two directions of motion as branches.
-        label = f"moving {motion} the pressure" if readings.slides else f"pressure {role}"
-        on = readings.branch == sign
-        marks.append(readings_mark(label, readings.pressure[on], readings.load[on], role))
-    ends = np.array([readings.pressure.min(), readings.pressure.max()])
-    marks.append(curve_mark("without friction", ends, values[slope_path] * ends + values[_ZERO]))
-    shown_slope, shown_slope_unit = in_shown_unit(values[slope_path], slope_unit)
-    shown_friction, unit = in_shown_unit(values[friction_path], load_unit)
-    scatter, _ = in_shown_unit(float(np.std(residuals)), load_unit)
-    axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind(channel.capitalize(), load_unit, channel)
-    result = result_of(
-        PROCEDURE,
-        sources,
-        fitted,
-        (
-            ReportedNumber(slope_path, slope_unit, f"{slope.capitalize()}, the common slope of both branches"),
-            ReportedNumber(friction_path, load_unit, f"{friction.capitalize()} without a pressure difference"),
-            ReportedNumber(growth_path, f"{load_unit}/Pa", f"Growth of the {friction} with the pressure difference"),
-            # A zero of the scale may be an answer.
-            ReportedNumber(_ZERO, load_unit, f"Zero of the {channel} sensor", float(np.ptp(readings.load))),
-        ),
-        f"{readings.pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {slope} "
-        f"{shown_slope:.4g} {shown_slope_unit}, {friction} {shown_friction:.3g} {unit}; scatter {scatter:.3g} {unit}",
-        with_residuals(f"Static {channel}", *axes, marks, readings.pressure, residuals),
-        f"a constant {slope} and a {friction} linear in pressure do not describe the readings",
-    )
-    # Friction that is certainly negative, or falls with the pressure, is none.
-    for path, fault in (
-        (friction_path, "without pressure is negative, as if it drove the motion"),
-        (growth_path, "falls as the pressure rises, as if pressure loosened the seal"),
-    ):
-        if not result.conflict and result[path].high < 0.0:
-            return result.for_this_model_only(f"the {friction} {fault}; check the channels and their units")
-    return result
+        For a force the units are m^2 and N. Raises IdentificationError for recordings that cannot separate them.
+        """
+        tolerances = context.tolerances
+        readings = torque_readings(sources, tolerances.zero_of_pressure)
+        channel, is_force, files = readings.channel, readings.channel == FORCE, [source.name for source in sources]
+        # An actuator that slides has kinetic friction. A set has no entry for a force or an area.
+        key, friction = ("dynamic", "friction in motion") if readings.slides else ("static", "static friction")
+        load_unit, slope, slope_unit = ("N", "area", "m^2") if is_force else ("N m", "torque constant", "m^3")
+        slope_path = "static_torque.area" if is_force else "actuator.torque_constant"
+        friction_path = f"static_torque.{key}_friction" if is_force else f"friction.{key}_torque"
+        growth_path = f"effects.seal_friction.{key}_per_pressure"
+        growth_path = "static_torque.friction_per_pressure" if is_force else growth_path
+        start_slope, start_zero, start_friction, scale = _straight_line(readings, ", ".join(files))
+        frictions = [f"friction of {file}" for file in files] if len(files) > 1 else []
+        has_zeros = "zero" in tolerances.each_recording and len(files) > 1
+        zeros = [f"{_SENSOR_ZERO} of {file}" for file in files] if has_zeros else [_SENSOR_ZERO]
+        load_gain = f"gain of the {channel} sensor"
+        numbers = (
+            sought(slope_path, start_slope),
+            sought(friction_path, start_friction, scale=scale),
+            sought(growth_path, 0.0, scale=scale / float(np.abs(readings.pressure).max())),
+            sought(_ZERO, start_zero, scale=scale),
+            *(number for name in zeros for number in within(name, tolerances.zero_of_pressure)),
+            *within(_GAIN, tolerances.gain_of("pressure")),
+            *within(load_gain, tolerances.gain_of(channel)),
+            *(number for name in frictions for number in within(name, tolerances.friction, "friction")),
+        )
+
+        def of_files(at: Values, names: list[str]) -> Floats:
+            values = np.array([at[name] for name in names] or [0.0])
+            return np.asarray(values[readings.files] if len(names) > 1 else values)
+
+        def law(at: Values) -> Floats:
+            pressure = (readings.pressure - of_files(at, zeros)) / (1.0 + at[_GAIN])
+            resisting = readings.branch * (at[friction_path] + at[growth_path] * np.abs(pressure))
+            resisting = resisting * (1.0 + of_files(at, frictions))
+            load = (1.0 + at[load_gain]) * (at[slope_path] * pressure - resisting)
+            return np.asarray(readings.weight * (load + at[_ZERO]))
+
+        middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
+        groups = (
+            np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist(),
+            np.where(
+                readings.pressure > middle, "readings at higher pressures", "readings at lower pressures"
+            ).tolist(),
+        )
+        # Loads over their noise.
+        weighted = PooledReadings(
+            readings.weight * readings.load, [channel] * readings.pressure.size, readings.recordings, groups
+        )
+        fitted, weighted_model = solve(law, weighted, numbers, self.confidence)
+        values, residuals = fitted.by_name, readings.load - weighted_model / readings.weight
+        marks = []
+        for role, sign, motion in (("rising", 1.0, "with"), ("falling", -1.0, "against")):
+            # An actuator that slides at constant pressure has two directions of motion as branches.
+            label = f"moving {motion} the pressure" if readings.slides else f"pressure {role}"
+            on = readings.branch == sign
+            marks.append(readings_mark(label, readings.pressure[on], readings.load[on], role))
+        ends = np.array([readings.pressure.min(), readings.pressure.max()])
+        marks.append(curve_mark("without friction", ends, values[slope_path] * ends + values[_ZERO]))
+        shown_slope, shown_slope_unit = in_shown_unit(values[slope_path], slope_unit)
+        shown_friction, unit = in_shown_unit(values[friction_path], load_unit)
+        scatter, _ = in_shown_unit(float(np.std(residuals)), load_unit)
+        axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind(channel.capitalize(), load_unit, channel)
+        result = result_of(
+            sources,
+            fitted,
+            (
+                ReportedNumber(slope_path, slope_unit, f"{slope.capitalize()}, the common slope of both branches"),
+                ReportedNumber(friction_path, load_unit, f"{friction.capitalize()} without a pressure difference"),
+                ReportedNumber(
+                    growth_path, f"{load_unit}/Pa", f"Growth of the {friction} with the pressure difference"
+                ),
+                # A zero of the scale may be an answer.
+                ReportedNumber(_ZERO, load_unit, f"Zero of the {channel} sensor", float(np.ptp(readings.load))),
+            ),
+            f"{readings.pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {slope} "
+            f"{shown_slope:.4g} {shown_slope_unit}, {friction} {shown_friction:.3g} {unit}; "
+            f"scatter {scatter:.3g} {unit}",
+            with_residuals(f"Static {channel}", *axes, marks, readings.pressure, residuals),
+        )
+        # Friction that is certainly negative, or falls with the pressure, is none.
+        for path, fault in (
+            (friction_path, "without pressure is negative, as if it drove the motion"),
+            (growth_path, "falls as the pressure rises, as if pressure loosened the seal"),
+        ):
+            if not result.conflict and result[path].high < 0.0:
+                return result.for_this_model_only(f"the {friction} {fault}")
+        return result
 
 
 def _straight_line(readings: TorqueReadings, files: str) -> tuple[float, float, float, float]:
@@ -336,14 +336,14 @@ def _straight_line(readings: TorqueReadings, files: str) -> tuple[float, float, 
     slope, zero, friction = solution.tolist()
     if slope <= 0.0:
         raise IdentificationError(
-            f"{files}: {PROCEDURE}: the {readings.channel} decreases while the pressure difference increases; reverse "
-            "the sign of one of them"
+            f"{files}: the {readings.channel} decreases while the pressure difference increases: a wrong "
+            "sign of one of them"
         )
     deviation = float(np.std(readings.load - design @ solution))
     # Where friction is small its sign is the noise's, and no reason to refuse.
     if friction < -_SIGMAS * deviation / np.sqrt(readings.pressure.size):
         raise IdentificationError(
-            f"{files}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
-            "reverse the sign of channel 'direction'"
+            f"{files}: the rising branch lies above the falling one, as if friction drove the motion: a "
+            "wrong sign of channel 'direction'"
         )
     return slope, zero, friction, max(abs(friction), deviation)

@@ -12,13 +12,26 @@ inside the dead band.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
+from ppafo.documents.models import Text
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.flow import ZERO, GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
+from ppafo.identification.bench.flow import (
+    VALVE,
+    ZERO,
+    FlowLaw,
+    GasAt,
+    flow_tolerances,
+    orifice_shape,
+    read_flow,
+    true_pressure,
+)
 from ppafo.identification.bench.law import (
+    BenchContext,
     BenchResult,
     PooledReadings,
     ReportedNumber,
@@ -33,7 +46,6 @@ from ppafo.identification.estimate import Verdict
 from ppafo.identification.fit import SHAPE, Conflict
 from ppafo.identification.least_squares import FitVariable, Flags
 from ppafo.identification.source import RecordingSource, pool
-from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.opening import NODES
 from ppafo.model.valves.proportional import spool_position
@@ -41,7 +53,6 @@ from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 
-PROCEDURE = "valve-map"
 CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
 PRESSURES = ("upstream_pressure", "downstream_pressure")
 MINIMUM_SAMPLES = 12
@@ -66,166 +77,213 @@ _BETTER = 5.4
 """Increase of the log-likelihood [-] by one more number that happens by chance in one fit of 1,000."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sweep:
-    """Readings of a valve, each (readings,): command [-], flow [kg/s], upstream and downstream pressure [Pa absolute].
+class _Sweep(NamedTuple):
+    """Readings of a valve: command [-], flow [kg/s], pressures [Pa], branch (1 rising, -1 falling), area [m^2].
 
-    ``branch`` is 1 where the command rises, -1 where it falls. ``commands`` has the commands of each recording; the
-    backlash is reset at the start of each.
+    ``is_possible`` flags the readings that can be, ``remarks`` are on the others.
     """
 
-    commands: tuple[Floats, ...]
     command: Floats
     flow: Floats
     upstream: Floats
     downstream: Floats
     branch: Floats
-
-    @property
-    def highest_command(self) -> float:
-        """Largest magnitude of a command [-]."""
-        return float(np.abs(self.command).max())
-
-    @property
-    def is_two_way(self) -> bool:
-        """True if the command both rises and falls, so that backlash is observable."""
-        return bool((self.branch > 0).any() and (self.branch < 0).any())
+    areas: Floats
+    is_two_way: bool
+    is_possible: Flags
+    remarks: tuple[str, ...]
 
 
-def valve_map(
-    sources: tuple[RecordingSource, ...],
-    gas: GasAt,
-    path: str = "valve",
-    confidence: float = 0.95,
-    tolerances: Tolerances = DEFAULTS,
-    nodes: Sequence[float] = (),
-) -> BenchResult:
-    """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).
+def _swept(sources: tuple[RecordingSource, ...], gas: GasAt, zero: float) -> _Sweep:
+    """Return the readings. Raises IdentificationError for those that do not determine a map.
 
-    With ``nodes`` the opening is a table over the command in place of dead band, gain and saturation.
-
-    Arguments:
-        sources: recordings of command, mass flow, upstream and downstream pressure
-        gas: gas of the bench
-        path: path of the valve in a set, ``valves.main``
-        confidence: confidence level of the intervals [-]
-        tolerances: limits of the errors of the bench
-        nodes: commands of the table between 0 and 1 [-], rising; none for a straight line beyond a dead band
-
-    Returns:
-        the estimates with intervals and verdicts, a summary and two panels
-
-    Raises:
-        IdentificationError: recordings that do not determine the map; names file, sample and remedy
+    ``zero`` is the limit of the zero of the meter, as a fraction of its largest reading [-].
     """
-    sweep, is_possible, remarks = _swept(sources, tolerances)
-    band = f"{path}.dead_band"
-    openings = [f"{SECTION}.opening.opening_{number:02}" for number in range(1, len(nodes) + 1)]
-    unknowns = _sought(sources, sweep, gas, band, nodes, openings)
-    numbers = (
-        *unknowns,
-        *flow_tolerances(gas, tolerances, PRESSURES, float(np.abs(sweep.flow).max())),
-    )
-
-    def law(at: Values) -> Floats:
-        true_upstream = true_pressure(at, "upstream_pressure", sweep.upstream)
-        true_downstream = true_pressure(at, "downstream_pressure", sweep.downstream)
-        spool = np.concatenate([spool_of(command, at[_PLAY]) for command in sweep.commands])
-        if nodes:
-            area = at[_FULL] * np.sign(spool) * table_of(nodes, [at[name] for name in openings], np.abs(spool))
-        else:
-            area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION], at[_ROUND])
-        shape = np.abs(orifice_shape(true_upstream, true_downstream, gas.heat_capacity_ratio))
-        flow = read_flow(at, gas, area * gas.choked_flow_constant * shape)
-        # A play needs every command, so that readings that cannot be drop out of the flow alone.
-        return np.where(is_possible, flow, sweep.flow)
-
-    groups = (
-        np.where(sweep.branch < 0.0, "falling commands", "rising commands").tolist(),
-        np.where(sweep.command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
-        np.where(np.abs(sweep.command) > 0.5 * sweep.highest_command, "large commands", "small commands").tolist(),
-    )
-    readings = PooledReadings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
-    fitted, model = solve(law, readings, numbers, confidence)
-    remedy = f"the opening is not the same in both directions, or not {'piece by piece ' if nodes else ''}linear"
-    # Corners are refuted where an opening with rounded ones, tried in its place, explains the readings better.
-    if not nodes and (fitted.conflict is None or fitted.conflict.number == SHAPE):
-        free = [number for number in numbers if math.isinf(number.deviation) or number.name == ZERO]
-        rounded, _ = solve(law, readings, (*free, sought(_ROUND, *_ROUNDS)), confidence)
-        gain = rounded.log_likelihood - fitted.log_likelihood
-        if gain > _BETTER:
-            remedy = (
-                f"an opening whose corners are rounded over {rounded.by_name[_ROUND]:.2g} of the command, through "
-                "which gas flows from the first command on, explains them better; with nodes = [0.05, 0.1, ...] the "
-                "opening is a table"
-            )
-            fitted = replace(fitted, conflict=Conflict("mass_flow", SHAPE, math.sqrt(2.0 * gain), 0.0))
-    values, residuals = fitted.by_name, sweep.flow - model
-    scatter = np.std(residuals) / np.abs(sweep.flow).max()
-    no_play = "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
-    if nodes:
-        reported = [ReportedNumber(_FULL, "m^2", "Effective area Cd A at full command")]
-        reported += [
-            ReportedNumber(name, "", f"Opening at a command of {node:g}", 1.0)
-            for name, node in zip(openings, nodes, strict=True)
-        ]
-        found = f"a table of {len(nodes)} nodes, {1e6 * values[_FULL]:.4g} mm^2 at full command"
-    else:
-        reported = [
-            ReportedNumber(band, "", "Dead band: command below which no gas flows, in both directions", _SMALL_COMMAND),
-            ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
-        ]
-        found = f"dead band {values[band]:.3g}, {1e6 * values[_GAIN]:.4g} mm^2 per command"
-    # Near the highest command there is no saturation to be seen, and no backlash in commands of one direction.
-    if not nodes and values[_SATURATION] < sweep.highest_command - _SATURATES:
-        reported.append(ReportedNumber(_SATURATION, "", "Saturation: command beyond which the opening is constant"))
-    if sweep.is_two_way:
-        width = "Hysteresis: width between rising and falling command"
-        reported.append(ReportedNumber(_PLAY, "", width, _SMALL_COMMAND))
-    marks = []
-    for role, name, on in (("rising", "fitted", sweep.branch == 1.0), ("falling", "", sweep.branch == -1.0)):
-        if on.any():
-            marks.append(readings_mark(f"command {role}", sweep.command[on], sweep.flow[on], role))
-            marks.append(curve_mark(name, sweep.command[on], model[on]))
-    axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
-    result = result_of(
-        PROCEDURE,
-        sources,
-        fitted,
-        reported,
-        f"{sweep.command.size} readings; {found}; scatter {scatter:.2%} of the largest flow",
-        with_residuals("Valve map", *axes, marks, sweep.command, residuals),
-        remedy,
-        (*remarks, *(() if sweep.is_two_way or nodes else (no_play,))),
-    )
-    return _with_nodes(result, band, nodes, openings) if nodes else result
-
-
-def _swept(sources: tuple[RecordingSource, ...], tolerances: Tolerances) -> tuple[_Sweep, Flags, tuple[str, ...]]:
-    """Return the readings, flags of those that are possible, and remarks on the others.
-
-    Raises IdentificationError for channels that are missing or do not move, and for a command beyond 1.
-    """
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
+    where = sources[0].where
+    check_sources(sources, CHANNELS, MINIMUM_SAMPLES, ("command", "mass_flow"), absolute=PRESSURES)
     branches = []
     for source in sources:
         requested = source.recording["command"]
         wrong = np.flatnonzero(np.abs(requested) > 1.0 + 1e-9)
         if wrong.size:
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel 'command' is {requested[wrong[0]]:g} at sample {wrong[0] + 1}; "
-                f"must be from -1 to 1: scale the channel in a column map"
+            source.refuse(
+                f"channel 'command' is {requested[wrong[0]]:g} at sample {wrong[0] + 1}; must be from -1 to 1"
             )
-        # The direction of the command, 0 before its first change, is that of the last change unless it was recorded.
+        # The direction of the command, 0 before its first change, is that of the last change unless recorded.
         signs = np.sign(np.diff(requested, prepend=requested[0]))
         last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
         branches.append(source.recording["direction"] if "direction" in source.recording else signs[last])
     command, upstream, downstream = (pool(sources, name) for name in CHANNELS if name != "mass_flow")
     direction = np.sign(command * (upstream - downstream))
-    measured, is_possible, remarks = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow)
-    commands = tuple(source.recording["command"] for source in sources)
-    sweep = _Sweep(commands, command, measured, upstream, downstream, np.concatenate(branches))
-    return sweep, is_possible, remarks
+    measured, is_possible, remarks = meter_readings(sources, direction, zero)
+    branch, span = np.concatenate(branches), float(np.ptp(command))
+    if span < _MINIMUM_RANGE:
+        raise IdentificationError(f"{where}: the command covers a range of {span:.3g}, not {_MINIMUM_RANGE:g} or more")
+    check_no_wrong_reading(sources, "mass_flow", (command, branch), np.ones(branch.size, dtype=bool))
+    shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
+    if not shape.any():
+        raise IdentificationError(f"{where}: both pressures are equal in all readings, so nothing drives a flow")
+    # Flow over flow per area at the measured pressures, so that a sagging supply is no saturation.
+    areas = np.where(shape > 0.0, measured / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
+    if float(command @ areas) <= 0.0:
+        raise IdentificationError(
+            f"{where}: the flow into chamber 1 falls as the command rises: a wrong sign of 'mass_flow' or 'command'"
+        )
+    # Backlash is seen where the command both rises and falls.
+    is_two_way = bool((branch > 0).any() and (branch < 0).any())
+    return _Sweep(command, measured, upstream, downstream, branch, areas, is_two_way, is_possible, remarks)
+
+
+class ValveMapProblem(FlowLaw):
+    """Table of procedure valve-map: dead band, gain, saturation and hysteresis from flow over command."""
+
+    needed = CHANNELS
+    row_time = 1.0
+    kind: Literal["valve-map"]
+    valve: Text | None = Field(None, description=VALVE)
+    nodes: tuple[float, ...] = Field(
+        (),
+        strict=False,
+        description="commands of a table of openings; default: straight beyond a dead band",
+    )
+
+    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+        """Identify dead band [-], gain [m^2], saturation [-] and hysteresis [-] from command and flow; (6), (7).
+
+        With nodes the opening is a table over the command in place of dead band, gain and saturation. Raises
+        IdentificationError for recordings that do not determine the map.
+        """
+        gas, path = self.gas_of(sources, context), context.valve_path(self.valve)
+        sweep = _swept(sources, gas, context.tolerances.zero_of_flow)
+        command, measured, branch, is_two_way = sweep.command, sweep.flow, sweep.branch, sweep.is_two_way
+        highest = float(np.abs(command).max())
+        band = f"{path}.dead_band"
+        openings = [f"{SECTION}.opening.opening_{number:02}" for number in range(1, len(self.nodes) + 1)]
+        numbers = (
+            *self._unknowns(sources[0].where, np.abs(command), np.abs(sweep.areas), band, openings),
+            *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
+            *flow_tolerances(gas, context.tolerances, PRESSURES, float(np.abs(measured).max())),
+        )
+
+        def law(at: Values) -> Floats:
+            true_upstream = true_pressure(at, "upstream_pressure", sweep.upstream)
+            true_downstream = true_pressure(at, "downstream_pressure", sweep.downstream)
+            spool = np.concatenate([spool_of(item.recording["command"], at[_PLAY]) for item in sources])
+            if self.nodes:
+                area = at[_FULL] * np.sign(spool) * table_of(self.nodes, [at[name] for name in openings], np.abs(spool))
+            else:
+                area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION], at[_ROUND])
+            shape = np.abs(orifice_shape(true_upstream, true_downstream, gas.heat_capacity_ratio))
+            flow = read_flow(at, gas, area * gas.choked_flow_constant * shape)
+            # A play needs every command, so that readings that cannot be drop out of the flow alone.
+            return np.where(sweep.is_possible, flow, measured)
+
+        groups = (
+            np.where(branch < 0.0, "falling commands", "rising commands").tolist(),
+            np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
+            np.where(np.abs(command) > 0.5 * highest, "large commands", "small commands").tolist(),
+        )
+        readings = PooledReadings(measured, ["mass_flow"] * measured.size, recordings_of(sources), groups)
+        fitted, model = solve(law, readings, numbers, self.confidence)
+        reason = ""
+        # Corners are refuted where an opening with rounded ones, tried in its place, explains the readings better.
+        if not self.nodes and (fitted.conflict is None or fitted.conflict.number == SHAPE):
+            free = [number for number in numbers if math.isinf(number.deviation) or number.name == ZERO]
+            rounded, _ = solve(law, readings, (*free, sought(_ROUND, *_ROUNDS)), self.confidence)
+            gain = rounded.log_likelihood - fitted.log_likelihood
+            if gain > _BETTER:
+                reason = (
+                    f"an opening whose corners are rounded over {rounded.by_name[_ROUND]:.2g} of the command, through "
+                    "which gas flows from the first command on, explains them better (nodes make a table of it)"
+                )
+                fitted = replace(fitted, conflict=Conflict("mass_flow", SHAPE, math.sqrt(2.0 * gain), 0.0))
+        values, residuals = fitted.by_name, measured - model
+        scatter = np.std(residuals) / np.abs(measured).max()
+        no_play = "the command was swept in one direction only: the dead band includes half the width of any hysteresis"
+        if self.nodes:
+            reported = [ReportedNumber(_FULL, "m^2", "Effective area Cd A at full command")]
+            reported += [
+                ReportedNumber(name, "", f"Opening at a command of {node:g}", 1.0)
+                for name, node in zip(openings, self.nodes, strict=True)
+            ]
+            found = f"a table of {len(self.nodes)} nodes, {1e6 * values[_FULL]:.4g} mm^2 at full command"
+        else:
+            reported = [
+                ReportedNumber(
+                    band, "", "Dead band: command below which no gas flows, in both directions", _SMALL_COMMAND
+                ),
+                ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
+            ]
+            found = f"dead band {values[band]:.3g}, {1e6 * values[_GAIN]:.4g} mm^2 per command"
+        # Near the highest command there is no saturation to be seen, and no backlash in commands of one direction.
+        if not self.nodes and values[_SATURATION] < highest - _SATURATES:
+            reported.append(ReportedNumber(_SATURATION, "", "Saturation: command beyond which the opening is constant"))
+        if is_two_way:
+            width = "Hysteresis: width between rising and falling command"
+            reported.append(ReportedNumber(_PLAY, "", width, _SMALL_COMMAND))
+        marks = []
+        for role, name, on in (("rising", "fitted", branch == 1.0), ("falling", "", branch == -1.0)):
+            if on.any():
+                marks.append(readings_mark(f"command {role}", command[on], measured[on], role))
+                marks.append(curve_mark(name, command[on], model[on]))
+        axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
+        result = result_of(
+            sources,
+            fitted,
+            reported,
+            f"{command.size} readings; {found}; scatter {scatter:.2%} of the largest flow",
+            with_residuals("Valve map", *axes, marks, command, residuals),
+            reason,
+            (*sweep.remarks, *(() if is_two_way or self.nodes else (no_play,))),
+        )
+        if not self.nodes:
+            return result
+        result = _with_nodes(result, band, self.nodes, openings)
+        coefficient, full = context.number(f"{path}.discharge_coefficient"), result.estimates[0]
+        if not (coefficient and full.is_usable):
+            return result
+        # The set has area and coefficient, of which the map knows the product alone.
+        area, own = 1e6 * full.value / coefficient, 1e6 * (context.number(f"{path}.area") or 0.0)
+        remark = (
+            f"the opening is a share of the full area: with the Cd of the set {path}.area = {area:.4g} mm^2, and the "
+            f"set has {own:.4g} mm^2, which stays; no interval counts that the opening is straight between two nodes"
+        )
+        return replace(result, remarks=(*result.remarks, remark))
+
+    def _unknowns(
+        self, where: str, size: Floats, areas: Floats, band: str, openings: Sequence[str]
+    ) -> tuple[FitVariable, ...]:
+        """Return the unknowns of the opening with first guesses from sizes of commands [-] and areas [m^2].
+
+        ``band`` and ``openings`` are paths of the straight line or the table. Raises IdentificationError, beginning
+        with ``where``, if the readings do not determine them.
+        """
+        largest, highest = float(areas.max()), float(size.max())
+        if self.nodes:
+            ends = [0.0, *self.nodes, 1.0]
+            if highest < _NEARLY_FULL:
+                raise IdentificationError(f"{where}: nodes need readings up to full command, not to {highest:.3g}")
+            rises = min(np.diff(ends)) > 0.0
+            if len(self.nodes) > NODES or not rises or np.histogram(size, ends)[0].min() < _FEWEST_BETWEEN:
+                raise IdentificationError(
+                    f"{where}: nodes = {list(self.nodes)}: must rise from above 0 to below 1, at most "
+                    f"{NODES}, with {_FEWEST_BETWEEN} readings or more between two of them and the ends 0 and 1"
+                )
+            near = [float(np.median(areas[np.argsort(np.abs(size - node))[:3]])) for node in self.nodes]
+            starts = zip(openings, np.clip(np.array(near) / largest, 0.0, 1.0).tolist(), strict=True)
+            return (sought(_FULL, largest, 0.0), *(sought(name, start, 0.0, 1.0, 1.0) for name, start in starts))
+        half = float(size[areas > _HALF_OPEN * largest].min())
+        if not half > 0.0:
+            raise IdentificationError(f"{where}: at command 0, the valve has more than half of its largest flow")
+        shut = size[areas < _SHUT * largest]
+        # Inside the bounds, so that the search can go either way.
+        start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
+        return (
+            sought(band, start, 0.0, half, highest),
+            sought(_GAIN, 0.5 * largest / (half - start), 0.0),
+            # Just inside the highest command, beyond which no reading changes with it.
+            sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
+        )
 
 
 def table_of(nodes: Sequence[float], openings: Sequence[float], size: Floats) -> Floats:
@@ -279,71 +337,3 @@ def spool_of(command: Floats, width: float) -> Floats:
         position = spool_position(position, requested, width)
         positions.append(position)
     return np.array(positions)
-
-
-def _sought(
-    sources: tuple[RecordingSource, ...],
-    sweep: _Sweep,
-    gas: GasAt,
-    band: str,
-    nodes: Sequence[float],
-    openings: Sequence[str],
-) -> tuple[FitVariable, ...]:
-    """Return the unknowns with first guesses; ``band`` and ``openings`` are paths of the straight line or the table.
-
-    Raises IdentificationError if the readings do not determine them.
-
-    The effective area is flow divided by flow per area at the measured pressures, so that a sagging supply is not
-    saturation.
-    """
-    span = float(np.ptp(sweep.command))
-    if span < _MINIMUM_RANGE:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the command covers a range of {span:.3g}, not {_MINIMUM_RANGE:g} or more"
-        )
-    drivers = sweep.command, sweep.branch
-    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", drivers, np.ones(sweep.flow.size, dtype=bool))
-    shape = np.abs(orifice_shape(sweep.upstream, sweep.downstream, gas.heat_capacity_ratio))
-    if not shape.any():
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: both pressures are equal in all readings, so nothing drives a flow"
-        )
-    areas = np.where(shape > 0.0, sweep.flow / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
-    if float(sweep.command @ areas) <= 0.0:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the flow into chamber 1 falls as the command rises; reverse the sign of "
-            "'mass_flow' or 'command'"
-        )
-    size, largest, highest = np.abs(sweep.command), float(np.abs(areas).max()), sweep.highest_command
-    play = (sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()
-    if nodes:
-        ends = [0.0, *nodes, 1.0]
-        if highest < _NEARLY_FULL:
-            raise IdentificationError(
-                f"{sources[0].name}: {PROCEDURE}: nodes need readings up to full command, not to {highest:.3g}"
-            )
-        rises = min(np.diff(ends)) > 0.0
-        if len(nodes) > NODES or not rises or np.histogram(size, ends)[0].min() < _FEWEST_BETWEEN:
-            raise IdentificationError(
-                f"{sources[0].name}: {PROCEDURE}: nodes = {list(nodes)}: must rise from above 0 to below 1, at most "
-                f"{NODES}, with {_FEWEST_BETWEEN} readings or more between two of them and the ends 0 and 1"
-            )
-        near = [float(np.median(np.abs(areas[np.argsort(np.abs(size - node))[:3]]))) for node in nodes]
-        starts = zip(openings, np.clip(np.array(near) / largest, 0.0, 1.0).tolist(), strict=True)
-        return (sought(_FULL, largest, 0.0), *(sought(name, start, 0.0, 1.0, 1.0) for name, start in starts), *play)
-    half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())
-    if not half > 0.0:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: at command 0, the valve has more than half of its largest flow; check "
-            "the zero of channel 'command', or omit the reading at command 0"
-        )
-    shut = size[np.abs(areas) < _SHUT * largest]
-    # Inside the bounds, so that the search can go either way.
-    start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
-    return (
-        sought(band, start, 0.0, half, highest),
-        sought(_GAIN, 0.5 * largest / (half - start), 0.0),
-        # Just inside the highest command, beyond which no reading changes with it.
-        sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
-        *play,
-    )

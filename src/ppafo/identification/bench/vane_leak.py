@@ -15,19 +15,20 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
+from ppafo.documents.models import Quantified
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import (
     CRITICAL_RATIOS,
     GAS_LAW,
     LAW_NAMES,
-    NEXT_LAW,
     PRODUCT_ONLY,
     TEMPERATURE,
-    GasAt,
+    FlowLaw,
     Law,
     Opening,
     OpeningSizes,
@@ -35,13 +36,16 @@ from ppafo.identification.bench.flow import (
     check_both_regimes,
     gas_tolerances,
     has_both_regimes,
+    is_same_gas,
     reported_parts,
     solve_flow,
 )
 from ppafo.identification.bench.law import (
+    BenchContext,
     BenchResult,
     PooledReadings,
     ReportedNumber,
+    TimedLaw,
     Values,
     halved_readings,
     recordings_of,
@@ -64,16 +68,15 @@ from ppafo.identification.estimate import in_shown_unit, interval_texts
 from ppafo.identification.fit import Fit
 from ppafo.identification.least_squares import FitVariable
 from ppafo.identification.source import RecordingSource, pool, window
-from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances
+from ppafo.identification.tolerances import Tolerances
+from ppafo.parameters.device import VANE
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.wording import count_of
 
-PROCEDURE = "vane-leak"
 CHANNELS = ("pressure_1", "pressure_2")
 MINIMUM_SAMPLES = 20
 """Least number of samples of a decay."""
@@ -201,15 +204,15 @@ def chamber_decay(source: RecordingSource, start: float | None, end: float | Non
     ``number`` is the number of the decay. Raises IdentificationError for a saturated sensor or too few samples.
     """
     part = window(source.recording, start, end)
-    skipped = check_no_gap(source, PROCEDURE, part)
+    skipped = check_no_gap(source, part)
     for name in CHANNELS:
         for plateau in plateaus(part[name]):
             # Later plateaus may be the resolution of the sensor, as the pressure hardly falls any more.
             if plateau.first < EDGE and stands_out(part[name], plateau):
-                raise IdentificationError(
-                    f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
+                source.refuse(
+                    f"channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
                     f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}: it is saturated, or the "
-                    "chamber was not yet closed; give a start after this sample"
+                    "chamber was not yet closed"
                 )
     decay = ChamberDecay(part.time, part["pressure_1"], part["pressure_2"], fuller=1, number=number)
     if not np.mean((decay.first - decay.second)[: decay.edge]) > 0.0:
@@ -219,9 +222,8 @@ def chamber_decay(source: RecordingSource, start: float | None, end: float | Non
     low = np.flatnonzero(difference < _EQUAL * float(np.mean(difference[: decay.edge])))
     count = int(low[0]) if low.size else difference.size
     if count < MINIMUM_SAMPLES:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: only {count} samples lie between the start and equal pressures, but "
-            f"{MINIMUM_SAMPLES} are needed"
+        source.refuse(
+            f"only {count} samples lie between the start and equal pressures, but {MINIMUM_SAMPLES} are needed"
         )
     time = decay.time[:count] - decay.time[0]
     return decay._replace(time=time, first=decay.first[:count], second=decay.second[:count])
@@ -303,56 +305,82 @@ class LawFit(NamedTuple):
         return f"law = '{self.opening.law}' ({', '.join(quantities)})"
 
 
-def vane_leak(
-    sources: tuple[RecordingSource, ...],
-    gas: GasAt,
-    volume_1: float | None = None,
-    volume_2: float | None = None,
-    discharge_coefficient: float | None = None,
-    start: float | None = None,
-    end: float | None = None,
-    confidence: float = 0.95,
-    critical_ratio: float | None = None,
-    law: Literal["orifice", "iso6358", "laminar", "both"] = "orifice",
-    tolerances: Tolerances = DEFAULTS,
-    volume_deviation: float = deviation_of_limit(HELD["actuator.dead_volume_1"]),
-) -> BenchResult:
-    """Identify the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
+class VaneLeakProblem(FlowLaw, TimedLaw):
+    """Table of procedure vane-leak: area, conductance or laminar coefficient from decaying pressure or steady flow."""
 
-    Recordings with a ``mass_flow`` are steady: the flow that maintains the pressure, at several pressures. The laws
-    ``iso6358`` and ``both`` are compared with each other: the values of one hold for this model only if the other one
-    explains the readings clearly better.
+    needed = CHANNELS
+    kind: Literal["vane-leak"]
+    angle: Annotated[float, Quantified("rad")] | None = Field(
+        None, description="vane angle, from which the set's volumes follow"
+    )
+    law: Law = Field(
+        "orifice",
+        description="flow law; an orifice in the form of the set; 'iso6358': C and b; 'both': orifice and laminar gap",
+    )
+    volume_1: Annotated[float, Quantified("m^3", above=0.0)] | None = Field(
+        None, description="volume of chamber 1 with its line, '40 cm^3'; known to 5 %, or to bench.held"
+    )
+    volume_2: Annotated[float, Quantified("m^3", above=0.0)] | None = Field(
+        None, description="volume of chamber 2 with its line"
+    )
 
-    Arguments:
-        sources: recordings of both chamber pressures
-        gas: gas of the bench
-        volume_1, volume_2: chamber volumes [m^3]; without the volume of the emptying chamber, area over volume is found
-        discharge_coefficient: Cd [-], with which an orifice gives an area; None for the product Cd A
-        start, end: samples used of closed chambers [s]
-        confidence: confidence level of the intervals [-]
-        critical_ratio: b of ISO 6358 [-], which selects the sonic conductance for ``orifice`` and ``both``
-        law: ``iso6358`` for C and b, ``laminar`` for a laminar coefficient, ``both`` for a laminar gap in parallel with
-            the orifice
-        tolerances: limits of the errors of the bench
-        volume_deviation: relative standard deviation of a volume [-]
+    def volumes_of(self, context: BenchContext) -> tuple[float | None, float | None, float]:
+        """Return both chamber volumes [m^3], stated or from the angle, and their relative standard deviation [-].
 
-    Returns:
-        the estimates with intervals and verdicts, a summary and two panels
+        Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
+        displacement per radian [m^3/rad].
+        """
+        first, second, angle = self.volume_1, self.volume_2, self.angle
+        deviation = context.tolerances.deviation_of("actuator.dead_volume_1", 1.0, 0.0)
+        if angle is not None:
+            if context.parameter_set.actuator_kind != VANE:
+                raise IdentificationError(f"{context.label}: angle is for a vane; allowed: volume_1, volume_2")
+            names = ("angle_min", "angle_max", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
+            lower, upper, per_angle, dead_1, dead_2 = context.numbers(*(f"actuator.{name}" for name in names))
+            if not lower <= angle <= upper:
+                raise IdentificationError(
+                    f"{context.label}: angle = {angle:.4g} rad lies beyond the stops, {lower:.4g} to {upper:.4g} rad"
+                )
+            # A volume that is given counts before one from the angle: its line may be another one.
+            first = first or dead_1 + per_angle * (angle - lower)
+            second = second or dead_2 + per_angle * (upper - angle)
+            of_volume = context.deviation("actuator.dead_volume_1", dead_1, "m^3")
+            of_angle = (angle - lower) * context.deviation("actuator.displacement_per_radian", per_angle, "m^3/rad")
+            deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
+        return first, second, deviation
 
-    Raises:
-        IdentificationError: recordings that do not determine the leak; names file, sample and remedy
-    """
-    laws = list[tuple[Opening, ReportedNumber]]()
-    for each in (law, *RIVALS.get(law, ())):
-        # An orifice has the form of the set; the law ``iso6358`` seeks b.
-        form = "iso6358" if each == "orifice" and critical_ratio is not None else each
-        known_ratio = None if each == "iso6358" else critical_ratio
-        opening = Opening(gas, form, discharge_coefficient or PRODUCT_ONLY, known_ratio)
-        laws.append((opening, _size(opening, discharge_coefficient)))
-    if sources and all("mass_flow" in source.recording for source in sources):
-        return _steady_leak(sources, laws, tolerances, confidence)
-    volumes = volume_1, volume_2
-    return _closed_leak(sources, (start, end), laws, volumes, volume_deviation, tolerances, confidence)
+    def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
+        """Identify the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
+
+        Recordings with a ``mass_flow`` are steady: the flow that maintains the pressure, at several pressures. The laws
+        ``iso6358`` and ``both`` are compared with each other: the values of one hold for this model only if the other
+        one explains the readings clearly better. Raises IdentificationError for recordings that do not determine it.
+        """
+        volumes, gas = self.volumes_of(context), self.gas_of(sources, context)
+        discharge_coefficient, critical_ratio = (
+            context.number(f"actuator.leak.{name}") for name in ("discharge_coefficient", "critical_ratio")
+        )
+        laws = list[tuple[Opening, ReportedNumber]]()
+        for each in (self.law, *RIVALS.get(self.law, ())):
+            # An orifice has the form of the set; the law ``iso6358`` seeks b.
+            form: Law = "iso6358" if each == "orifice" and critical_ratio is not None else each
+            known_ratio = None if each == "iso6358" else critical_ratio
+            opening = Opening(gas, form, discharge_coefficient or PRODUCT_ONLY, known_ratio)
+            laws.append((opening, _size(opening, discharge_coefficient)))
+        if all("mass_flow" in source.recording for source in sources):
+            result = _steady_leak(sources, laws, context.tolerances, self.confidence)
+        else:
+            window = self.start, self.end
+            result = _closed_leak(sources, window, laws, volumes, context.tolerances, self.confidence)
+        own = context.number("gas.molar_mass")
+        gap = next((each for each in result.estimates if each.path == GAP and each.is_usable and each.value), None)
+        if gap is None or own is None or is_same_gas(own, gas.molar_mass):
+            return result
+        # The flow of a laminar gap goes with 1 / (R T viscosity), that of an orifice needs no viscosity.
+        remark = f"{GAP} is not written to the set, whose gas is not that of the bench and has another viscosity"
+        of_bench = replace(gap, path="vane_leak.laminar_coefficient")
+        estimates = tuple(of_bench if item is gap else item for item in result.estimates)
+        return replace(result, estimates=estimates, remarks=(*result.remarks, remark))
 
 
 def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumber:
@@ -380,12 +408,12 @@ def _steady_leak(
 ) -> BenchResult:
     """Identify the leak from steady flow at several pressures, which separate the zero of the flow meter."""
     channels = (*CHANNELS, "mass_flow")
-    check_sources(sources, PROCEDURE, channels, _FEWEST_STEADY, moving=("mass_flow",), absolute=CHANNELS)
+    check_sources(sources, channels, _FEWEST_STEADY, moving=("mass_flow",), absolute=CHANNELS)
     for source in sources:
-        check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])
+        check_not_clipped(source, "mass_flow", "pressure_1", source.recording["pressure_1"])
     first, second, flow = (pool(sources, name) for name in channels)
-    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", (first, second), np.ones(flow.size, dtype=bool))
-    flow, is_possible, remarks = meter_readings(sources, PROCEDURE, first - second, tolerances.zero_of_flow)
+    check_no_wrong_reading(sources, "mass_flow", (first, second), np.ones(flow.size, dtype=bool))
+    flow, is_possible, remarks = meter_readings(sources, first - second, tolerances.zero_of_flow)
     first, second, flow = first[is_possible], second[is_possible], flow[is_possible]
     labels = np.array(recordings_of(sources))[is_possible].tolist()
     difference = first - second
@@ -396,7 +424,7 @@ def _steady_leak(
     readings = PooledReadings(flow, ["mass_flow"] * flow.size, labels, (halves,))
     ratio, fits = np.minimum(first, second) / np.maximum(first, second), list[LawFit]()
     if laws[0][0].has_sought_ratio:
-        check_both_regimes(ratio, sources[0].name, PROCEDURE)
+        check_both_regimes(ratio, sources[0])
     is_wide = has_both_regimes(ratio)
     for opening, size in laws:
         _, alone = opening.rough_sizes(first, second, flow)
@@ -432,14 +460,9 @@ def _compared(
     that depend on whether there is a gap hold for this model only.
     """
     chosen, rival = fits[0], fits[-1]
-    # An orifice in the form of the set, with its critical ratio.
-    advice = NEXT_LAW["orifice" if chosen.opening.law == "iso6358" else chosen.opening.law]
     advantage = rival.fitted.log_likelihood - chosen.fitted.log_likelihood
-    if rival is not chosen:
-        is_better = rival.is_sound and advantage > -_CLEAR
-        advice = f"try law = '{rival.opening.law}'" if is_better else _NEITHER
-    remedy = f"{advice}, or give a start and an end; gas may leak elsewhere, or exchange heat with the walls"
-    result = result_of(PROCEDURE, sources, chosen.fitted, chosen.reported, summary, panels, remedy, remarks, scatter)
+    reason = "" if rival is chosen or (rival.is_sound and advantage > -_CLEAR) else _NEITHER
+    result = result_of(sources, chosen.fitted, chosen.reported, summary, panels, reason, remarks, scatter)
     if rival is chosen:
         return result
     if advantage >= _CLEAR:
@@ -447,9 +470,8 @@ def _compared(
             f"{rival.text} explains the readings better than law = '{chosen.opening.law}' (log-likelihood higher by "
             f"{advantage:.1f})"
         )
-        unexplained = result.conflict or f"{better}, but not all of them; {remedy}"
-        advice = f"{better}; give law = '{rival.opening.law}'"
-        return result.for_this_model_only(advice if rival.is_sound else unexplained)
+        unexplained = result.conflict or f"{better}, but not all of them"
+        return result.for_this_model_only(better if rival.is_sound else unexplained)
     with_gap = rival if chosen.opening.has_sought_ratio else chosen
     if (
         advantage <= -_CLEAR
@@ -462,7 +484,7 @@ def _compared(
         return result
     remark = (
         f"the readings do not tell law = '{chosen.opening.law}' from {rival.text}: the log-likelihoods differ by "
-        f"{abs(advantage):.1f}, less than {_CLEAR:.1f}; less noise, or more pressures, may tell them apart"
+        f"{abs(advantage):.1f}, less than {_CLEAR:.1f}"
     )
     result = replace(result, remarks=(*result.remarks, remark))
     # Without a gap, both laws are an orifice.
@@ -473,32 +495,30 @@ def _closed_leak(
     sources: tuple[RecordingSource, ...],
     window: tuple[float | None, float | None],
     laws: _Laws,
-    volumes: tuple[float | None, float | None],
-    volume_deviation: float,
+    volumes: tuple[float | None, float | None, float],
     tolerances: Tolerances,
     confidence: float,
 ) -> BenchResult:
     """Identify the leak from the pressures in closed chambers between two times [s], the ``window``.
 
-    ``volumes`` are V of chambers 1 and 2 [m^3].
+    ``volumes`` are V of chambers 1 and 2 [m^3], and their relative standard deviation [-].
     """
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
-    sources, remarks = without_wrong_samples(sources, PROCEDURE, CHANNELS, *window)
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS)
+    check_sources(sources, CHANNELS, MINIMUM_SAMPLES)
+    sources, remarks = without_wrong_samples(sources, CHANNELS, *window)
+    check_sources(sources, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS)
     for source in sources:
         # A chamber that is open to the room has a constant pressure.
-        check_moves(source, PROCEDURE, max(CHANNELS, key=lambda name: float(np.ptp(source.recording[name]))))
+        check_moves(source, max(CHANNELS, key=lambda name: float(np.ptp(source.recording[name]))))
     decays = tuple(chamber_decay(source, *window, number) for number, source in enumerate(sources, start=1))
     if len({(decay.fuller, decay.changing) for decay in decays}) > 1:
-        raise IdentificationError(
-            "chamber 1 empties in some recordings and chamber 2 in others; give each chamber its own [[procedure]]"
-        )
+        raise IdentificationError("chamber 1 empties in some recordings and chamber 2 in others, which are two leaks")
     # The chamber whose pressure determines the leak empties, or fills from a room.
     chamber = decays[0].fuller if decays[0].changing == 0 else 3 - decays[0].fuller
-    volume, other_volume = volumes if chamber == 1 else volumes[::-1]
+    first, second, volume_deviation = volumes
+    volume, other_volume = (first, second) if chamber == 1 else (second, first)
     ratio = np.concatenate([decay.second / decay.first for decay in decays])
     if laws[0][0].has_sought_ratio:
-        check_both_regimes(ratio, sources[0].name, PROCEDURE)
+        check_both_regimes(ratio, sources[0])
     is_wide = has_both_regimes(ratio)
     assumed_volume, gap = volume or _UNIT_VOLUME, _GAP
     if volume is None:

@@ -1,6 +1,5 @@
 """Trajectory fit problem: recordings with the scenarios that model them, parameters to fit, tolerances with priors."""
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -136,18 +135,16 @@ def check_experiment(experiment: FittedExperiment) -> None:
     where, recording, inputs = f"experiment '{experiment.label}'", experiment.recording, experiment.inputs
     if len(recording) < 2:
         raise IdentificationError(f"{where}: {recording.label} has only one sample; a fit needs two or more")
-    for key, names, allowed, fault, use in (
-        ("channels", experiment.channels, FITTED_CHANNELS, "cannot be fitted", ""),
-        ("inputs", inputs, ALL_INPUTS, "is not a measured input", " to follow"),
+    for names, allowed, fault in (
+        (experiment.channels, FITTED_CHANNELS, "cannot be fitted"),
+        (inputs, ALL_INPUTS, "is not a measured input"),
     ):
-        kind, wanted = ("channel ", FITTED_CHANNELS) if key == "channels" else ("", inputs)
-        there = json.dumps([name for name in wanted if name in recording])
         for name in names:
             if name not in allowed:
-                raise IdentificationError(f"{where}: {kind}'{name}' {fault}{known_names(name, allowed)}")
+                raise IdentificationError(f"{where}: channel '{name}' {fault}{known_names(name, allowed)}")
             if name not in recording:
-                has = f"available: {', '.join(recording.names)}; give {key} = {there}"
-                raise IdentificationError(f"{where}: {recording.label} has no channel '{name}'{use}; {has}")
+                known = known_names(name, recording.names)
+                raise IdentificationError(f"{where}: {recording.label} has no channel '{name}'{known}")
     scenario, has_torque = experiment.scenario, EXTERNAL_TORQUE in inputs
     motion, follows = vane_motion(scenario), {ANGLE} & set(inputs) & set(experiment.channels)
     is_prescribed = motion.profile is not None
@@ -204,7 +201,7 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
     if not before.any():
         raise IdentificationError(
             f"{where}: {recording.label} has no sample at or before {experiment.start:g} s, from which the initial "
-            "state is read; give a later start"
+            "state is read"
         )
     time = recording.time[before]
     rest = {name: value_at_rest(time, recording[name][before], at_end=True) for name in recording.names}
@@ -278,8 +275,7 @@ def broken_rule(device: Device) -> str:
     if dynamic > static:
         return (
             f"friction.dynamic_torque was fitted to {dynamic:.3g} N m, above friction.static_torque of "
-            f"{static:.3g} N m (fitted, or moved within its tolerance); let the section fit both, "
-            "friction.static_torque without low, high and prior"
+            f"{static:.3g} N m (fitted, or moved within its tolerance)"
         )
     if device.actuator.angle_min >= device.actuator.angle_max:
         return "actuator.angle_min was fitted above actuator.angle_max"
@@ -351,7 +347,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
         if channel in experiment.inputs:
             raise IdentificationError(
                 f"{parameter.name}: the run of experiment '{experiment.label}' uses the recorded '{channel}', so this "
-                f"parameter has no effect; omit the parameter, or remove '{channel}' from the inputs"
+                "parameter has no effect"
             )
     start = parameter.start
     if start is None:
@@ -378,7 +374,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
         (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
         (
             0.0 in (low, start) and not parameter.is_tolerance and _is_off_at_zero(scenarios[0], path, high),
-            "0 leaves it out of the model, so it cannot be fitted from there; give start and low, both above 0",
+            "0 leaves it out of the model, so it cannot be fitted from there; start and low must be above 0",
         ),
         (not is_allowed, f"the bounds {bounds} exceed the allowed range, {allowed}"),
     )
@@ -420,8 +416,6 @@ class TrajectoryProblem:
     confidence: float = 0.95
 
     def __post_init__(self) -> None:
-        if not self.parameters or not self.experiments:
-            raise IdentificationError("a trajectory fit needs at least one parameter and at least one recording")
         labels = [experiment.label for experiment in self.experiments]
         _refuse_twice("experiment", labels)
         for experiment in self.experiments:
@@ -451,7 +445,7 @@ def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
 def _refuse_twice(kind: str, names: list[str]) -> None:
     """Raise IdentificationError for a duplicated name; ``kind`` is the noun for the message."""
     if (twice := first_twice(names)) is not None:
-        raise IdentificationError(f"{kind} '{twice}' is given twice; rename or remove one of the two")
+        raise IdentificationError(f"{kind} '{twice}' is given twice")
 
 
 def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, float]:

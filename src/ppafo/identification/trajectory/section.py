@@ -5,14 +5,14 @@ All input errors are reported before the search starts.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ppafo.errors import DataError, IdentificationError, ScenarioError
 from ppafo.identification.estimate import Estimate, in_shown_unit, interval_factor
 from ppafo.identification.problem import ExperimentSection, ParameterSection, TrajectorySection
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, remarks_on_readings
-from ppafo.identification.tolerances import Tolerances, positive_in, quantity_in, quantity_of
+from ppafo.identification.tolerances import Tolerances, quantity_of
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
     INPUTS,
@@ -30,7 +30,6 @@ from ppafo.identification.trajectory.experiment import (
 )
 from ppafo.identification.trajectory.fitting import (
     CandidateExperiment,
-    ExpectedBenefit,
     TrajectoryFit,
     expected_information,
     fit,
@@ -41,7 +40,7 @@ from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.progress import Report
 from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.recorded.channels import ANGLE, COMMAND, LONGEST_STEP
+from ppafo.simulation.recorded.channels import ANGLE, COMMAND
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_fixed_volume
 from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
@@ -64,11 +63,11 @@ class SectionContext:
     read: Callable[[ExperimentSection], RecordingSource]
     folder: Path
     file: str
-    parameter_set: ParameterSet | None = None
-    valve: str | None = None
-    bench: Mapping[str, Estimate] = field(default_factory=dict)
-    used: tuple[UsedRecording, ...] = ()
-    tolerances: Tolerances = field(default_factory=Tolerances)
+    parameter_set: ParameterSet
+    valve: str | None
+    bench: Mapping[str, Estimate]
+    used: tuple[UsedRecording, ...]
+    tolerances: Tolerances
 
 
 def noise_of_channels(texts: Mapping[str, str], where: str) -> dict[str, float]:
@@ -86,29 +85,22 @@ def noise_of_channels(texts: Mapping[str, str], where: str) -> dict[str, float]:
     return deviations
 
 
-SHORTEST_STEP = 1.0e-6
-"""Shortest time step that a problem file may request [s]."""
-
-
 def trajectory_problem(section: TrajectorySection, context: SectionContext) -> TrajectoryProblem:
     """Convert a section to a fit problem. Raises IdentificationError for a recording used by a bench procedure."""
     experiments = tuple(_experiment(entry, context) for entry in section.experiments)
     scenarios = {experiment.label: experiment.scenario for experiment in experiments}
     # Samples that a bench procedure used are in its interval, which is a prior here.
     if message := double_use(context.used, map(use_of, experiments)):
-        raise IdentificationError(
-            f"{context.file}: {message}; omit the recording from the procedure or from the trajectory"
-        )
+        raise IdentificationError(f"{context.file}: {message}")
     parameters = [_parameter(entry, scenarios, context) for entry in section.parameters]
     for entry in section.experiments:
-        limit = positive_in(entry, "time_offset", "s", f"{context.file}: experiment '{entry.label}'")
-        if limit is not None:
+        if (limit := entry.time_offset) is not None:
             # The delay of the samples of one recording is known within a limit, as a tolerance is.
             deviation = deviation_of_limit(limit)
             parameters.append(
                 FreeParameter(TIME_OFFSET, 0.0, -limit, limit, deviation, (entry.label,), is_tolerance=True)
             )
-    stated = {} if context.parameter_set is None else stated_by(context.parameter_set, experiments[0].scenario)
+    stated = stated_by(context.parameter_set, experiments[0].scenario)
     tolerances = tolerance_parameters(context.tolerances, experiments, parameters, stated)
     return TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence)
 
@@ -120,10 +112,10 @@ def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExpe
     if entry.scenario is None:
         scenario, start, inputs = _replay(entry, source.recording, context, where)
     else:
-        reason = "cannot be combined with a scenario, which prescribes the motion of the vane; omit one of them"
+        reason = "cannot be combined with a scenario, which prescribes the motion of the vane"
         refuse_first(where, *((getattr(entry, name) is not None, f"{name} {reason}") for name in ("locked", "volume")))
         scenario = _scenario(entry.scenario, entry.overrides, context)
-        start, inputs = quantity_in(entry, "start", "s", where) or 0.0, entry.inputs or ()
+        start, inputs = entry.start or 0.0, entry.inputs or ()
     channels = entry.channels
     if channels is None:
         # All that is neither locked nor followed; of a fixed volume its pressure.
@@ -132,8 +124,8 @@ def _experiment(entry: ExperimentSection, context: SectionContext) -> FittedExpe
         channels = channels if entry.volume is None else ("pressure_1",)
         if scenario.device.actuator.has_one_chamber:
             channels = tuple(name for name in channels if name != "pressure_2")
-    step = quantity_in(entry, "step", "s", where, SHORTEST_STEP, LONGEST_STEP)
-    scenario = scenario if step is None else replace(scenario, run=replace(scenario.run, step=step))
+    if entry.step is not None:
+        scenario = replace(scenario, run=replace(scenario.run, step=entry.step))
     # The scenario of a replay has the state of the samples already.
     is_read = entry.scenario is not None and entry.initial_state in ("recording", "fitted")
     state: InitialState = "recording" if is_read else "scenario"
@@ -156,8 +148,10 @@ def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], conte
     quantity = declaration_of(entry.path, acting)
     atmosphere = acting.device.supply.atmospheric_pressure
     where = f"{context.file}: parameter '{entry.path}'"
+    stated = {key: getattr(entry, key) for key in ("start", "low", "high")}
     start, low, high = (
-        quantity_in(entry, key, quantity.unit, where, atmosphere=atmosphere) for key in ("start", "low", "high")
+        None if text is None else quantity_of(f"{where}: {key}", text, quantity.unit, atmosphere)
+        for key, text in stated.items()
     )
     deviation = math.inf
     if entry.prior == "bench":
@@ -182,56 +176,34 @@ def _replay(
 
     The replay starts at the first sample unless a start is given. Raises IdentificationError if a scenario is needed.
     """
-    if context.parameter_set is None:
-        raise IdentificationError(f"{where}: needs a scenario, because no device was given")
     inputs = tuple(name for name in INPUTS if name in recording) if entry.inputs is None else entry.inputs
     is_locked, is_fixed = entry.locked is not None, entry.volume is not None
     refuse_first(
         where,
-        (entry.initial_state == "scenario", "initial_state = 'scenario' needs a scenario; omit initial_state"),
+        (entry.initial_state == "scenario", "initial_state = 'scenario' needs a scenario"),
         (
             (is_locked or is_fixed) and ANGLE in inputs,
-            f"'{ANGLE}' cannot be an input with locked or volume; remove '{ANGLE}' from inputs",
+            f"'{ANGLE}' cannot be an input with locked or volume",
         ),
-        (is_locked and is_fixed, "locked and volume exclude each other: a fixed volume has no vane; omit one of them"),
+        (is_locked and is_fixed, "locked and volume exclude each other: a fixed volume has no vane"),
         (
             COMMAND not in recording,
-            f"has no scenario, so its recording needs a channel '{COMMAND}'; available: {', '.join(recording.names)}; "
-            "give a scenario",
+            f"has no scenario, so its recording needs a channel '{COMMAND}'; available: {', '.join(recording.names)}",
         ),
         (COMMAND not in inputs, f"has no scenario, so inputs must have '{COMMAND}'"),
     )
-    start_time = quantity_in(entry, "start", "s", where)
-    start_time = float(recording.time[0]) if start_time is None else start_time
+    start_time = float(recording.time[0]) if entry.start is None else entry.start
     used = recording.between(start_time, float(recording.time[-1]))
     device = build_device(apply_overrides(context.parameter_set, entry.overrides, valve=context.valve), context.valve)
-    angle, volume = quantity_in(entry, "locked", "rad", where), positive_in(entry, "volume", "m^3", where)
-    known = {} if angle is None else {ANGLE: angle}
-    if volume is not None:
-        device, known = with_fixed_volume(device, volume)
-    remedies = dict.fromkeys(
-        FITTED_CHANNELS, 'give a scenario, which prescribes the initial state, and channels = ["angle"]'
-    )
-    start = start_of(used, device, known, where, remedies)
+    known = {} if entry.locked is None else {ANGLE: entry.locked}
+    if entry.volume is not None:
+        device, known = with_fixed_volume(device, entry.volume)
+    start = start_of(used, device, known, where)
     motion = locked_vane(start.angle) if known else None
     return replay_scenario(recording, device, start, used.duration, where, motion), start_time, inputs
 
 
-@dataclass(frozen=True, slots=True)
-class TrajectoryOutcome:
-    """Result of section [trajectory]: fit, expected benefit of candidates (best first), and remarks."""
-
-    fit: TrajectoryFit
-    expected: tuple[ExpectedBenefit, ...]
-    remarks: tuple[str, ...]
-
-    @property
-    def is_good(self) -> bool:
-        """True if the search converged to a valid device and no part of the recordings contradicts the rest."""
-        return not self.fit.conflict and not self.fit.remarks
-
-
-def solve_section(section: TrajectorySection, context: SectionContext, report: Report) -> TrajectoryOutcome:
+def solve_section(section: TrajectorySection, context: SectionContext, report: Report) -> TrajectoryFit:
     """Solve section [trajectory]: fit the parameters and rank the candidates, after a check of all inputs."""
     try:
         problem = trajectory_problem(section, context)
@@ -239,11 +211,10 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
         for entry in section.candidates:
             where = f"{context.file}: candidate '{entry.label}'"
             scenario = _scenario(entry.scenario, entry.overrides, context)
-            interval = quantity_in(entry, "interval", "s", where, SHORTEST_STEP, scenario.run.duration)
-            assert interval is not None, "it has a default"
-            candidates.append(
-                CandidateExperiment(entry.label, scenario, noise_of_channels(entry.noise, where), interval)
-            )
+            if entry.interval > (longest := scenario.run.duration):
+                raise IdentificationError(f"{where}: interval = {entry.interval:g} s must be at most {longest:g} s")
+            noise = noise_of_channels(entry.noise, where)
+            candidates.append(CandidateExperiment(entry.label, scenario, noise, entry.interval))
         fitted = fit(problem, report)
         expected = expected_information(fitted, candidates)
     except (IdentificationError, DataError) as error:
@@ -261,7 +232,6 @@ def solve_section(section: TrajectorySection, context: SectionContext, report: R
             ends = [in_shown_unit(number, estimate.unit) for number in numbers]
             low, high, lowest, highest = (f"{end:.4g}" for end, _ in ends)
             remarks.append(
-                f"{estimate.path}: fitted {low} to {high} {ends[0][1]}, bench procedure {lowest} to {highest}: the "
-                "model of the fit or of the procedure is incomplete"
+                f"{estimate.path}: fitted {low} to {high} {ends[0][1]}, bench procedure {lowest} to {highest}"
             )
-    return TrajectoryOutcome(fitted, expected, tuple(remarks))
+    return replace(fitted, expected=expected, notes=tuple(remarks))

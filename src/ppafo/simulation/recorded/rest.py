@@ -46,12 +46,10 @@ def samples_at_rest(recording: Recording) -> int:
     return max(1, min(quiet, int((time < time[0] + REST_WINDOW).sum())))
 
 
-def start_of(
-    recording: Recording, device: Device, known: Mapping[str, float], file: str, remedies: Mapping[str, str]
-) -> ReplayStart:
+def start_of(recording: Recording, device: Device, known: Mapping[str, float], file: str) -> ReplayStart:
     """Return the initial state of a replay: ``known`` values [SI] take precedence over the averaged samples at rest.
 
-    Raises DataError, prefixed with ``file``, for a missing channel, with the remedy for this channel.
+    Raises DataError, prefixed with ``file``, for a missing channel.
     """
     count, values = samples_at_rest(recording), dict(known)
     if device.actuator.has_one_chamber and "pressure_2" not in recording:
@@ -60,8 +58,8 @@ def start_of(
     for name in (ANGLE, "pressure_1", "pressure_2", "angular_velocity"):
         if name not in values and name in recording:
             values[name] = value_at_rest(recording.time[:count], recording[name][:count])
-        elif name in remedies and name not in values:
-            raise DataError(f"{file}: there is no channel '{name}' for the initial state; {remedies[name]}")
+        elif name != "angular_velocity" and name not in values:
+            raise DataError(f"{file}: there is no channel '{name}' for the initial state")
     angle = float(between_stops(np.array([values[ANGLE]]), device, file)[0])
     return ReplayStart(angle, values.get("angular_velocity", 0.0), values["pressure_1"], values["pressure_2"])
 

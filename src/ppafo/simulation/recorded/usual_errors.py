@@ -15,7 +15,7 @@ from ppafo.units import split_pressure_kind, to_si
 _MISTAKEN = {
     "Pa": {unit: to_si(1.0, f"{unit}_d", "Pa_d") for unit in ("psi", "kPa", "bar", "MPa")},
     "rad": {unit: to_si(1.0, unit, "rad") for unit in ("deg", "rad")},
-    "N m": {unit: to_si(1.0, unit, "N m") for unit in ("N cm", "N m")},
+    "N m": {unit: to_si(1.0, unit, "N m") for unit in ("N mm", "N cm", "N m")},
 }
 """Units that are mistaken for each other, each with its value in SI, by SI unit."""
 

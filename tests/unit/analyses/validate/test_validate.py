@@ -178,9 +178,8 @@ def test_a_small_residual_of_which_no_cause_is_known_is_a_remark_and_a_large_one
         said = str(found.to_dict()["summary"])
         assert found.passed is agrees, said
         assert "no single change explains the residual" in said
-        # The motion is asked for before a parameter is named.
-        first = "if the device was on a leg, locked or driven, give motion='leg', locked or measured first; no single"
-        assert agrees is not (first in said)
+        # The motion that was assumed is said before a parameter is named.
+        assert agrees is not ("the vane was taken to be free; no single" in said)
         assert agrees is ("which is wider than the noise and may hide a wrong number" in said)
         assert re.search(r"is off by [\d.]+ times its noise \([\d.]+ % of full range\)", said)
 

@@ -8,15 +8,11 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.free_decay import free_decay
 from ppafo.identification.bench.law import BenchResult
-from ppafo.identification.bench.open_valve_flow import open_valve_flow
-from ppafo.identification.bench.static_torque import static_torque
-from ppafo.identification.bench.valve_map import valve_map
-from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.source import RecordingSource
 from ppafo.signals.recording import Floats
 from tests.unit.identification import planted
+from tests.unit.identification.planted import free_decay, open_valve_flow, static_torque, valve_map, vane_leak
 
 Solve = Callable[[tuple[RecordingSource, ...]], BenchResult]
 RESPONSES = {
@@ -33,13 +29,13 @@ OVER_TIME = ("decay", "leak")
 @pytest.fixture
 def solved() -> dict[str, Solve]:
     """The procedure for each kind of recording."""
-    leaking = planted.CO2, 60e-6, 60e-6 / 1.3, 0.113
+    volumes, leaking = (60e-6, 60e-6 / 1.3), {"discharge_coefficient": 0.113}
     return {
         "decay": lambda sources: free_decay(sources, rise=0.0),
         "flow": lambda sources: open_valve_flow(sources, planted.CO2),
         "sweep": lambda sources: valve_map(sources, planted.CO2),
-        "leak": lambda sources: vane_leak(sources, *leaking),
-        "steady": lambda sources: vane_leak(sources, *leaking),
+        "leak": lambda sources: vane_leak(sources, planted.CO2, *volumes, **leaking),
+        "steady": lambda sources: vane_leak(sources, planted.CO2, *volumes, **leaking),
         "static": static_torque,
     }
 
@@ -145,7 +141,7 @@ def test_two_wrong_readings_are_both_named() -> None:
     source = planted.static()
     torque = source.recording["torque"].copy()
     torque[[12, 90]] *= (10.0, 20.0)
-    with pytest.raises(IdentificationError, match=r"at sample 91, .*: a wrong reading, and so are samples 13;"):
+    with pytest.raises(IdentificationError, match=r"at sample 91, .*: a wrong reading, and so are samples 13$"):
         static_torque((changed(source, "torque", torque),))
 
 

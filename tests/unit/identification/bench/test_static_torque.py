@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.static_torque import static_torque
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import Tolerances
 from tests.unit.identification import planted
+from tests.unit.identification.planted import static_torque
 
 GROWTH = "effects.seal_friction.static_per_pressure"
 
@@ -32,10 +32,10 @@ def test_intervals_hold_friction_and_its_growth_in_about_the_stated_share_of_rec
 
 
 def test_the_gains_of_the_sensors_widen_the_torque_constant_and_are_named() -> None:
-    known = Tolerances(gain=0.0)
+    known = Tolerances.model_construct(gain=0.0)
     usual, exact = (
         static_torque((planted.static(),), tolerances=item)["actuator.torque_constant"]
-        for item in (Tolerances(), known)
+        for item in (Tolerances.model_construct(), known)
     )
     assert usual.half_width > 1.2 * exact.half_width
     assert "gain of the pressure sensor" in usual.explanation
@@ -80,7 +80,7 @@ def test_samples_of_a_stroke_are_one_reading() -> None:
 
 
 def test_a_direction_that_is_turned_round_is_told_and_not_fitted() -> None:
-    with pytest.raises(IdentificationError, match="reverse the sign of channel 'direction'"):
+    with pytest.raises(IdentificationError, match="a wrong sign of channel 'direction'"):
         static_torque((planted.static(sign=-1.0),))
 
 

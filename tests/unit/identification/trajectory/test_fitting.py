@@ -9,7 +9,6 @@ import pytest
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import batch_of, state_row_numbers
-from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import fitting
 from ppafo.identification.trajectory.experiment import (
     FittedExperiment,
@@ -19,8 +18,7 @@ from ppafo.identification.trajectory.experiment import (
     numbers_of,
     with_numbers,
 )
-from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
-from ppafo.identification.trajectory.runs import FIT_TOLERANCE, prepare, run_with, signals_of
+from ppafo.identification.trajectory.fitting import FIT_TOLERANCE, TrajectoryFit, fit, prepare, run_with, signals_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Recording
 from ppafo.simulation.loading import load_scenario
@@ -88,8 +86,6 @@ def test_covariance_and_correlation_belong_together(three: TrajectoryFit) -> Non
 
 def test_an_estimate_is_found_by_the_short_path_of_the_valve(three: TrajectoryFit) -> None:
     assert three.estimate("valve.discharge_coefficient") is three.estimates[0]
-    with pytest.raises(IdentificationError, match="was not fitted, did you mean"):
-        three.estimate("foot_plate.inertias")
 
 
 def test_columns_are_the_runs_that_simulate_makes_with_less_error(experiment: FittedExperiment) -> None:
@@ -119,10 +115,7 @@ def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: 
     apart = dataclasses.replace(experiment, scenario=with_numbers(experiment.scenario, start))
     found = fitted(apart, INERTIA, FreeParameter("supply.dorsiflexion_pressure"))
     assert found.estimate("supply.dorsiflexion_pressure").verdict == "not identifiable"
-    said = (
-        "the recordings are hardly sensitive to this parameter; fix this parameter, give a prior, or make another "
-        "recording"
-    )
+    said = "the recordings are hardly sensitive to this parameter"
     assert found.estimate("supply.dorsiflexion_pressure").explanation == said
     assert found.estimate("foot_plate.inertia").verdict == "identified"
 
@@ -220,4 +213,4 @@ def test_a_cylinder_is_fitted_as_a_vane_is(recorded: Callable[..., Recording]) -
 
 
 def test_noise_of_the_angle_is_in_radians(three: TrajectoryFit) -> None:
-    assert three.fit.noise["angle"] == pytest.approx(math.radians(0.1), rel=0.12)
+    assert three.fit.sensors["angle"].deviation == pytest.approx(math.radians(0.1), rel=0.12)

@@ -10,17 +10,14 @@ from ppafo.identification.trajectory.experiment import (
     FreeParameter,
     TrajectoryProblem,
     broken_rule,
-    declaration_of,
     declared_numbers,
     full_path,
     number_at,
     numbers_of,
     with_numbers,
 )
-from ppafo.identification.trajectory.fitting import fit
-from ppafo.identification.trajectory.runs import prepare, run_with
+from ppafo.identification.trajectory.fitting import fit, prepare
 from ppafo.running import simulate
-from ppafo.signals.faults import noise_of
 from ppafo.simulation.scenario import Scenario
 
 INERTIA = FreeParameter("foot_plate.inertia")
@@ -65,7 +62,7 @@ def test_a_parameter_that_makes_no_sense_is_refused(
         ({"channels": ()}, "no channel"),
         ({"noise": {"angle": 0.0}}, "must be above 0"),
         ({"inputs": ("comand",)}, "not a measured input, did you mean 'command'"),
-        ({"inputs": ("supply_pressure",)}, r"has no channel 'supply_pressure' to follow.*; give inputs = \[\]$"),
+        ({"inputs": ("supply_pressure",)}, r"has no channel 'supply_pressure', did you mean 'pressure_1'"),
     ],
 )
 def test_an_experiment_that_makes_no_sense_is_refused(
@@ -80,35 +77,14 @@ def test_the_same_parameter_twice_is_refused(experiment: FittedExperiment) -> No
         problem(experiment, FreeParameter("valve.area"), FreeParameter("valves.proportional.area"))
 
 
-def test_a_problem_without_parameters_is_refused(experiment: FittedExperiment) -> None:
-    with pytest.raises(IdentificationError, match="at least one"):
-        problem(experiment)
-
-
 def test_every_parameter_that_0_leaves_out_of_the_model_is_refused_before_the_fit(experiment: FittedExperiment) -> None:
     late, spool = FreeParameter("valve.delay"), FreeParameter("valve.spool_frequency", start=30.0, low=0.0)
-    words = r"0 leaves it out of the model, so it cannot be fitted from there; give start and low, both above 0"
+    words = r"0 leaves it out of the model, so it cannot be fitted from there; start and low must be above 0"
     with pytest.raises(
         IdentificationError, match=rf"\(1\) valve\.delay: {words}; \(2\) valve\.spool_frequency: {words}$"
     ):
         problem(experiment, late, INERTIA, spool)
     problem(experiment, FreeParameter("valve.delay", start=0.015, low=0.001))
-
-
-@pytest.mark.parametrize("path", ["valves.proportional.delay", "valve.delay"])
-@pytest.mark.parametrize(("start", "then"), [(0.0, 0.002), (0.002, 0.0)])
-def test_a_setting_of_the_valve_that_goes_to_or_from_zero_is_named(
-    experiment: FittedExperiment, path: str, start: float, then: float
-) -> None:
-    prepared = prepare(experiment, {path: start})
-    with pytest.raises(IdentificationError, match=r"'step': the fit changed valve\.delay to or from 0"):
-        run_with(prepared, {path: then})
-
-
-def test_noise_is_estimated_from_a_signal_that_moves() -> None:
-    time = np.linspace(0.0, 1.0, 2000)
-    noisy = np.sin(6.0 * time) + 0.003 * np.random.default_rng(2).standard_normal(time.size)
-    assert noise_of(noisy) == pytest.approx(0.003, rel=0.1)
 
 
 def test_too_few_samples_after_the_start_are_refused(experiment: FittedExperiment) -> None:
@@ -169,20 +145,9 @@ def test_a_time_offset_belongs_to_the_recording_and_leaves_the_scenario_alone(st
     assert with_numbers(step, {TIME_OFFSET: 0.01}) is step
 
 
-def test_the_scenario_itself_is_left_as_it_was(step: Scenario) -> None:
-    before = number_at(step, "valve.dead_band")
-    with_numbers(step, {"valves.proportional.dead_band": 0.25})
-    assert number_at(step, "valve.dead_band") == before
-
-
 def test_the_chosen_valve_has_the_path_that_a_parameter_set_has(step: Scenario) -> None:
     assert full_path("valve.area", step) == "valves.proportional.area"
     assert number_at(step, "valve.area") == number_at(step, "valves.proportional.area") == pytest.approx(31.6e-6)
-
-
-def test_a_misspelt_path_is_answered_with_the_nearest_one(step: Scenario) -> None:
-    with pytest.raises(IdentificationError, match=r"did you mean 'friction\.viscous_damping'"):
-        declaration_of("friction.viscous_dampening", step)
 
 
 def test_dynamic_friction_above_static_friction_is_named(step: Scenario) -> None:
@@ -198,19 +163,6 @@ def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: Fitted
     level = float(np.quantile(values, 0.1))
     clipped = np.minimum(values + 300.0 * random.standard_normal(values.size), level)
     recording = experiment.recording.with_channel("pressure_1", clipped, "Pa")
-    without = dataclasses.replace(experiment, recording=recording, noise={"angle": 1e-3, "pressure_2": 500.0})
-    with pytest.raises(
-        IdentificationError, match=r"stays at its largest value for .* the sensor is probably saturated"
-    ):
-        prepare(without, {})
-
-
-def test_a_channel_that_is_at_its_limit_from_the_third_sample_on_is_not_one_without_noise(
-    experiment: FittedExperiment,
-) -> None:
-    values = np.array(experiment.recording["pressure_1"])
-    values[2:] = values.max() + 1e5
-    recording = experiment.recording.with_channel("pressure_1", values, "Pa")
     without = dataclasses.replace(experiment, recording=recording, noise={"angle": 1e-3, "pressure_2": 500.0})
     with pytest.raises(
         IdentificationError, match=r"stays at its largest value for .* the sensor is probably saturated"

@@ -8,8 +8,7 @@ import pytest
 
 from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.trajectory.experiment import FittedExperiment, FreeParameter, TrajectoryProblem, numbers_of
-from ppafo.identification.trajectory.fitting import fit
-from ppafo.identification.trajectory.runs import prepare, signals_at, signals_of
+from ppafo.identification.trajectory.fitting import fit, prepare, signals_at, signals_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
