@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.identify import identify
-from ppafo.errors import DataError, IdentificationError
+from ppafo.errors import DataError
 
 HEAD = 'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n'
 BRANCH = np.tile(np.repeat([1.0, -1.0], 6), 3)
@@ -36,12 +36,6 @@ def test_a_decay_needs_times_and_the_message_says_how_a_table_without_them_is_re
         DataError, match=r'not \'angle\'; .*give the sample rate in the map: time = \{ rate = "100 Hz" \}'
     ):
         identify(problem(tmp_path, columns, "free-decay"))
-
-
-def test_a_missing_direction_is_told_the_table_that_derives_it(tmp_path: Path) -> None:
-    columns = "angle [deg],pressure_difference [psi_d],torque [N m],state [-]"
-    with pytest.raises(IdentificationError, match=r"or derive it: direction.of = \"pressure_difference\""):
-        identify(problem(tmp_path, columns))
 
 
 MAP = """
