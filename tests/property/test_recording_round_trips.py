@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.storage import read_csv, write_csv
-from ppafo.storage.netcdf import netcdf_bytes
-from ppafo.storage.netcdf_reading import read_netcdf
+from ppafo.storage.netcdf import netcdf_bytes, read_netcdf
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 UNITS = {

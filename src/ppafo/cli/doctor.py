@@ -23,7 +23,7 @@ FORMATS: dict[str, str] = {
     "rig": "ppafo.rig.preset",
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",
-    "bottle": "ppafo.parameters.bottles.fluid",
+    "bottle": "ppafo.parameters.bottles.bottle",
     "publication": "ppafo.parameters.publications.publication",
 }
 """Modules with a ``json_schema()``, by file format."""

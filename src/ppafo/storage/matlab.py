@@ -18,7 +18,7 @@ from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.signals.recording import TIME, Floats
 from ppafo.storage.column_map import ColumnMap, MappedTable, in_map, shown_names
 from ppafo.storage.files import read_bytes
-from ppafo.storage.netcdf_reading import own_items
+from ppafo.storage.netcdf import own_items
 from ppafo.storage.trial_reading import check_can_be_read
 from ppafo.wording import nearest_name, one_line
 

@@ -14,6 +14,7 @@ from ppafo.errors import DataError, refused_as
 from ppafo.signals import Recording, recording_kind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.comma_separated import parse_header, read_csv, recording_of_columns
+from ppafo.storage.netcdf import read_netcdf
 from ppafo.storage.result_folder import CSV_FILE, MANIFEST, NETCDF_FILE, RUN_FILE, read_document, read_stored
 from ppafo.wording import one_line
 
@@ -164,7 +165,6 @@ def read_recording(
             raise DataError(f"{file}: contains no result of a walk or a simulation (no {NETCDF_FILE}, no {RUN_FILE})")
         file /= NETCDF_FILE
     if file.suffix == ".nc":
-        from ppafo.storage.netcdf_reading import read_netcdf
         from ppafo.storage.trial_reading import check_can_be_read
 
         # The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.

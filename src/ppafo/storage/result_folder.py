@@ -13,7 +13,7 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import csv_bytes
 from ppafo.storage.files import add_files, read_bytes
-from ppafo.storage.netcdf import dataset_of, netcdf_bytes
+from ppafo.storage.netcdf import dataset_of, netcdf_bytes, read_netcdf
 from ppafo.storage.owned_folder import (
     HASHES,
     MARK,
@@ -110,8 +110,6 @@ def check_result_folder(folder: str | Path) -> None:
 
 def read_stored(folder: str | Path) -> StoredResult:
     """Read a result folder, without a function to draw it. Raises DataError for any other folder."""
-    from ppafo.storage.netcdf_reading import read_netcdf
-
     folder_path = Path(folder)
     if not folder_path.is_dir():
         raise DataError(f"{folder}: is not a folder")

@@ -13,7 +13,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.storage import read_csv
-from ppafo.storage.netcdf_reading import read_netcdf
+from ppafo.storage.netcdf import read_netcdf
 from ppafo.walking import list_walks, loading
 
 SHORT = ["--minutes", "0.1"]

@@ -18,8 +18,7 @@ from ppafo.model.cold_gas import (
     temperature_at,
 )
 from ppafo.model.source import bottle_content
-from ppafo.parameters.bottles.bottle import load_bottle
-from ppafo.parameters.bottles.fluid import load_fluid
+from ppafo.parameters.bottles.bottle import load_bottle, load_fluid
 from ppafo.walking import load_walk
 from ppafo.walking.motion import walk_of
 

@@ -16,7 +16,7 @@ from ppafo.model.source import (
     liquid_density,
     nodes_around,
 )
-from ppafo.parameters.bottles.fluid import list_fluids, load_fluid
+from ppafo.parameters.bottles.bottle import list_fluids, load_fluid
 from scripts import fluid_tables
 
 FLUIDS = list_fluids()

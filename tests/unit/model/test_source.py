@@ -22,7 +22,7 @@ from ppafo.model.source import (
     regulated_pressure,
     regulator_flow_limit,
 )
-from ppafo.parameters.bottles.fluid import load_fluid
+from ppafo.parameters.bottles.bottle import load_fluid
 
 CO2 = load_fluid("CO2").table
 VOLUME = 3.75e-4

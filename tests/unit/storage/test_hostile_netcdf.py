@@ -12,7 +12,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.storage import trial_reading
-from ppafo.storage.netcdf_reading import read_netcdf
+from ppafo.storage.netcdf import read_netcdf
 from ppafo.storage.reading import read_recording
 
 SECRET = np.arange(3.0)

@@ -9,8 +9,7 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
 from ppafo.storage import dataset_of
-from ppafo.storage.netcdf import netcdf_bytes
-from ppafo.storage.netcdf_reading import read_netcdf
+from ppafo.storage.netcdf import netcdf_bytes, read_netcdf
 
 
 def recording() -> Recording:

@@ -91,7 +91,9 @@ def check_orifices(evidence: Evidence) -> Iterator[AuditFinding]:
                 ),
                 ComparedNumber("conductance", opened.conductance, "kg/(s Pa)"),
             ),
-            why="" if opened.form is AREA_FORM else f"C of ISO 6358 counts for air and is converted to {gas}.",
+            why=f"C of ISO 6358 counts for air and is converted to {gas}."
+            if opened.form is not AREA_FORM and gas != "air"
+            else "",
         )
 
 

@@ -11,8 +11,7 @@ from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, following_rates
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_density
-from ppafo.parameters.bottles.bottle import Bottle, load_bottle
-from ppafo.parameters.bottles.fluid import PATHS
+from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
 from ppafo.parameters.declared import kind_at, value_at
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
