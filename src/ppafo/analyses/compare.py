@@ -114,7 +114,7 @@ class ComparedCase:
     - ``verdict``: end of the nominal run in a word; ``tracking``: how it follows, with a tried remedy
     - ``follows``: True if the nominal run completes and follows its reference, or misses it only as announced
     - ``failed``, ``reason``: number of draws whose run failed, and reason of the first failure
-    - ``following``: number of draws whose run follows its reference; None without a verdict on any
+    - ``following``: number of draws whose run does so too; None without a verdict on any
     - ``is_on_front``: True if the case follows and no other that follows beats it in both error and gas
     - ``pairs``: statistics against the baseline by metric, ``best``: probability of being the best; empty without draws
     - ``rows``, ``renoised``: runs over the draws, and the first of them repeated with other sensor noise; None without
@@ -364,7 +364,7 @@ def _drawn_runs(
         # Read before the runs with other noise, which may overwrite it.
         failure = runs.reason
         renoised = runs.run({path: renoised_columns[path] for path in paths}) if renoised_columns else None
-        verdicts = excess(rows, scenario, varied, uncertainty.gauge).follows
+        verdicts = excess(rows, scenario, varied, uncertainty.gauge).passes
         drawn[task, name] = {"rows": rows, "renoised": renoised, "reason": failure, "verdicts": verdicts}
     return drawn
 

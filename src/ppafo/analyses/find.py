@@ -319,7 +319,7 @@ def judged(
 
     # Nobody would build on a loop whose command turns all the time.
     oscillates = verdicts.oscillates == 1.0
-    fails = (verdicts.follows == 0.0) & ~verdicts.excused
+    fails = verdicts.passes == 0.0
     if limit.text == FOLLOWS:
         # A run without a verdict is none that follows, and a torque just beyond the actuator's is not reached.
         fails |= np.isnan(verdicts.follows) | ((verdicts.beyond_reach > 0.0) & reach_varies)

@@ -495,10 +495,10 @@ def _part(heading: str, part: BenchResult | TrajectoryFit, more: Iterable[str], 
         text, *ends = interval_texts(*(number for number, _ in numbers))
         shown = f"{text} {numbers[0][1]}".removesuffix(" -").rstrip()
         rows.append((item.path, shown, " to ".join(ends), item.verdict_text))
-        # A value far from that of the set is right for another device, or a wrong unit.
+        # A value far from that of the set is right for another device, or a wrong unit; openings have none.
         entry = before.numbers.get(item.path)
         value, unit = in_set_unit(item.value, item.path, item.unit, before)
-        if entry is None or not item.is_usable or not (entry.value > 0.0 and value > 0.0):
+        if entry is None or not item.is_usable or ".opening." in item.path or not (entry.value > 0.0 and value > 0.0):
             continue
         if not 1.0 / _FAR_FROM_SET < (ratio := value / entry.value) < _FAR_FROM_SET:
             times = f"{ratio:.3g} times the value of the set, {entry.value:.4g} {unit}".rstrip()

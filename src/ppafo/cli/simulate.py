@@ -32,7 +32,7 @@ def simulate(
     Exit code 1 where it diverged, or a check finds it numerically sensitive, or its reference not followed.
 
     check: run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated;
-        exit code 1 if one cannot, or if the reference is not followed
+        exit code 1 if one other than a count cannot, or if the reference is not followed
     out: result folder with the report; default out/NAME of the scenario
 
     >>> print(simulate("step-response", out=Path("step")).text.splitlines()[0])
@@ -56,7 +56,7 @@ def simulate(
         report = assessed(run_scenario(loaded), check)
         tracking, changed = report.tracking, list(changes_in(loaded))
         # A reference that is not followed makes the result useless, and a check fails.
-        passes = report.check is None or (report.check.is_determined and tracking.passes)
+        passes = report.check is None or (report.check.passes and tracking.passes)
         return CommandOutput(
             _text(report),
             {

@@ -3,20 +3,21 @@
 A stretch is straight, slow and no shorter than a tenth of a second; a sine is one move. Judged are the second half of
 each stretch and the whole of each move; of a move at the start of a run, what follows once the value has met the
 reference; of a reference that repeats, what follows a start-up. The error that is allowed at a sample is the same in
-both. The last part and the worst of the earlier ones are kept. These numbers are for verdicts only: no table and no
-study lists them.
+both. A stretch of up to twice the least length counts in part by itself, and for the rest as part of the move around
+it, so that no number jumps where a plateau becomes a stretch. The last part, the worst of the earlier ones and the move
+before the last stretch are kept. These numbers are for verdicts only: no table and no study lists them.
 """
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ppafo.metrics.command import Reversals, is_torque_requested, start_reversals, update_reversals
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, root_mean
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
-from ppafo.model.columns import Numeric, choose, larger
+from ppafo.model.columns import larger
 from ppafo.model.helping import PUSH_OFF
 from ppafo.signals.meter import (
     REQUESTED,
@@ -27,6 +28,7 @@ from ppafo.signals.meter import (
     Sample,
     advance_part,
     deciding_sample,
+    shortest_rest,
 )
 
 LARGEST_SHARE = 0.05
@@ -43,6 +45,23 @@ LAG_OF_JOINT = 0.6
 """Lag that a moving joint allows, divided by its speed and the wanted change [s/rad]."""
 LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
 """Largest range of the error of an angle at rest [rad], or divided by the way of the reference [-] if that is more."""
+LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
+"""Largest angle error for a moving reference [rad], or divided by the reference's range [-] if that allows more."""
+LARGEST_CREST = 1.5
+"""Largest error divided by the largest RMS error, for a smooth wave of a torque or a pressure; of a lag it is 1.41."""
+LARGEST_SHARE_OF_WAVE = 0.5
+"""Standard deviation of the error divided by the standard deviation of a moving reference [-].
+
+A controller that only keeps the mean of a sine has 1.0, however small the sine is beside its mean; a constant delay on
+a slow ramp has 0. In a walk it is the RMS torque error divided by the RMS of the requested torque.
+"""
+TIMES_OF_SMALL_WAVE = 1.5
+"""Reduction of the error that a moving joint allows, divided by the deviation of the reference [-]: of a wave that
+moves as much as is allowed at rest, the limit is that of a wave alone."""
+WHERE_REQUESTED, IN_PUSH_OFF = -1.0, -2.0
+"""In place of the start of a judged part, for a walk."""
+FEWEST_PERIODS = 0.5
+"""Periods of a reference in the settled part, below which the part may hold no peak of the reference [-]."""
 SUSTAINED = 4
 """Number of reversals on the hold from which a loop counts as oscillating; settling takes one or two."""
 _TINY = 1.0e-300
@@ -50,17 +69,20 @@ _TINY = 1.0e-300
 
 
 class PartSums(NamedTuple):
-    """Sums over the judged samples of a part of the reference that begins with sample ``start``.
+    """Sums over the judged samples, ``since`` to ``end``, of a part of the reference that begins with ``start``.
 
-    ``rests`` is 1 for a slow stretch, 0 for a move. ``squares`` is the sum of squared errors, ``total`` that of errors,
-    ``taken`` the number of samples, ``reference_squares`` and ``reference_total`` the sums for the reference less the
-    initial value, ``lag_squares`` and ``lag_total`` those of the allowed lag, ``swing`` the reversal state of the
-    error, ``lag_swing`` that of a loop that only lags, ``lowest_error`` and ``highest_error`` its extremes. ``first``
-    and ``last`` are the reference before the part and at its end, and ``path`` is the sum of its changes in between,
-    without their sign.
+    ``share`` is how much of it counts by itself, ``rests`` 1 for a slow stretch, 0 for a move. ``squares`` is the sum
+    of squared errors, ``total`` that of errors, ``taken`` the number of samples, ``reference_squares`` and
+    ``reference_total`` the sums for the reference less the initial value, ``lag_squares`` and ``lag_total`` those of
+    the allowed lag, ``swing`` the reversal state of the error, ``lag_swing`` that of a loop that only lags,
+    ``lowest_error`` and ``highest_error`` its extremes. ``first`` and ``last`` are the reference before the part and at
+    its end, and ``path`` is the sum of its changes in between, without their sign.
     """
 
     start: float = 0.0
+    since: float = 0.0
+    end: float = 0.0
+    share: float = 1.0
     rests: float = 0.0
     squares: float = 0.0
     total: float = 0.0
@@ -78,15 +100,168 @@ class PartSums(NamedTuple):
     path: float = 0.0
 
 
-def stands(rests: Floats, path: Floats) -> Floats:
-    """1 for a slow stretch, and for a reference that does not move at all; 0 for a move."""
-    found: Floats = choose(path > 0.0, rests, 1.0)
-    return found
+class SettledPart(NamedTuple):
+    """Numbers of a judged part of a run, or arrays (runs,) of such numbers without recordings.
+
+    "SI" is the SI unit of the controlled quantity. The error is the value minus the reference.
+    """
+
+    wanted_change: float
+    """Largest reference relative to the initial value, or to 0 for a torque; in a walk the RMS of the request [SI]."""
+    rms_error: float = 0.0
+    """RMS error [SI]."""
+    mean_error: float = 0.0
+    """Mean error [SI]."""
+    error_deviation: float = 0.0
+    """Standard deviation of the error [SI]."""
+    error_range: float = 0.0
+    """Largest minus smallest error [SI]."""
+    largest_error: float = 0.0
+    """Largest absolute error [SI]."""
+    error_reversals: float = 0.0
+    """Number of reversals of the error beyond those of a lag behind a moving reference; 0 below ``SUSTAINED``."""
+    value_range: float = 0.0
+    """Range of the controlled quantity over the whole run [SI]."""
+    peak: float = 0.0
+    """Largest change in the direction of the reference; 0 for a wanted change below the smallest one [SI].
+
+    In a walk: largest absolute torque [N m].
+    """
+    requested_peak: float = 0.0
+    """Largest torque in plantarflexion that a walk requests [N m]; 0 for a task."""
+    given_peak: float = 0.0
+    """Largest torque in plantarflexion that the actuator of a walk gives [N m]; 0 for a task."""
+    rests: float = 0.0
+    """1 if the reference stands still, 0 if it moves."""
+    motion: float = 0.0
+    """Motion of reference and joint [-]: 0 at rest, 1 where the limits of a moving reference hold."""
+    lag: float = 0.0
+    """RMS of the error that motion allows beside the one at rest [SI]."""
+    mean_lag: float = 0.0
+    """Mean of the error that motion allows beside the one at rest [SI]."""
+    weight: float = 1.0
+    """Weight of the error [-]: 1, and less for a quick ramp, on which every loop is behind."""
+    share: float = 1.0
+    """Share by which the part counts by itself [-]: less for a short rest, and for the move before that."""
+    way: float = math.inf
+    """Path of a moving reference in the part, or its largest value if that is more; inf at rest [SI]."""
+    ends_on_ramp: float = 0.0
+    """1 for a move in one direction to the largest reference, which the run does not see settle."""
+    reference_range: float = 0.0
+    """Range of initial value and reference for an angle [rad]; 0 for other quantities."""
+    reference_mean: float = 0.0
+    """Mean of the reference [SI]; 0 for a walk."""
+    reference_deviation: float = 0.0
+    """Standard deviation of the reference [SI]."""
+    reference_periods: float = math.inf
+    """Number of periods of a sine in the part; infinite for another reference."""
+    is_reference_smooth: float = 0.0
+    """1 for a reference without steps and corners."""
+    first: float = 0.0
+    """First judged sample of a recorded task."""
+    last: float = 0.0
+    """Last judged sample of a recorded task."""
+    start: float = WHERE_REQUESTED
+    """Start of the judged samples of the last part, or of an earlier part [s]; below 0 for a walk."""
+    end: float = 0.0
+    """End of an earlier part [s]; 0 for the last one."""
+    duration: float = 0.0
+    """Length of the part [s]; in a walk, the duration of the recording."""
+    command_reversal_rate: float = 0.0
+    """Rate of command reversals in the part [1/s]."""
+
+    @property
+    def is_undecided(self) -> Any:
+        """True if the part is no basis for the verdict that a run follows: it ends on a ramp, or may hold no peak."""
+        moves = (np.asarray(self.rests) == 0.0) & (np.asarray(self.reference_deviation) > 0.0)
+        is_short = np.asarray(self.reference_periods) < FEWEST_PERIODS
+        return (np.asarray(self.ends_on_ramp) > 0.0) | (moves & is_short)
 
 
-def allowed_squares(at_rest: Numeric, mean_lag: Numeric, lag_squares: Numeric) -> Numeric:
-    """Mean square of the error that is allowed for a part, from the error at rest and the lag; also of columns."""
-    return at_rest * at_rest + 2.0 * at_rest * mean_lag + lag_squares
+def numbers_of(
+    part: PartSums, change: float, interval: float, wanted: float, angle_range: float, smooth: float, turns: float
+) -> SettledPart:
+    """Return the numbers of a part of a reference whose largest ``change`` counts as ``wanted``.
+
+    ``interval`` [s] is that of the samples, ``turns`` the least number of reversals of the error by a lag.
+    """
+    inverse = 1.0 / part.taken if part.taken > 0.0 else math.nan
+    mean, square, mean_ahead = part.total * inverse, part.squares * inverse, part.reference_total * inverse
+    rests = 1.0 if part.rests > 0.0 or part.path == 0.0 else 0.0
+    of_lag = 0.0 if rests > 0.0 else max(float(int(max(abs(part.lag_swing.turns) - 1.0, 0.0))), turns)
+    reversals = float(int(max(abs(part.swing.turns) - 1.0, 0.0))) - of_lag
+    lag, way = math.sqrt(part.lag_squares * inverse), abs(part.last - part.first)
+    wave = math.sqrt(max(part.reference_squares * inverse - mean_ahead * mean_ahead, 0.0))
+    return SettledPart(
+        wanted_change=wanted,
+        reference_range=angle_range,
+        is_reference_smooth=smooth,
+        rms_error=math.sqrt(square),
+        mean_error=mean,
+        error_deviation=math.sqrt(max(square - mean * mean, 0.0)),
+        error_range=part.highest_error - part.lowest_error,
+        largest_error=max(part.highest_error, -part.lowest_error),
+        error_reversals=reversals if reversals >= SUSTAINED else 0.0,
+        rests=rests,
+        motion=min(lag / (LARGEST_LAG * max(change, _TINY)), 1.0),
+        lag=lag,
+        mean_lag=part.lag_total * inverse,
+        weight=weight_of(rests, part.path, way, part.taken * interval, change),
+        share=part.share,
+        way=math.inf if rests > 0.0 else max(part.path, change),
+        reference_mean=mean_ahead,
+        reference_deviation=0.0 if rests > 0.0 else wave,
+    )
+
+
+class PartLimits(NamedTuple):
+    """Largest numbers with which a part of a task follows its reference [SI], inf without a limit.
+
+    ``rms_error`` is that at rest with a lag beside it, or for a wave its share, which does not count the mean error.
+    ``mean_error`` is for on/off valves at rest, which swing about the reference by design, ``swing`` for the range of
+    the error of an angle, and of on/off valves, ``largest_error`` for a moving reference of an angle and a smooth wave.
+    """
+
+    rms_error: float
+    mean_error: float
+    swing: float
+    largest_error: float
+
+
+def gradual_limits(part: SettledPart) -> PartLimits:
+    """Return the limits of a part for a valve with gradual openings, continuous in amplitude and speed."""
+    share = LARGEST_SHARE * part.wanted_change
+    # Of a small wave the limit is that of any motion.
+    small = share + LARGEST_LAG * part.wanted_change - TIMES_OF_SMALL_WAVE * part.reference_deviation
+    of_wave = max(LARGEST_SHARE_OF_WAVE * part.reference_deviation, share, small)
+    # The error that is allowed at rest, and beside it the lag at each sample.
+    with_lag = math.sqrt(share * share + 2.0 * share * part.mean_lag + part.lag * part.lag)
+    rms = max(min(with_lag, math.sqrt(of_wave * of_wave + part.mean_error * part.mean_error)), _TINY)
+    # An error of this many degrees is allowed for an angle, however small its range.
+    swing = max(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * part.reference_range)
+    angle = max(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * part.reference_range)
+    is_angle = part.reference_range > 0.0
+    of_smooth = LARGEST_CREST * rms if part.rests == 0.0 and part.is_reference_smooth > 0.0 else math.inf
+    return PartLimits(
+        rms_error=rms,
+        mean_error=math.inf,
+        swing=swing + (2.0 * angle - swing) * part.motion if is_angle else math.inf,
+        largest_error=(angle if is_angle else of_smooth) / max(part.motion, _TINY),
+    )
+
+
+def error_and_oscillation(part: SettledPart, limits: PartLimits) -> tuple[float, float]:
+    """Return remaining error and oscillation of a part, divided by their limits [-], without its share."""
+    span = part.error_range / limits.swing
+    ratio = max(part.rms_error / limits.rms_error, abs(part.mean_error) / limits.mean_error, span)
+    # On a quick ramp every loop lags, by no more than the whole way.
+    weighed = max(ratio, part.largest_error / limits.largest_error) * part.weight
+    error = max(weighed, part.largest_error / (LARGEST_EXCUSED * part.way))
+    # While the reference moves, an error that reverses is none to speak of if it is small.
+    turning = min(part.error_reversals / (SUSTAINED - 1.0), error / max(part.motion, _TINY))
+    # A joint that creeps has a range of its error, too, but a mean error above the standard deviation.
+    swings = part.rests > 0.0 and part.error_deviation > abs(part.mean_error)
+    return error, max(turning, span) if swings else turning
 
 
 def weight_of(rests: float, path: float, way: float, time: float, extent: float) -> float:
@@ -101,35 +276,26 @@ def weight_of(rests: float, path: float, way: float, time: float, extent: float)
 
 
 def badness(part: PartSums, course: ReferenceSummary) -> float:
-    """Squared ratio of the largest number of a part to its limit, by which the worst of the earlier parts is chosen."""
-    extent, taken = max(course.largest, _TINY), max(part.taken, 1.0)
-    weight = weight_of(part.rests, part.path, abs(part.last - part.first), taken * course.interval, extent)
-    # Sums in place of means: one division for all.
-    allowed = allowed_squares(LARGEST_SHARE * extent * taken, part.lag_total, part.lag_squares * taken)
-    error = weight * weight * part.squares * taken / max(allowed, _TINY)
-    of_lag = 1.0 if part.rests > 0.0 else max(abs(part.lag_swing.turns), 1.0)
-    turns = float(int(max(abs(part.swing.turns) - of_lag, 0.0))) / (SUSTAINED - 1.0)
-    # Of an angle at rest the range has a limit, too.
-    span = (part.highest_error - part.lowest_error) / max(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * extent)
-    at_rest = max(turns, span * (1.0 - course.of_joint))
-    full_motion = LARGEST_LAG * extent * LARGEST_LAG * extent * taken
-    reversing = error * max(full_motion, part.lag_squares) / max(part.lag_squares, _TINY)
-    far = max(part.highest_error, -part.lowest_error) / (LARGEST_EXCUSED * max(extent, part.path))
-    moving = max(min(turns * turns, reversing), far * far)
-    return max(error, at_rest * at_rest if part.rests > 0.0 else moving)
+    """Largest number of a part divided by its limit; 0 for a part that does not exist."""
+    extent = max(course.largest, _TINY)
+    angle_range = extent * (1.0 - course.of_joint)
+    numbers = numbers_of(part, extent, course.interval, extent, angle_range, 0.0, 0.0)
+    error, oscillation = error_and_oscillation(numbers, gradual_limits(numbers))
+    return max(error, oscillation) if part.taken > 0.0 else 0.0
 
 
 class SettledSums(NamedTuple):
     """State of the settled meter: present part of the reference, and the worst of the earlier ones.
 
-    ``worst_badness`` is that of the latter, ``waits`` is 1 while the present rest is in its first half, ``lagged``
-    the reference with the allowed lag, ``met`` 1 once the value has met the reference, and ``command`` the
-    reversals of the command in the judged samples of the part. ``begun`` is the initial controlled value,
-    ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been at or below the reference,
-    and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the reverse.
+    ``before`` is the move before a present rest, ``worst_badness`` that of the worst part, ``waits`` is 1 while the
+    present rest is in its first half, ``lagged`` the reference with the allowed lag, ``met`` 1 once the value has met
+    the reference, and ``command`` the reversals of the command in the judged samples of the part. ``begun`` is the
+    initial controlled value, ``lowest`` and ``highest`` its extremes. ``met_upwards`` is 1 once the value has been at
+    or below the reference, and ``top`` the highest value since then; ``met_downwards`` and ``bottom`` are the reverse.
     """
 
     part: PartSums
+    before: PartSums
     worst: PartSums
     worst_badness: float
     waits: float
@@ -151,23 +317,18 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
     error = value - reference
     return SettledSums(
         part=PartSums(
-            start=0.0,
-            rests=0.0,
             squares=error * error,
             total=error,
             taken=1.0,
             reference_squares=error * error,
             reference_total=-error,
-            lag_squares=0.0,
-            lag_total=0.0,
             swing=Swing(error, UNDECIDED, error),
-            lag_swing=Swing(0.0, UNDECIDED, 0.0),
             lowest_error=error,
             highest_error=error,
             first=reference,
             last=reference,
-            path=0.0,
         ),
+        before=PartSums(),
         worst=PartSums(),
         worst_badness=0.0,
         waits=0.0,
@@ -206,21 +367,24 @@ def begun(swing: Swing, value: float, anew: bool) -> Swing:
 
 
 def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late: float, lag: float) -> PartSums:
-    """Return the sums of the present part with a sample, anew where the part begins or is not judged yet.
+    """Return the sums of the present part with a sample, anew where the part is not judged yet.
 
     ``late`` is the lead of the reference over a late one, ``lag`` what is allowed of that.
     """
     before, error, reference = state.part, sample.value - sample.reference, sample.reference
     # From the initial value, or the square of a pressure would hide its change.
     ahead = reference - state.begun
-    is_new = course.is_new > 0.0
+    # What it has from the parts before, where it is a move after a short rest.
+    is_new, joined = course.is_new > 0.0, 1.0 - before.share
     is_first = course.part_start == 0.0 and course.rests == 0.0
     begins = course.start_up > 0.0 and sample.number >= course.start_up and sample.number < course.start_up + 1.0
     is_met = state.met == 0.0 and 2.0 * sample.number < course.samples - 1.0 and meets(course, sample)
-    anew = is_new or state.waits > 0.0 or (is_first and (begins or is_met))
+    anew = state.waits > 0.0 or (is_first and (begins or is_met))
     least = OSCILLATION_THRESHOLD * course.largest
     return PartSums(
-        start=course.part_start,
+        start=before.start,
+        since=sample.number if anew or before.taken == 0.0 else before.since,
+        end=sample.number,
         rests=course.rests,
         squares=error * error + (0.0 if anew else before.squares),
         total=error + (0.0 if anew else before.total),
@@ -230,13 +394,21 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
         lag_squares=lag * lag + (0.0 if anew else before.lag_squares),
         lag_total=lag + (0.0 if anew else before.lag_total),
         # What motion excuses is no reversal.
-        swing=begun(next_swing(before.swing, error, least + lag), error, anew),
-        lag_swing=begun(next_swing(before.lag_swing, late, least), late, anew),
-        lowest_error=error if anew else min(before.lowest_error, error),
-        highest_error=error if anew else max(before.highest_error, error),
-        first=before.last if is_new else before.first,
+        swing=begun(next_swing(before.swing, error, least + lag), error, anew or is_new),
+        lag_swing=begun(next_swing(before.lag_swing, late, least), late, anew or is_new),
+        lowest_error=error
+        if anew
+        else error + joined * min(before.lowest_error - error, 0.0)
+        if is_new
+        else min(before.lowest_error, error),
+        highest_error=error
+        if anew
+        else error + joined * max(before.highest_error - error, 0.0)
+        if is_new
+        else max(before.highest_error, error),
+        first=before.first,
         last=reference,
-        path=abs(reference - before.last) + (0.0 if is_new else before.path),
+        path=abs(reference - before.last) + before.path,
     )
 
 
@@ -253,6 +425,7 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     part, command = next_part(state, course, sample, late, lag), update_reversals(state.command, course, sample)
     return SettledSums(
         part=part,
+        before=state.before,
         worst=state.worst,
         worst_badness=state.worst_badness,
         waits=course.in_first_half,
@@ -269,29 +442,74 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     )
 
 
-def keep_worst(state: SettledSums, course: ReferenceSummary) -> SettledSums:
-    """Keep the part that ends with the sample before a new one, if it is the worst so far."""
-    before, number = state.part, course.line_start + 1.0
-    ends = course.is_new > 0.0 and (before.rests > 0.0 or before.path > 0.0)
-    # At the start of a run the value may be on its way yet.
-    is_late = course.start_up > 0.0 and number > course.start_up + 1.0
-    found = badness(before, course)
-    is_worse = ends and (before.start > 0.0 or state.met > 0.0 or is_late) and found > state.worst_badness
-    return state._replace(
-        worst=before if is_worse else state.worst, worst_badness=found if is_worse else state.worst_badness
+def blend(first: PartSums, rest: PartSums, of_first: float) -> PartSums:
+    """Return the sums with which a move after a rest begins: a share ``of_first`` of a move and of that rest."""
+    # Only the second half of a rest was judged; a small part of a path that returns counts in full.
+    of_rest, of_path = 2.0 * of_first, of_first * of_first * of_first
+    return PartSums(
+        start=first.start if of_first > 0.0 else rest.end,
+        since=first.since,
+        end=rest.end,
+        share=1.0 - of_first,
+        squares=of_first * first.squares + of_rest * rest.squares,
+        total=of_first * first.total + of_rest * rest.total,
+        taken=of_first * first.taken + of_rest * rest.taken,
+        reference_squares=of_first * first.reference_squares + of_rest * rest.reference_squares,
+        reference_total=of_first * first.reference_total + of_rest * rest.reference_total,
+        lag_squares=of_first * first.lag_squares + of_rest * rest.lag_squares,
+        lag_total=of_first * first.lag_total + of_rest * rest.lag_total,
+        lowest_error=min(first.lowest_error, rest.lowest_error),
+        highest_error=max(first.highest_error, rest.highest_error),
+        first=rest.last + of_path * (first.first - rest.last),
+        last=rest.last,
+        path=of_path * (first.path + 2.0 * rest.path),
     )
 
 
-class RecordedSettled(NamedTuple):
-    """State of the settled meter over a recording: summary of the reference, meter, and end of the worst earlier part.
+def worse(state: SettledSums, course: ReferenceSummary, part: PartSums, share: float) -> SettledSums:
+    """Keep a part that ends and counts by a ``share``, if it is the worst so far."""
+    found = share * badness(part, course)
+    is_worse = found > state.worst_badness
+    return state._replace(
+        worst=part._replace(share=share) if is_worse else state.worst, worst_badness=max(found, state.worst_badness)
+    )
 
-    ``is_cut`` is 1 for a reference that has rests and moves, and ``worst_end`` the number of a sample, 0 without one.
+
+def keep_worst(state: SettledSums, course: ReferenceSummary) -> SettledSums:
+    """Before the first sample of a new part, end the one before; the move before a rest counts as much as the rest."""
+    ended, rests = state.part, state.part.rests > 0.0
+    # At the start of a run the value may be on its way yet.
+    is_late = ended.start > 0.0 or state.met > 0.0 or (course.start_up > 0.0 and ended.end > course.start_up)
+    counts = is_late and (rests or ended.path > 0.0)
+    share = min(max((ended.end - ended.start) / shortest_rest(course) - 1.0, 0.0), 1.0)
+    judged = worse(worse(state, course, state.before, share), course, ended, share if counts else 0.0)
+    absent = PartSums(
+        start=ended.start,
+        since=ended.since,
+        lowest_error=ended.lowest_error,
+        highest_error=ended.highest_error,
+        first=ended.first,
+    )
+    joined = blend(state.before if state.before.taken > 0.0 else absent, ended, 1.0 - share)
+    none = PartSums(start=ended.end, first=ended.last, last=ended.last)
+    # A rest after a rest has before it what a move would begin with.
+    after_rest = judged._replace(
+        part=none if course.rests > 0.0 else joined, before=joined if course.rests > 0.0 else PartSums()
+    )
+    after_move = state._replace(part=none, before=ended if counts else PartSums())
+    following = after_rest if rests else after_move
+    return following if course.is_new > 0.0 else state
+
+
+class RecordedSettled(NamedTuple):
+    """State of the settled meter over a recording: summary of the reference, and meter.
+
+    ``is_cut`` is 1 for a reference that has rests and moves.
     """
 
     course: ReferenceSummary
     sums: SettledSums
     is_cut: float
-    worst_end: float = 0.0
 
 
 def sample_ahead(state: RecordedSettled, sample: Sample) -> float:
@@ -304,24 +522,10 @@ def update_recorded(state: RecordedSettled, sample: Sample, later: Sample) -> Re
     number = sample_ahead(state, sample)
     parted = advance_part(state.course, sample.number, sample.reference, number, later.reference)
     course = parted if state.is_cut > 0.0 else state.course
-    sums = update_settled(keep_worst(state.sums, course), course, sample)
-    is_same = sums.worst_badness == state.sums.worst_badness
-    return RecordedSettled(course, sums, state.is_cut, state.worst_end if is_same else sample.number - 1.0)
+    return RecordedSettled(course, update_settled(keep_worst(state.sums, course), course, sample), state.is_cut)
 
 
 SETTLED = MeterKind("settled", SettledSums, start_settled, update_settled, needs_course=True, end_part=keep_worst)
-
-
-def farther(highest: Floats, lowest: Floats) -> Floats:
-    """Largest magnitude of an error, given its extremes ``highest`` and ``lowest``."""
-    found: Floats = larger(highest, -lowest)
-    return found
-
-
-def deviation(squares: Floats, total: Floats, count: Floats) -> Floats:
-    """Standard deviation from sum of squares, sum and number of samples."""
-    count = larger(count, 1.0)
-    return np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0))
 
 
 def read_reversals(readings: Readings) -> Floats:
@@ -330,41 +534,27 @@ def read_reversals(readings: Readings) -> Floats:
     return np.asarray(sums.command.turns / larger((sums.part.taken - 1.0) * readings.interval, 1.0))
 
 
-def _of_sums(part: str, *names: str, by: Callable[..., Floats] | None = None) -> ReadAt:
-    return ReadAt(tuple(".".join(("meters", SETTLED.name, *part.split(), name)) for name in names), by)
-
-
+PART_SUMS = tuple(name for name in PartSums._fields if name not in ("start", "since", "end"))
+"""Sums of a part by which it is judged."""
+_SETTLED = f"meters.{SETTLED.name}"
 _NUMBERS: dict[str, Callable[[Readings], Floats]] = {
     **{
-        f"{prefix}_{name}": _of_sums(part, *fields, by=function)
-        for prefix, part in (("settled", "part"), ("worst", "worst"))
-        for name, fields, function in (
-            ("error", ("squares", "taken"), root_mean),
-            ("missing", ("total", "taken"), mean_of),
-            ("largest", ("highest_error", "lowest_error"), farther),
-            ("span", ("highest_error", "lowest_error"), less),
-            ("reference", ("reference_total", "taken"), mean_of),
-            ("wave", ("reference_squares", "reference_total", "taken"), deviation),
-            ("turns", ("swing.turns",), count_of),
-            ("lag", ("lag_squares", "taken"), root_mean),
-            ("mean_lag", ("lag_total", "taken"), mean_of),
-            ("lag_turns", ("lag_swing.turns",), count_of),
-            ("way", ("last", "first"), less),
-            ("rests", ("rests", "path"), stands),
-            ("path", ("path",), None),
-            ("taken", ("taken",), None),
-        )
+        f"{prefix}_{name}": ReadAt((f"{_SETTLED}.{part}.{name}{'.turns' * name.endswith('swing')}",))
+        for prefix, part in (("settled", "part"), ("before", "before"), ("worst", "worst"))
+        for name in PART_SUMS
     },
-    **{f"settled_{name}": _of_sums("", name) for name in ("begun", "lowest", "highest", "top", "bottom")},
+    **{f"settled_{name}": ReadAt((f"{_SETTLED}.{name}",)) for name in ("begun", "lowest", "highest", "top", "bottom")},
+    "settled_error": ReadAt((f"{_SETTLED}.part.squares", f"{_SETTLED}.part.taken"), root_mean),
+    "settled_turns": ReadAt((f"{_SETTLED}.part.swing.turns",), count_of),
     "settled_reversals": read_reversals,
     "settled_extent": ReadAt(("course.largest",)),
-    "settled_last": ReadAt(("course.last",)),
+    "settled_final": ReadAt(("course.last",)),
     "settled_interval": ReadAt(("course.interval",)),
 }
 SETTLED_METRICS = {
     name: MetricKind(name, "-", "for verdicts", (), None, read, (SETTLED,)) for name, read in _NUMBERS.items()
 }
-"""Metrics of the last part and of the worst earlier one by name [SI unit of the controlled quantity], for verdicts."""
+"""Metrics of the last part, the move before it and the worst earlier part by name, for verdicts."""
 
 
 class _PlantarflexionPeaks(NamedTuple):

@@ -1,6 +1,6 @@
 """Common interface of results with a recording: channels in any unit, tables, and display in a notebook."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ppafo.engine.lanes import Floats
@@ -66,8 +66,12 @@ class RecordedResult:
         """
         return self.recording.values_of(channel, self.scenario.device.supply.atmospheric_pressure)
 
+    def __iter__(self) -> Iterator[str]:
+        """Yield ``time`` and the channel names, for iteration and ``in``."""
+        yield from ("time", *self.recording.names)
+
     def _ipython_key_completions_(self) -> list[str]:
-        return ["time", *self.recording.names]
+        return list(self)
 
     @in_own_units
     def _repr_html_(self) -> str:

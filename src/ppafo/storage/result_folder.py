@@ -1,6 +1,6 @@
 """Result folders: the recording as NetCDF and CSV, and ``run.json`` with all inputs of the run."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -62,6 +62,10 @@ class StoredResult:
     def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
         """Return the values of a channel, in SI or in a given unit; ``time`` gives the sample times [s]."""
         return self.recording.values_of(channel, self.atmosphere)
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield ``time`` and the channel names, as of a ``Result``."""
+        yield from ("time", *self.recording.names)
 
     def dataset(self, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
         """Return the recording as an xarray Dataset, like ``Result.dataset``."""

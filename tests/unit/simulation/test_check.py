@@ -121,6 +121,10 @@ def test_what_only_the_error_changes_is_told_from_what_nobody_could_measure() ->
     assert Check("loop", (firm,), (), NO_ERROR, None, ()).is_determined
     diverged = Check("loop", (firm,), (), NO_ERROR, 0.1, (MOVED_START,))
     assert not diverged.is_determined
+    # A count of events is said to be sensitive, and fails no check.
+    counted = Check("loop", (moved, firm), (), NO_ERROR, None, ())
+    assert [check.passes for check in (counted, diverged)] == [True, False]
+    assert not Check("loop", (inexact,), (), NO_ERROR, None, ()).passes
     assert "completion: the run with start moved diverged." in diverged.sentence
     assert diverged.sentence.endswith(" The runs separate at t = 0.1 s.")
 

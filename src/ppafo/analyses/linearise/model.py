@@ -668,7 +668,7 @@ def limits_of(scenario: Scenario, linearised: LinearisedPlant, point: Point) -> 
     if run.program.has_one_chamber:
         regimes = {name: regime for name, regime in regimes.items() if "chamber 2" not in name}
     else:
-        regimes["leak over the vane"] = _regime(plant.leak_curve, pressure_1, pressure_2, 1.0)
+        regimes["leak from chamber to chamber"] = _regime(plant.leak_curve, pressure_1, pressure_2, 1.0)
     vane = "locked" if scenario.motion.locked_angle is not None else "prescribed"
     if point.direction == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max

@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.metric import followed
+from ppafo.metrics.command import requested_samples
+from ppafo.metrics.metric import controlled_in, followed
+from ppafo.metrics.settled import SettledPart
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, SHUT, reversals
 from ppafo.model.catalog import VALVES
 from ppafo.parameters.plant import valve_settings
@@ -14,7 +16,6 @@ from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import Remedy
 from ppafo.simulation.tracking.rule import Failure, only_switches
-from ppafo.simulation.tracking.settled import SettledPart
 
 _FULLY_OPEN = 0.98
 """Command above which a valve counts as fully open [-]."""
@@ -25,7 +26,7 @@ _FAR, _FAR_OF_RANGE = 2.0, 0.05
 class Case(NamedTuple):
     """Run that does not follow its reference.
 
-    ``law`` is the controller kind, None for a Python controller; ``settled`` the settled part of ``recording``;
+    ``law`` is the controller kind, None for a Python controller; ``settled`` the judged part of ``recording``;
     ``failure`` the kind of failure. ``is_for_reach`` is true if the run gives all that the actuator can give.
     """
 
@@ -35,6 +36,13 @@ class Case(NamedTuple):
     settled: SettledPart
     failure: Failure | None
     is_for_reach: bool = False
+
+    @property
+    def samples(self) -> slice | NDArray[np.bool_]:
+        """Judged samples of the recording; of a walk those with a requested torque, if any torque is requested."""
+        if self.scenario.follows_reference:
+            return slice(int(self.settled.first), int(self.settled.last) + 1)
+        return slice(None) if controlled_in(self.recording) is None else requested_samples(self.recording)
 
     @property
     def oscillates(self) -> bool:
@@ -69,13 +77,13 @@ class Case(NamedTuple):
     def is_approaching(self) -> bool:
         """True if the value only approaches a reference at rest: its error falls throughout, and does not reverse."""
         turns = reversals(self._error, OSCILLATION_THRESHOLD * self.settled.wanted_change)
-        return self.settled.rests and self.is_settling and turns == 0
+        return self.settled.rests > 0.0 and self.is_settling and turns == 0
 
     @property
     def _error(self) -> NDArray[np.float64]:
         """Error of the settled part [SI]."""
         reference, value = followed(self.recording)
-        return np.asarray((value - reference)[self.settled.samples])
+        return np.asarray((value - reference)[self.samples])
 
 
 def _is_far_from_set(recording: Recording, lowest: float, span: float, band: float) -> NDArray[np.bool_]:

@@ -7,12 +7,14 @@ import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, switching_remedy
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.metric import followed
-from ppafo.metrics.settled import LARGEST_SHARE
+from ppafo.control.torque_loop import SAMPLES_LATE
+from ppafo.metrics.metric import Floats, followed
+from ppafo.metrics.settled import LARGEST_LAG, LARGEST_SHARE
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, error_functions
 from ppafo.parameters.graph import Asked
 from ppafo.simulation.declaration import law_settings
+from ppafo.simulation.gains import loop_of
 from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import LoopParts, quicker_at
@@ -61,6 +63,10 @@ _EXPLAINED = 0.6
 """Smallest fraction of the squared error explained by a lag for which the lag is reported [-]."""
 _SLOWER = (0.7, 0.4, 0.2, 0.1, 0.05)
 """Frequencies of a reference in trials, divided by its own frequency [-]."""
+_DELAYS_OF_VALVE = {"delay": -1.0, "spool_frequency": 1.0}
+"""Numbers of a valve that delay its opening, and the sign of the change that reduces the delay."""
+_QUICKER_DEVICE = (3.0, 10.0, 100.0)
+"""Factors by which valve or controller become quicker in trials [-]."""
 _SLOW, _FEW_DECISIONS = 0.01, 20.0
 """Period of a controller [s], and decisions in the settled part below which that period makes the loop fail [-]."""
 _DELAY, _LONG_DELAY = "sensors.delay", 0.1
@@ -85,20 +91,66 @@ def _slow_decisions(case: Case) -> TrackingCause | None:
     period, settled = case.scenario.controller.period, case.settled.duration
     if period < _SLOW or settled >= _FEW_DECISIONS * period:
         return None
-    rates, late = (10.0 / period, 100.0 / period, _USUAL_RATE), _late_text(case)
+    late = _late_text(case)
     text = (
         f"the controller decides every {1.0e3 * period:.3g} ms, only {settled / period:.2g} times in the settled "
         f"{settled:.3g} s{late and f', and {late}'}"
     )
-    remedies = (Remedy({}, (f"controller.rate={rate:g} Hz",)) for rate in rates if rate <= _USUAL_RATE)
-    return TrackingCause(text, tuple(remedies), "increase `controller.rate`")
+    return TrackingCause(text, _higher_rates(period), "increase `controller.rate`")
+
+
+def _higher_rates(period: float) -> tuple[Remedy, ...]:
+    """Remedies with a higher rate, up to the usual one, than that of a controller with a period [s]."""
+    rates = dict.fromkeys((10.0 / period, 100.0 / period, _USUAL_RATE))
+    return tuple(Remedy({}, (f"controller.rate={each:g} Hz",)) for each in rates if 1.0 / period < each <= _USUAL_RATE)
+
+
+def _slope(case: Case) -> Floats:
+    """Rate of the reference in the settled part [SI/s]; none at rest, of a pair, or for a move of one sample."""
+    reference, time = followed(case.recording)[0][case.samples], case.recording.time[case.samples]
+    moves = reference.size > 1 and not case.settled.rests and not case.only_switches
+    return np.gradient(reference, time) if moves else np.zeros(reference.size)
+
+
+def _late_device(case: Case, least: float = LARGEST_SHARE) -> TrackingCause | None:
+    """Cause: the number of valve or controller that gives most of a dead time, if the task does not leave that.
+
+    In the dead time a reference moves by more than a share ``least`` of the wanted change, or one at rest is judged for
+    few dead times only.
+    """
+    scenario, law, settled = case.scenario, case.law, case.settled
+    if law is None or case.only_switches:
+        return None
+    dead_time, valve = loop_of(scenario, law).dead_time, scenario.device.valve.settings
+    moves = float(np.sqrt(np.mean(_slope(case) ** 2))) * dead_time
+    if moves <= least * settled.wanted_change and not (settled.rests and dead_time > least * settled.duration):
+        return None
+    quicker = {
+        f"valve.{name}": [float(valve[name]) * factor**power for factor in _QUICKER_DEVICE]
+        for name, power in _DELAYS_OF_VALVE.items()
+        if valve.get(name, 0.0) > 0.0
+    }
+    saved = {
+        path: dead_time - loop_of(with_numbers(scenario, {path: numbers[-1]}), law).dead_time
+        for path, numbers in quicker.items()
+    }
+    saved["controller.rate"] = SAMPLES_LATE * scenario.controller.period
+    path = max(saved, key=saved.__getitem__)
+    if path in quicker:
+        number = level_text(declared_numbers(scenario)[path].unit, number_at(scenario, path))
+        remedies = tuple(remedy(scenario, {path: each}) for each in quicker[path])
+    else:
+        number, remedies = f"{1.0 / scenario.controller.period:.4g} Hz", _higher_rates(scenario.controller.period)
+    moved = f", in which the reference moves by {change_text(scenario.controlled, moves)}" * (moves > 0.0)
+    text = f"`{path} = {number}` gives most of the loop's dead time of {level_text('s', dead_time)}{moved}"
+    return TrackingCause(text, remedies, "use a faster valve or controller, or a slower reference")
 
 
 def _late_text(case: Case) -> str:
     """Words for a sensor delay that is long beside the time between two crossings of the reference; "" otherwise."""
     scenario, delay = case.scenario, float(case.scenario.sensors.delay)
     reference, value = followed(case.recording)
-    crossings = int(np.count_nonzero(np.diff((value > reference)[case.settled.samples])))
+    crossings = int(np.count_nonzero(np.diff((value > reference)[case.samples])))
     if delay * max(crossings, 1) <= _LONG_DELAY * case.settled.duration:
         return ""
     return f"the measured {CONTROLLED[scenario.controlled].words} comes late (`{_DELAY} = {level_text('s', delay)}`)"
@@ -107,7 +159,7 @@ def _late_text(case: Case) -> str:
 def _shut_valve(case: Case) -> TrackingCause | None:
     """Cause: the command is 0, or stays within the dead band of the valve."""
     scenario, settled = case.scenario, case.settled
-    command, band = np.abs(case.recording["command"][settled.samples]), dead_band(scenario)
+    command, band = np.abs(case.recording["command"][case.samples]), dead_band(scenario)
     # A loop that rests at the edge of the band is a little beyond it now and then.
     typical = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
     if case.failure != "overshoots" and (np.max(command) if settled.error_reversals else typical) <= SHUT:
@@ -184,7 +236,7 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
 def _pair_step(case: Case, law: ControllerKind) -> tuple[float, float]:
     """Step of on/off valves [SI] in their dead time, at the mean angle of the settled part, and that time [s]."""
     step, dead_time = pair_step(case.scenario, law)
-    return step * _loop_rate(case.scenario, float(np.mean(case.recording["angle"][case.settled.samples]))), dead_time
+    return step * _loop_rate(case.scenario, float(np.mean(case.recording["angle"][case.samples]))), dead_time
 
 
 def _wide_zone(case: Case, begin: str, end: str = "") -> TrackingCause:
@@ -204,7 +256,7 @@ def _wide_zone(case: Case, begin: str, end: str = "") -> TrackingCause:
 
 def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
     """Cause: a default gain is too large for delays, noise, motion of the joint, or chambers that are small there."""
-    scenario, sensors, angle = case.scenario, case.scenario.sensors, case.recording["angle"][case.settled.samples]
+    scenario, sensors, angle = case.scenario, case.scenario.sensors, case.recording["angle"][case.samples]
     # A joint that moves far oscillates where its loop is fastest, near a stop.
     rates = [(_loop_rate(scenario, float(each)), float(each)) for each in (angle.mean(), angle.min(), angle.max())]
     (rate, fastest), softer = max(rates), stiffened(scenario, (0.5, 0.25))
@@ -268,7 +320,7 @@ def _static_friction(case: Case) -> TrackingCause | None:
 
 def open_share(case: Case) -> float:
     """Share of the settled part in which the valve is fully open [-]."""
-    return float(np.mean(case.is_fully_open[case.settled.samples]))
+    return float(np.mean(case.is_fully_open[case.samples]))
 
 
 def _small_valve(case: Case) -> TrackingCause | None:
@@ -306,7 +358,7 @@ def _within_tolerance(case: Case) -> TrackingCause | None:
 
 def _opened_away(case: Case) -> TrackingCause | None:
     """Cause: the valve is fully open for most of the settled part, away from the reference."""
-    scenario, samples, is_open = case.scenario, case.settled.samples, case.is_fully_open
+    scenario, samples, is_open = case.scenario, case.samples, case.is_fully_open
     share = np.mean(is_open[samples])
     if share <= _MOSTLY:
         return None
@@ -336,20 +388,21 @@ def _opened_away(case: Case) -> TrackingCause | None:
 
 def _lag(case: Case) -> TrackingCause | None:
     """Cause: the reference moves faster than the loop follows; states the lag if it explains the error."""
-    scenario, samples = case.scenario, case.settled.samples
+    scenario, samples = case.scenario, case.samples
     reference, value = (series[samples] for series in followed(case.recording))
-    # A move of one sample has no rate.
-    if reference.size < 2:
-        return None
-    slope, error = np.gradient(reference, case.recording.time[samples]), reference - value
+    slope, error = _slope(case), reference - value
     squares = float(np.mean(slope**2))
-    if squares == 0.0 or case.settled.rests or case.only_switches:
+    if squares == 0.0:
         return None
     delay = float(np.mean(slope * error)) / squares
     text = "the reference changes faster than the loop can follow"
+    late = _late_device(case)
     if delay > 0.0 and delay**2 * squares >= _EXPLAINED * case.settled.rms_error**2:
         text = f"it lags its reference by {1.0e3 * delay:.3g} ms"
+    elif late is not None:
+        text = late.text
     remedies = [*stiffened(scenario, (2.0, 4.0)), *rescaled_gains(scenario, case.law, (2.0, 4.0))]
+    remedies += () if late is None else late.remedies
     frequency = float(scenario.reference.settings.get("frequency", 0.0))
     for share in _SLOWER if frequency else ():
         slower = {"reference.frequency": share * frequency}
@@ -417,7 +470,7 @@ def _still_approaching(case: Case) -> TrackingCause | None:
 def _not_settled(case: Case) -> TrackingCause:
     """Cause: the run ends before the loop settles, the integral gain is 0, or no other cause applies."""
     settings = case.scenario.controller.settings
-    stop = stop_of(case.scenario, case.recording["angle"][case.settled.samples])
+    stop = stop_of(case.scenario, case.recording["angle"][case.samples])
     if stop and case.scenario.controlled == ANGLE:
         return TrackingCause(f"the joint lies on its {stop} stop", (), "check the load that moves it there")
     if case.is_settling:
@@ -440,6 +493,8 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     lambda case: torque_beyond_reach(case) if case.is_for_reach else None,
     load_beyond_reach,
     flung_at_start,
+    # No gains follow what moves on in the dead time by more than any lag that is allowed.
+    lambda case: _late_device(case, LARGEST_LAG),
     torque_at_its_limit,
     _slow_decisions,
     _within_tolerance,
@@ -452,6 +507,7 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _lag,
     _still_approaching,
     _law_without_torque_loop,
+    _late_device,
     _poor_sensors,
     _not_settled,
 )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ppafo.control.catalog import PROFILES
 from ppafo.metrics.metric import Floats, followed
-from ppafo.metrics.settled import LARGEST_SHARE
+from ppafo.metrics.settled import FEWEST_PERIODS, LARGEST_SHARE
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
 from ppafo.parameters.device import Device
@@ -28,7 +28,6 @@ from ppafo.simulation.tracking.remedies import (
     stiffer_laws,
     torque_asked,
 )
-from ppafo.simulation.tracking.settled import FEWEST_PERIODS
 
 _MARGINS = (1.05, 1.5)
 """Static torque at an increased supply pressure divided by the wanted torque; the second for a fast wave [-]."""
@@ -87,7 +86,7 @@ def reach_at_samples(case: Case) -> tuple[NDArray[np.intp], Floats]:
 
     Returns the indices, counted from the first settled sample, and torques of shape (samples, 2).
     """
-    device, angle = case.scenario.device, case.recording["angle"][case.settled.samples]
+    device, angle = case.scenario.device, case.recording["angle"][case.samples]
     chosen, torque = np.unique(np.linspace(0, angle.size - 1, _SAMPLES).astype(np.intp)), static_torque(device)
     return chosen, np.array([torque_reach(device, float(angle[index]), torque) for index in chosen])
 
@@ -106,7 +105,7 @@ def _supplies_for(
 
 def torque_peaks(case: Case) -> tuple[TorqueReach, TorqueReach]:
     """Highest and lowest wanted torque with the reach there; a reference with a period counts with its own peaks."""
-    scenario, samples = case.scenario, case.settled.samples
+    scenario, samples = case.scenario, case.samples
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
     has_period = math.isfinite(case.settled.reference_periods)
     lowest, highest = profile_bounds(scenario.reference) if has_period else (reference.min(), reference.max())
@@ -135,9 +134,7 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     if worst.lacking <= 0.0:
         return None
     supply = supply_that_moves(device, worst.upwards)
-    stop = (
-        stop_of(scenario, case.recording["angle"][settled.samples]) if isinstance(scenario.motion, FreeMotion) else ""
-    )
+    stop = stop_of(scenario, case.recording["angle"][case.samples]) if isinstance(scenario.motion, FreeMotion) else ""
     lies = f"only the {stop} stop, on which the joint lies, resists the torque: " if stop else ""
     text = (
         f"{lies}at {level_text('rad', worst.angle)} and {level_text('Pa', number_at(scenario, supply))} the "
@@ -164,7 +161,7 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
     scenario, motion, device = case.scenario, case.scenario.motion, case.scenario.device
     if scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
         return None
-    reference, angle = (series[case.settled.samples] for series in followed(case.recording))
+    reference, angle = (series[case.samples] for series in followed(case.recording))
     wanted, outside = float(np.mean(reference)), float(motion.outside_torque)
     lowest, highest = torque_reach(device, wanted)
     load = outside + float(gravity_torque(wanted, device.foot_plate.gravity_torque))
@@ -203,7 +200,7 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
 
 def torque_at_its_limit(case: Case) -> TrackingCause | None:
     """Cause: the actuator of a joint whose angle is controlled often gives all the torque that its supplies allow."""
-    scenario, device, samples = case.scenario, case.scenario.device, case.settled.samples
+    scenario, device, samples = case.scenario, case.scenario.device, case.samples
     if scenario.controlled != ANGLE or case.oscillates or case.only_switches:
         return None
     angle, torque = case.recording["angle"][samples], case.recording["torque"][samples]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.metrics.metric import Floats
-from ppafo.metrics.settled import SETTLED_METRICS, WALK_PEAKS
+from ppafo.metrics.settled import SETTLED_METRICS, WALK_PEAKS, SettledPart
 from ppafo.model.columns import first
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import (
@@ -17,7 +17,7 @@ from ppafo.simulation.tracking.rule import (
     is_noisy,
     only_switches,
 )
-from ppafo.simulation.tracking.settled import SettledPart, settled_parts
+from ppafo.simulation.tracking.settled import settled_parts
 from ppafo.simulation.tracking.shortfall import available_torque, misses_for_reach, shortfall
 
 _OF_WALK = ("torque_error", "requested_torque", "peak_torque", *WALK_PEAKS)
@@ -63,6 +63,11 @@ class TrackingExcess(NamedTuple):
         return np.where(np.isnan(self.largest), np.nan, self.largest <= 1.0)
 
     @property
+    def passes(self) -> Floats:
+        """1 for each run (runs,) that follows its reference or misses it on purpose, 0 for others, nan if unknown."""
+        return np.where(self.excused, 1.0, self.follows)
+
+    @property
     def oscillates(self) -> Floats:
         """1 for each run (runs,) whose loop oscillates, 0 for the others, nan if unknown."""
         return np.where(np.isnan(self.oscillation), np.nan, self.oscillation > 1.0)
@@ -95,27 +100,27 @@ def tracking_excess(
             if not np.any(asks):
                 highest = np.minimum(limit, available_torque(scenario)[1])
                 of_walk |= {"requested_peak": highest, "given_peak": np.nan_to_num(numbers["push_off_peak"])}
-            settled = SettledPart(samples=slice(None), **of_walk)
+            settled = SettledPart(**of_walk)
             # A law that requests no torque is judged by the peak alone.
             excess = excess_of_walk(settled, turning, limit)
             known = (asks & (requested > 0.0)) | (~asks & np.isfinite(peak) & (limit > 0.0))
             known_turning = np.where(counted | known, turning, np.nan)
             zeros = np.zeros(none.size)
             return TrackingExcess(np.where(known, excess, np.nan), known_turning, zeros, zeros > 0.0)
-        last, worst = settled_parts(scenario, numbers, least)
+        parts = settled_parts(scenario, numbers, least)
         beyond, is_switched = shortfall(scenario), only_switches(scenario, scenario.law)
-        found = [excess_of_part(part, is_switched, beyond) for part in (last, worst)]
-        explained = bool(scenario.beyond_reach) & misses_for_reach(scenario, (last, worst), turning)
+        found = [excess_of_part(part, is_switched, beyond) for part in parts]
+        explained = bool(scenario.beyond_reach) & misses_for_reach(scenario, parts, turning)
     known = np.isfinite(numbers["settled_error"])
     # Without an earlier part its numbers are nan.
-    largest = np.fmax(turning, np.fmax(*(part.largest for part in found)))
-    known_verdict = known & ~(last.is_undecided & (largest <= 1.0))
+    largest = np.fmax.reduce([turning, *(part.largest for part in found)])
+    known_verdict = known & ~(parts[0].is_undecided & (largest <= 1.0))
     # A value that does not move is no oscillation, however far it is from the reference, and a cut wave is none either.
     swings = (np.where((each.standstill > 1.0) | (each.reach > 1.0), 0.0, each.oscillation) for each in found)
-    beyond = np.where(last.ends_on_ramp, 0.0, beyond) + np.zeros(none.size)
+    beyond = np.where(parts[0].ends_on_ramp, 0.0, beyond) + np.zeros(none.size)
     return TrackingExcess(
         largest=np.where(known_verdict, largest, np.nan),
-        oscillation=np.where(counted | known, np.fmax(turning, np.fmax(*swings)), np.nan),
+        oscillation=np.where(counted | known, np.fmax.reduce([turning, *swings]), np.nan),
         beyond_reach=beyond,
         excused=(beyond > 0.0) & (largest > 1.0) & explained,
     )

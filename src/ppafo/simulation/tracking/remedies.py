@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.settled import LARGEST_SHARE
+from ppafo.metrics.settled import LARGEST_SHARE, SettledPart
 from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import SonicOrifice
@@ -16,7 +16,6 @@ from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.default_gains import GAIN_TERMS, SLOPE_GAINS, default_links
 from ppafo.simulation.numbers import declared_numbers, number_at, of_its_chambers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.settled import SettledPart
 from ppafo.wording import override_text, without_exponent
 
 FASTEST_FIRST = (

@@ -9,21 +9,20 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ppafo.control.kind import ControllerKind
+from ppafo.engine.in_python import over_samples
 from ppafo.metrics.metric import Floats
 from ppafo.metrics.settled import (
-    LARGEST_ANGLE_SWING,
-    LARGEST_EXCUSED,
-    LARGEST_LAG,
     LARGEST_SHARE,
-    LARGEST_SWING_SHARE,
-    SUSTAINED,
-    allowed_squares,
+    LARGEST_SHARE_OF_WAVE,
+    PartLimits,
+    SettledPart,
+    error_and_oscillation,
+    gradual_limits,
 )
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.model.columns import first
 from ppafo.simulation.profiles import profile_bounds, profile_values
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.settled import SettledPart
 
 LARGEST_SHARE_SWITCHED = 0.25
 """RMS error divided by the wanted change, above which an on/off controller, which swings by design, does not follow."""
@@ -34,16 +33,6 @@ LARGEST_SPAN_SWITCHED = 0.6
 
 One step of a quarter, above which a pair is called coarse, beyond each side of a dead zone of +-4.2 % is 58 %.
 """
-LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
-"""Largest angle error for a moving reference [rad], or divided by the reference's range [-] if that allows more."""
-LARGEST_CREST = 1.5
-"""Largest error divided by the largest RMS error, for a smooth wave of a torque or a pressure; of a lag it is 1.41."""
-LARGEST_SHARE_OF_WAVE = 0.5
-"""Standard deviation of the error divided by the standard deviation of a moving reference [-].
-
-A controller that only keeps the mean of a sine has 1.0, however small the sine is beside its mean; a constant delay on
-a slow ramp has 0. In a walk it is the RMS torque error divided by the RMS of the requested torque.
-"""
 LARGEST_PEAK = 1.5
 """Peak of the value divided by the wanted change [-]."""
 LARGEST_PEAK_WALK = 1.5
@@ -52,9 +41,6 @@ LEAST_PEAK_WALK = 0.7
 """Largest torque of a walk in plantarflexion divided by the largest requested one; with less it does not follow [-]."""
 MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
 """Command reversals per stride and per second above which a loop oscillates."""
-_TIMES_OF_SMALL_WAVE = 1.5
-"""Reduction of the error that a moving joint allows, divided by the deviation of the reference [-]: of a wave that
-moves as much as is allowed at rest, the limit is that of a wave alone."""
 _TINY = 1.0e-300
 """Divisor in place of 0."""
 PER_TURN = 2.0
@@ -73,13 +59,17 @@ Criterion = Literal[
     "swing",
     "largest error",
     "reversals",
+    "command reversals",
     "movement",
     "peak",
     "missing peak torque",
     "reach",
     "any reach",
 ]
-"""Number of the judged part with a limit; a torque reference may exceed the reach of a locked or of a moving joint."""
+"""Number of the judged part with a limit, command reversals of the whole run.
+
+A torque reference may exceed the reach of a locked or of a moving joint.
+"""
 CRITERION_TEXTS: dict[Criterion | Literal[""], str] = {
     "reach": "the reference exceeds the largest available torque by",
     "any reach": "the reference exceeds the largest available torque at every angle by",
@@ -172,42 +162,15 @@ class _TaskExcess(NamedTuple):
         return largest
 
 
-class PartLimits(NamedTuple):
-    """Largest numbers with which a part of a task follows its reference [SI], inf without a limit; arrays (runs,)."""
-
-    rms_error: Floats
-    """RMS error: at rest, with a lag beside it; of a wave its share, which does not count the mean error."""
-    mean_error: Floats
-    """Mean error at rest of on/off valves, which swing about the reference by design."""
-    swing: Floats
-    """Range of the error of an angle, and of on/off valves at rest."""
-    largest_error: Floats
-    """Largest error while a reference moves, of an angle and of a smooth wave."""
-
-
 def part_limits(settled: SettledPart, is_switched: bool) -> PartLimits:
-    """PartLimits of a part, of which each is a continuous function of amplitude and speed of reference and joint.
-
-    ``is_switched`` is true for a valve without gradual openings. The numbers of ``settled`` may be arrays (runs,).
-    """
-    wanted, motion = np.asarray(settled.wanted_change), np.asarray(settled.motion)
-    reference_range, none = np.asarray(settled.reference_range), np.full_like(motion, np.inf)
-    if is_switched:
-        at_rest = wanted / np.maximum(1.0 - motion, _TINY)
-        mean, span = LARGEST_MEAN_SWITCHED * at_rest, LARGEST_SPAN_SWITCHED * at_rest
-        return PartLimits(LARGEST_SHARE_SWITCHED * wanted, mean, span, none)
-    share, wave = LARGEST_SHARE * wanted, np.asarray(settled.reference_deviation)
-    # Of a small wave the limit is that of any motion.
-    small = share + LARGEST_LAG * wanted - _TIMES_OF_SMALL_WAVE * wave
-    of_wave = np.hypot(np.maximum(np.maximum(LARGEST_SHARE_OF_WAVE * wave, share), small), settled.mean_error)
-    lag, mean_lag = np.asarray(settled.lag), np.asarray(settled.mean_lag)
-    rms = np.minimum(np.sqrt(allowed_squares(share, mean_lag, lag**2)), of_wave)
-    # An error of this many degrees is allowed for an angle, however small its range.
-    swing = np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * reference_range)
-    angle, is_angle = np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * reference_range), reference_range > 0.0
-    of_smooth = np.where(~np.asarray(settled.rests) & settled.is_reference_smooth, LARGEST_CREST * rms, np.inf)
-    largest = np.where(is_angle, angle, of_smooth) / np.maximum(motion, _TINY)
-    return PartLimits(rms, none, np.where(is_angle, swing + (2.0 * angle - swing) * motion, np.inf), largest)
+    """Limits of a part; of on/off valves, ``is_switched``, wider ones. Numbers may be arrays (runs,)."""
+    if not is_switched:
+        limits: PartLimits = over_samples(gradual_limits, settled)
+        return limits
+    wanted = np.asarray(settled.wanted_change)
+    at_rest = wanted / np.maximum(1.0 - np.asarray(settled.motion), _TINY)
+    mean, span = LARGEST_MEAN_SWITCHED * at_rest, LARGEST_SPAN_SWITCHED * at_rest
+    return PartLimits(LARGEST_SHARE_SWITCHED * wanted, mean, span, np.full_like(at_rest, np.inf))  # type: ignore[arg-type]
 
 
 def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | float = 0.0) -> _TaskExcess:
@@ -217,33 +180,22 @@ def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | flo
     numbers of ``settled`` may be arrays (runs,).
     """
     wanted, mean_error, motion = settled.wanted_change, np.abs(settled.mean_error), np.asarray(settled.motion)
-    limits = part_limits(settled, is_switched)
-    numbers = settled.rms_error, mean_error, settled.error_range, settled.largest_error
-    ratios = [np.asarray(number) / limit for number, limit in zip(numbers, limits, strict=True)]
-    span = ratios[2]
-    # On a quick ramp every loop lags, by no more than the whole way.
-    error = np.maximum(np.max(ratios, axis=0) * settled.weight, settled.largest_error / (LARGEST_EXCUSED * settled.way))
-    reversals = np.asarray(settled.error_reversals) / (SUSTAINED - 1)
-    # A joint that creeps has a range of its error, too, but a mean error above the standard deviation.
-    swings = np.asarray(settled.error_deviation > mean_error)
+    error, oscillation = over_samples(error_and_oscillation, settled, part_limits(settled, is_switched))
+    overshoot = (settled.peak / wanted - 1.0) / (LARGEST_PEAK - 1.0) * (1.0 - motion)
     if is_switched:
         # A limit cycle beside the reference has a large mean error, and reverses.
-        swings |= reversals > 0.0
-        oscillation, overshoot = np.where(swings, error, 0.0), np.zeros_like(error)
-    else:
-        # While the reference moves, an error that reverses is none to speak of if it is small.
-        oscillation = np.minimum(reversals, error / np.maximum(motion, _TINY))
-        oscillation = np.where(settled.rests & swings, np.maximum(oscillation, span), oscillation)
-        overshoot = (settled.peak / wanted - 1.0) / (LARGEST_PEAK - 1.0) * (1.0 - motion)
+        swings = (settled.error_deviation > mean_error) | (np.asarray(settled.error_reversals) > 0.0)
+        oscillation, overshoot = np.where(swings, error, 0.0), np.zeros_like(motion)
     share = np.asarray(settled.rms_error / wanted)
     is_still = (share > LARGEST_SHARE) & (settled.value_range <= SMALLEST_MOVE * wanted)
     standstill = np.where(is_still, share / LARGEST_SHARE, 0.0)
     # A pair swings by design, so that a torque beyond reach shows in the mean error rather than in the RMS error. The
     # mean error of a wave hides its peaks, and a ramp may end before them.
     missing = np.where(settled.rests, mean_error, np.maximum(mean_error, beyond))
-    is_beyond = (np.asarray(beyond) > 0.0) & ~np.asarray(settled.ends_on_ramp)
+    is_beyond = (np.asarray(beyond) > 0.0) & (np.asarray(settled.ends_on_ramp) == 0.0)
     reach = np.where(is_beyond, missing / (LARGEST_SHARE * wanted), 0.0)
-    return _TaskExcess(error, oscillation, overshoot, standstill, reach)
+    ratios = (error, oscillation, overshoot, standstill, reach)
+    return _TaskExcess._make(np.broadcast_arrays(*(np.asarray(settled.share * each) for each in ratios)))
 
 
 def failure_of_task(excess: _TaskExcess, turning: float) -> Failure | None:

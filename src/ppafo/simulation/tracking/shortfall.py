@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from ppafo.engine.scheme.actuators import torque_of
 from ppafo.metrics.metric import Floats
+from ppafo.metrics.settled import SettledPart
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.controlled import TORQUE
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import excess_of_part, only_switches
-from ppafo.simulation.tracking.settled import SettledPart
 
 _ANGLES = 9
 """Number of angles between the stops at which the torque of a moving joint is evaluated."""
@@ -85,8 +85,7 @@ def _within_reach(part: SettledPart, lowest: Floats, highest: Floats) -> Settled
         "error_range": np.maximum(part.error_range - np.ptp(beyond, axis=0), 0.0),
         "largest_error": np.maximum(part.largest_error - farthest, 0.0),
         # The error of a wave whose peaks are cut reverses more often than the wave.
-        "error_reversals": np.where(part.rests | (farthest == 0.0), part.error_reversals, 0.0),
+        "error_reversals": np.where((np.asarray(part.rests) > 0.0) | (farthest == 0.0), part.error_reversals, 0.0),
         "reference_deviation": cut.std(axis=0),
-        "samples": mean,
     }
     return SettledPart._make(np.broadcast_arrays(*left.values()))

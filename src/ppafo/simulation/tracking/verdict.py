@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ppafo.metrics.metric import controlled_in, extent
-from ppafo.metrics.settled import LARGEST_EXCUSED, LARGEST_SHARE, SUSTAINED
+from ppafo.metrics.settled import IN_PUSH_OFF, LARGEST_EXCUSED, LARGEST_SHARE, LARGEST_SHARE_OF_WAVE, SUSTAINED
 from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario
@@ -20,7 +20,6 @@ from ppafo.simulation.tracking.rule import (
     CRITERION_TEXTS,
     LARGEST_PEAK,
     LARGEST_PEAK_WALK,
-    LARGEST_SHARE_OF_WAVE,
     LEAST_PEAK_WALK,
     REVERSALS,
     SMALLEST_MOVE,
@@ -34,7 +33,7 @@ from ppafo.simulation.tracking.rule import (
     only_switches,
     part_limits,
 )
-from ppafo.simulation.tracking.settled import IN_PUSH_OFF, settled_walk, task_parts
+from ppafo.simulation.tracking.settled import settled_walk, task_parts
 from ppafo.simulation.tracking.shortfall import available_torque, misses_for_reach, shortfall
 from ppafo.simulation.tracking.walk_causes import CAUSES_OF_WALK
 from ppafo.units.shown import in_units, units_in_force
@@ -139,10 +138,11 @@ class Tracking:
         words, since = CONTROLLED[self.controlled].words, time_text(self.since, self.until)
         error, wanted, moved = (change_text(self.controlled, each) for each in (self.error, self.wanted, self.moved))
         plain_moved = moved.partition(" ")[0]
-        if self.criterion == "reversals":
+        if self.criterion in ("reversals", "command reversals"):
             rounded = _distinct(lambda each, digits: float(f"{each:.{digits}g}"), self.number, self.limit)
             often, most = (without_exponent(each, ".3g") for each in rounded)
-            allowed = f"{often} reversals a {self.per} ({most} allowed)"
+            span = " of the whole run" * (self.criterion == "command reversals")
+            allowed = f"{often} {self.criterion} a {self.per}{span} ({most} allowed)"
             return f"the {words} loop oscillates: {allowed}, RMS error {error} (requested {wanted}){since}"
         with_unit = partial(change_text, self.controlled)
         number, limit = _distinct(with_unit, self.number, self.limit)
@@ -236,7 +236,7 @@ def _decided(case: Case, turning: float, rate: float) -> tuple[Criterion, float,
     criteria = _criteria(case)
     if failure == "oscillates":
         if turning > 1.0:
-            return "reversals", rate * per, rate / turning * per
+            return "reversals" if is_noisy(case.scenario) else "command reversals", rate * per, rate / turning * per
         swing = next(each for each in criteria if each[0] == "swing")
         is_swing = swing[1] > swing[2] and (not case.only_switches or criteria[0][1] <= criteria[0][2])
         if settled.error_reversals and not is_swing and not case.only_switches:
@@ -297,7 +297,7 @@ def _criteria(case: Case) -> tuple[tuple[Criterion, float, float], ...]:
     is_cut = beyond > mean and not settled.rests
     reach: Criterion = "any reach" if scenario.motion.locked_angle is None else "reach"
     # On a quick ramp an error is allowed that would be none at rest.
-    weight = max(float(settled.weight), _LEAST)
+    weight = max(float(settled.weight * settled.share), _LEAST)
     rms, of_mean, swing, largest = (float(limit) / weight for limit in part_limits(settled, switches))
     lacking = ((reach if is_cut else "mean error", beyond if is_cut else mean, LARGEST_SHARE * wanted),)
     return (
@@ -355,15 +355,19 @@ def _judged(result: "RecordedResult") -> tuple[Case, float, float] | None:
         turning, rate = reversals / most, reversals / recording.duration
         failure = failure_of_walk(settled, turning, limit)
         return Case(scenario, law, recording, settled, failure), turning, rate
-    last, worst = task_parts(scenario, recording)
-    counted = last.command_reversal_rate * per if is_noisy(scenario) else reversals
+    parts = task_parts(scenario, recording)
+    counted = parts[0].command_reversal_rate * per if is_noisy(scenario) else reversals
     turning, beyond, switches = counted / most, float(np.max(shortfall(scenario))), only_switches(scenario, law)
-    ratios = [excess_of_part(part, switches, beyond) for part in (last, worst)]
-    excess, settled = ratios[0], last
-    if ratios[1].largest > max(1.0, float(excess.largest)):
-        excess, settled = ratios[1], worst
+    ratios = [excess_of_part(part, switches, beyond) for part in parts]
+    # An earlier part decides where it fails and the last one does not, or fails less.
+    largest = [
+        float(ratios[0].largest),
+        *(np.nan_to_num(float(each.largest)) * (each.largest > 1.0) for each in ratios[1:]),
+    ]
+    place = int(np.argmax(largest))
+    excess, settled = ratios[place], parts[place]
     failure = failure_of_task(excess, turning)
-    is_for_reach = bool(misses_for_reach(scenario, (last, worst), turning)[0])
+    is_for_reach = bool(misses_for_reach(scenario, parts, turning)[0])
     case = Case(scenario, law, recording, settled, failure, is_for_reach)
     # No oscillation: an error at the cut peaks of a wave, which reverses more often than the wave, and a slow approach.
     if failure == "oscillates" and turning <= 1.0 and (cuts_wave(case) or case.is_approaching):

@@ -24,7 +24,7 @@ _DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "
 
 def _request_beyond_reach(case: Case) -> TrackingCause | None:
     """Cause: the controller of a walk often requests more torque than the actuator gives at the current angle."""
-    scenario, samples = case.scenario, case.settled.samples
+    scenario, samples = case.scenario, case.samples
     if case.failure == "overshoots" or controlled_in(case.recording) is None:
         return None
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
@@ -82,7 +82,7 @@ def _dead_band_of_walk(case: Case) -> TrackingCause | None:
     """Cause: the command of a walk often stays within the valve's dead band, without compensation by its controller."""
     scenario = case.scenario
     band = dead_band(scenario) - float(scenario.controller.settings.get("dead_band", 0.0))
-    command = np.abs(case.recording["command"][case.settled.samples])
+    command = np.abs(case.recording["command"][case.samples])
     share = float(np.mean((command > SHUT) & (command <= band)))
     if share <= _OFTEN or case.failure == "overshoots":
         return None
