@@ -230,7 +230,6 @@ def compare(
     from ppafo.simulation.ensemble.running import lacking
     from ppafo.simulation.numbers import NOISE_SEED
     from ppafo.simulation.simulate import simulate_many
-    from ppafo.simulation.tracking.pair_step import unlimited_switching
     from ppafo.studies.declaration import DEFAULT_SEED
     from ppafo.studies.draws import FEWEST_DRAWS, MAXIMUM_DRAWS, Uncertainty, study_of, uncertainty_of
     from ppafo.studies.study import changes_of, choose_configurations, configurations_with
@@ -293,10 +292,8 @@ def compare(
     for task, _ in named_tasks:
         cases = [_case(name, nominal[task, name], metrics, **drawn.get((task, name), {})) for name in names]
         found.tasks[task] = _judged_together(found, cases)
-    switching = ((task, name, unlimited_switching(result)) for (task, name), result in nominal.items())
     remarks = [
         *(f"outputs: '{name}' is left out: not every configuration has this metric" for name in asked if lacks[name]),
-        *(f"{name}, {task}: {text}" for task, name, text in switching if text),
         *_remarks(found),
     ]
     if loaded is not None and loaded.drawn and draws is None and loaded.sample.runs != count:
@@ -521,7 +518,6 @@ def best_probabilities(values: Sequence[Floats], better: int, confidence: float)
 def _remarks(found: ComparisonResult) -> list[str]:
     """Return remarks on differing tasks, failed runs, means that depend on few draws, and noise."""
     from ppafo.simulation.gains import remark_on_following_gains
-    from ppafo.simulation.tracking.pair_step import coarse_pair
     from ppafo.studies.intervals import is_carried
 
     remarks, failed, uncertain = [], [], []
@@ -538,7 +534,7 @@ def _remarks(found: ComparisonResult) -> list[str]:
         for case in cases:
             where = f"{case.configuration}, {task}"
             with said_of_configuration(case.configuration):
-                remarks += [coarse_pair(case.scenario), remark_on_following_gains(case.scenario, found.varied)]
+                remarks.append(remark_on_following_gains(case.scenario, found.varied))
                 if kept := case.scenario.origin.replaced:
                     remarks.append(f"{where}: {kept}")
                 if not case.follows:

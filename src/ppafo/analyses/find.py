@@ -138,13 +138,11 @@ def find(
     from ppafo.simulation.declaration import changes_reach
     from ppafo.simulation.gains import remark_on_following_gains
     from ppafo.simulation.numbers import NOISE_SEED
-    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.draws import seeds_of_noise
     from ppafo.studies.study import with_overrides
     from ppafo.study.runs import RunCounter, excess, scenario_runs, settled, with_companions
 
     base = with_overrides(scenario_or_load(scenario), overrides)
-    warn_of_coarse_pairs([base], [vary.partition("=")[0].strip()])
     # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
     ranged = vary.rpartition("..")[2] if vary.strip().startswith(PATHS_THAT_SET_UNITS) else ""
     given = units_of_texts((ranged, such_that.rpartition("=")[2]))

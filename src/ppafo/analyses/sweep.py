@@ -81,7 +81,6 @@ def sweep(
 
     from ppafo.analyses.study_results import SUMMARY, StudyResults, finding_of, summarise
     from ppafo.simulation.gains import warn_of_gains
-    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.storage.files import temporary_folder
     from ppafo.studies.draws import study_of
     from ppafo.studies.study import check_can_be_swept
@@ -98,7 +97,6 @@ def sweep(
     for configuration in chosen.configurations:
         varied = [path for path in {*chosen.paths, *chosen.same} if chosen.varies(path, configuration.name)]
         with said_of_configuration(configuration.name):
-            warn_of_coarse_pairs([configuration.scenario], varied)
             warn_of_gains(configuration.scenario, varied)
     report, started = progress or report_nothing, time.monotonic()
     chunks, finished = claim(chosen, folder, agreed, threads, report)

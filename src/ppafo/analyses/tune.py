@@ -56,7 +56,6 @@ def tune(
     name_plugins(plugins)
     from ppafo.analyses.tuning import Problem, load_tuning, solve_tuning
     from ppafo.errors import StudyError
-    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.study.executing import executor_of
 
     if isinstance(tuning, Problem) and overrides:
@@ -64,5 +63,4 @@ def tune(
     problem = tuning if isinstance(tuning, Problem) else load_tuning(tuning, overrides)
     if seed is not None:
         problem = problem.with_seed(seed)
-    warn_of_coarse_pairs([problem.scenario], problem.before)
     return solve_tuning(problem, threads, progress, executor_of(executor))

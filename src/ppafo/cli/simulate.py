@@ -49,10 +49,8 @@ def simulate(
 
     from ppafo.simulation.numbers import changes_in
     from ppafo.simulation.simulate import simulate as run_scenario
-    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
 
     with shown_in(loaded.device.shown):
-        warn_of_coarse_pairs([loaded])
         report = assessed(run_scenario(loaded), check)
         tracking, changed = report.tracking, list(changes_in(loaded))
         # A reference that is not followed makes the result useless, and a check fails.
@@ -114,27 +112,15 @@ def assessed(result: "Result", check: bool) -> _RunReport:
 def _text(report: _RunReport) -> str:
     """Format status, tracking, metrics, repeatability and gains of a run."""
     from ppafo.report.kind import metrics_lines
-    from ppafo.simulation.tracking.pair_step import coarse_pair
 
     # The result's own text has a verdict whose remedies were not tried.
-    scenario = report.result.scenario
-    # The warning on a coarse pair was printed before the run.
-    verdict = [said for said in report.verdict if said != coarse_pair(scenario)]
-    head = [f"{scenario.name}: {report.result.status.kind}", *verdict, ""]
+    head = [f"{report.result.scenario.name}: {report.result.status.kind}", *report.verdict, ""]
     exact = "" if report.error is None else report.error.sentence
     exact = exact if report.check is None else repr(report.check)
     # Gains that are in force are no news: they stand last.
     gains = "" if report.gains is None else report.gains.sentence
-    valve = scenario.device.valve.settings
-    times = [name for name in _OPENING if name in valve]
-    ideal = f"the valve opens without delay, as an ideal one: {', '.join(f'valve.{name}' for name in times)} = 0"
-    ideal = "" if any(valve[name] for name in times) or not times else ideal
-    last = [*filter(None, [exact, gains, ideal]), *(f"\nCommand with the remedy\n{text}" for text in report.usage)]
+    last = [*filter(None, [exact, gains]), *(f"\nCommand with the remedy\n{text}" for text in report.usage)]
     return "\n".join([*head, *metrics_lines(report.result.metrics), *([""] if last else []), *last])
-
-
-_OPENING = "opening_delay", "spool_frequency", "slew_limit"
-"""Values of a valve that delay its opening; 0 for none."""
 
 
 @in_units(lambda report, _folder: report.result.scenario.device.shown)

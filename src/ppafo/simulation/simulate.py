@@ -114,21 +114,20 @@ class Result(RecordedResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Remarks on a missed reference with tried remedies, a stop, a too coarse pair of valves, replaced values."""
+        """Remarks on a missed reference with tried remedies, a stop, replaced values."""
         no_warnings = (self.tracking.said, changed_text(changes_in(self.scenario)))
         return tuple(sentence for sentence in self.to_dict()["verdict"] if sentence not in no_warnings)
 
     @in_own_units
     def sentences(self, verdict: "Tracking") -> list[str]:
-        """Sentences of ``run.json``: tracking, remarks, a too coarse pair of valves, and changed values.
+        """Sentences of ``run.json``: tracking, remarks, and changed values.
 
         ``verdict`` is ``tracking``, with or without remedies that were tried.
         """
-        from ppafo.simulation.tracking.pair_step import coarse_pair
         from ppafo.simulation.tracking.remarks import remarks_on
 
         remarks = remarks_on(self, not verdict.fails and bool(verdict.said))
-        said = (verdict.sentence, *remarks, coarse_pair(self.scenario), changed_text(changes_in(self.scenario)))
+        said = (verdict.sentence, *remarks, changed_text(changes_in(self.scenario)))
         return list(filter(None, said))
 
     @in_own_units

@@ -21,7 +21,6 @@ from ppafo.simulation.numbers import changes_in, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking, tracking_in
-from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.simulation.tracking.remedies import level_text
 from ppafo.simulation.tracking.verdict import TOO_SHORT
 from ppafo.storage.opensim import opensim_recording, write_opensim
@@ -91,7 +90,7 @@ class WalkResult(RecordedResult):
         head = [f"{self.scenario.name}: {self.status.message}", self.scenario.origin.replaced]
         head.append(changed_text(changes_in(self.scenario)))
         if self.status.kind != "diverged":
-            head += [self.tracking.sentence, limited_request(self.scenario), unlimited_switching(self)]
+            head += [self.tracking.sentence, limited_request(self.scenario)]
             toes = self.metrics.get("lowest_toes")
             if toes is not None and toes.value < 0.0:
                 head.append("the toes would drag in mid-swing: the ankle is not lifted enough")

@@ -90,7 +90,6 @@ def sensitivity(
     """
     name_plugins(plugins)
     from ppafo.analyses.sensitivity.methods import DEFAULT_SAMPLES, METHODS, analyse, finding_of
-    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.studies.draws import drawn_in
     from ppafo.study.executing import executor_of
     from ppafo.study.runs import RunCounter, scenario_runs, with_companions
@@ -105,7 +104,6 @@ def sensitivity(
         raise StudyError(f"the outputs of study '{chosen.name}' have no metric; name the metric to analyse")
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
     tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)
-    warn_of_coarse_pairs([base.scenario])
     companions = with_companions(requested, base.scenario)
     runs = scenario_runs(base.scenario, companions, tally, used.gauge, threads, executor_of(executor))
     with shown_in(chosen.shown_for(base.scenario)):

@@ -18,7 +18,6 @@ from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import changes_in
 from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.simulation.tracking import Tracking
-from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
@@ -107,7 +106,7 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     cut_off = (walked for walked in (worn, comparison.without_device) if not walked.status.is_completed)
     said = [ended, *(f"{walked.scenario.name}: {walked.status.message}" for walked in cut_off)]
     said += [benefit_sentence(comparison), verdict.sentence, limited_request(scenario)]
-    said += [unlimited_switching(worn), scenario.origin.replaced, "" if gains is None else gains.sentence]
+    said += [scenario.origin.replaced, "" if gains is None else gains.sentence]
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
     mended = usage_text(reloaded(scenario, verdict.mended)) if verdict.mended else ""

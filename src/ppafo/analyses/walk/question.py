@@ -47,7 +47,6 @@ def walk_with_and_without(
 
     from ppafo.analyses.walk.answer import finding_of
     from ppafo.simulation.scenario import Scenario
-    from ppafo.simulation.tracking.pair_step import warn_of_coarse_pairs
     from ppafo.simulation.tracking.verdict import NOTHING_TO_FOLLOW
     from ppafo.walking.loading import check_duration_once, load_walk
     from ppafo.walking.walk import compare_walks
@@ -57,7 +56,6 @@ def walk_with_and_without(
     if not isinstance(chosen, Scenario):
         check_duration_once(overrides, minutes)
         chosen = load_walk(chosen, overrides, gait=gait, bottle=bottle)
-    warn_of_coarse_pairs([chosen])
     comparison = compare_walks(chosen, minutes=minutes, progress=partial(_report_walk, progress or report_nothing))
     finding = finding_of(comparison)
     tracking = finding.found["tracking"]

@@ -26,7 +26,6 @@ from ppafo.simulation.tracking.load_causes import (
     torque_at_its_limit,
     torque_beyond_reach,
 )
-from ppafo.simulation.tracking.pair_step import pair_step, quicker_text
 from ppafo.simulation.tracking.remedies import (
     CASCADE,
     Remedy,
@@ -44,6 +43,7 @@ from ppafo.simulation.tracking.remedies import (
     stiffer_laws,
     torque_asked,
 )
+from ppafo.simulation.tracking.rule import is_pair
 
 _MOSTLY, _PARTLY = 0.5, 0.2
 """Fractions of the settled part that count as most of it, and as much of a move [-]."""
@@ -67,8 +67,8 @@ _DELAYS_OF_VALVE = {"delay": -1.0, "spool_frequency": 1.0}
 """Numbers of a valve that delay its opening, and the sign of the change that reduces the delay."""
 _QUICKER_DEVICE = (3.0, 10.0, 100.0)
 """Factors by which valve or controller become quicker in trials [-]."""
-_SLOW, _FEW_DECISIONS = 0.01, 20.0
-"""Period of a controller [s], and decisions in the settled part below which that period makes the loop fail [-]."""
+_SLOW = 0.01
+"""Period of a controller from which its rate is named [s]."""
 _DELAY, _LONG_DELAY = "sensors.delay", 0.1
 """Path of the delay of all sensors, and delay divided by the time between two crossings of the reference, from which
 the delay is named [-]."""
@@ -86,25 +86,6 @@ _QUICKER = 1.3
 """Loop rate at an angle, divided by the rate used for the gains, above which it causes oscillation [-]."""
 
 
-def _slow_decisions(case: Case) -> TrackingCause | None:
-    """Cause: the controller decides only a few times while the loop settles."""
-    period, settled = case.scenario.controller.period, case.settled.duration
-    if period < _SLOW or settled >= _FEW_DECISIONS * period:
-        return None
-    late = _late_text(case)
-    text = (
-        f"the controller decides every {1.0e3 * period:.3g} ms, only {settled / period:.2g} times in the settled "
-        f"{settled:.3g} s{late and f', and {late}'}"
-    )
-    return TrackingCause(text, _higher_rates(period), "increase `controller.rate`")
-
-
-def _higher_rates(period: float) -> tuple[Remedy, ...]:
-    """Remedies with a higher rate, up to the usual one, than that of a controller with a period [s]."""
-    rates = dict.fromkeys((10.0 / period, 100.0 / period, _USUAL_RATE))
-    return tuple(Remedy({}, (f"controller.rate={each:g} Hz",)) for each in rates if 1.0 / period < each <= _USUAL_RATE)
-
-
 def _slope(case: Case) -> Floats:
     """Rate of the reference in the settled part [SI/s]; none at rest, of a pair, or for a move of one sample."""
     reference, time = followed(case.recording)[0][case.samples], case.recording.time[case.samples]
@@ -119,28 +100,30 @@ def _late_device(case: Case, least: float = LARGEST_SHARE) -> TrackingCause | No
     few dead times only.
     """
     scenario, law, settled = case.scenario, case.law, case.settled
-    if law is None or case.only_switches:
-        return None
-    dead_time, valve = loop_of(scenario, law).dead_time, scenario.device.valve.settings
+    period, valve = scenario.controller.period, scenario.device.valve.settings
+    saved = {"controller.rate": SAMPLES_LATE * period}
+    # The valves of an on/off law, and the gains of a Python object, have causes of their own.
+    has_loop = law is not None and not case.only_switches
+    dead_time = loop_of(scenario, law).dead_time if law is not None and has_loop else saved["controller.rate"]
     moves = float(np.sqrt(np.mean(_slope(case) ** 2))) * dead_time
     if moves <= least * settled.wanted_change and not (settled.rests and dead_time > least * settled.duration):
         return None
     quicker = {
         f"valve.{name}": [float(valve[name]) * factor**power for factor in _QUICKER_DEVICE]
         for name, power in _DELAYS_OF_VALVE.items()
-        if valve.get(name, 0.0) > 0.0
+        if has_loop and valve.get(name, 0.0) > 0.0
     }
-    saved = {
-        path: dead_time - loop_of(with_numbers(scenario, {path: numbers[-1]}), law).dead_time
-        for path, numbers in quicker.items()
-    }
-    saved["controller.rate"] = SAMPLES_LATE * scenario.controller.period
+    if law is not None:
+        trials = {path: loop_of(with_numbers(scenario, {path: numbers[-1]}), law) for path, numbers in quicker.items()}
+        saved |= {path: dead_time - loop.dead_time for path, loop in trials.items()}
     path = max(saved, key=saved.__getitem__)
     if path in quicker:
         number = level_text(declared_numbers(scenario)[path].unit, number_at(scenario, path))
         remedies = tuple(remedy(scenario, {path: each}) for each in quicker[path])
     else:
-        number, remedies = f"{1.0 / scenario.controller.period:.4g} Hz", _higher_rates(scenario.controller.period)
+        rates = [rate for rate in dict.fromkeys((10.0 / period, 100.0 / period, _USUAL_RATE)) if rate <= _USUAL_RATE]
+        number = f"{1.0 / period:.4g} Hz"
+        remedies = tuple(Remedy({}, (f"controller.rate={rate:g} Hz",)) for rate in rates if rate * period > 1.0)
     moved = f", in which the reference moves by {change_text(scenario.controlled, moves)}" * (moves > 0.0)
     text = f"`{path} = {number}` gives most of the loop's dead time of {level_text('s', dead_time)}{moved}"
     return TrackingCause(text, remedies, "use a faster valve or controller, or a slower reference")
@@ -229,14 +212,26 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
     # Where a valve has gradual openings, a law that uses them for an angle is the better remedy.
     gradual = (CASCADE,) if scenario.controlled == ANGLE else ()
     return TrackingCause(
-        text, (*gradual, *smaller_pair(scenario, ratio)), f"take smaller valves, or {quicker_text(scenario, dead_time)}"
+        text,
+        (*gradual, *smaller_pair(scenario, ratio)),
+        f"take smaller valves, or {_quicker_text(scenario, dead_time)}",
     )
 
 
 def _pair_step(case: Case, law: ControllerKind) -> tuple[float, float]:
-    """Step of on/off valves [SI] in their dead time, at the mean angle of the settled part, and that time [s]."""
-    step, dead_time = pair_step(case.scenario, law)
-    return step * _loop_rate(case.scenario, float(np.mean(case.recording["angle"][case.samples]))), dead_time
+    """Step R theta of on/off valves [SI] at the mean angle of the settled part, in their dead time theta [s]."""
+    loop, angle = loop_of(case.scenario, law), float(np.mean(case.recording["angle"][case.samples]))
+    return loop.rate * loop.dead_time * _loop_rate(case.scenario, angle), loop.dead_time
+
+
+def _quicker_text(scenario: Scenario, dead_time: float) -> str:
+    """Words for what reduces the dead time [s] of an on/off loop: its valves, the rate of its controller, or both."""
+    sampled = SAMPLES_LATE * scenario.controller.period
+    if not is_pair(scenario):
+        return "a higher `controller.rate`" if sampled > 0.5 * dead_time else "a faster valve"
+    # The longer of the valves' switching interval and the delay of sampling decides.
+    interval = float(scenario.device.valve.settings["switching_interval"])
+    return "faster valves together with a higher `controller.rate`" if sampled > interval else "faster valves"
 
 
 def _wide_zone(case: Case, begin: str, end: str = "") -> TrackingCause:
@@ -496,7 +491,6 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     # No gains follow what moves on in the dead time by more than any lag that is allowed.
     lambda case: _late_device(case, LARGEST_LAG),
     torque_at_its_limit,
-    _slow_decisions,
     _within_tolerance,
     _static_friction,
     _shut_valve,

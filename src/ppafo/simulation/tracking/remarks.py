@@ -11,7 +11,6 @@ from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.reach import torque_reach
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.load_causes import LOCKED, ON_STOP, stop_of
-from ppafo.simulation.tracking.pair_step import unlimited_switching
 from ppafo.simulation.tracking.remedies import level_text
 from ppafo.simulation.tracking.rule import SMALLEST_MOVE
 
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
-    """Yield remarks on rest, stops, switching, sensor values without effect, and replaced values.
+    """Yield remarks on rest, stops, sensor values without effect, and replaced values.
 
     ``follows``: True if the run follows its reference; a stop may then bear the torque that the reference asks for.
     """
@@ -37,7 +36,6 @@ def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
         if reached and follows and scenario.controlled != ANGLE and motion.leg is None:
             reached[-1] += f": there the stop bears the torque; not tried: lock the joint ({LOCKED.text}) or add a load"
     yield from (f"the joint reaches {text}" for text in reached)
-    yield unlimited_switching(result)
     yield _without_effect(scenario)
     yield scenario.origin.replaced
 

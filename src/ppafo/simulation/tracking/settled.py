@@ -143,25 +143,21 @@ def _course(scenario: Scenario, recording: Recording) -> ReferenceSummary:
     duration = float(recording.time[-1] - recording.time[0])
     interval = duration / (count - 1)
     largest, start = extent(recording), hold_start(recording)
+    profile, choice = PROFILES[scenario.reference.kind], scenario.reference
+    single = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
+    period = None if profile.period is None else profile.period(profile_parameters(single))
     return ReferenceSummary(
         last=float(reference[-1]),
         largest=largest,
         tolerance=SAME_LEVEL * largest,
         hold_start=float(count - 1 if start is None else start),
         samples=float(count),
-        start_up=_start_up(scenario, duration) / interval,
+        # A value meets a repeated reference in this time.
+        start_up=0.0 if period is None else start_up_of(period, duration, profile.is_wave) / interval,
         interval=interval,
         of_joint=0.0 if scenario.controlled == ANGLE else 1.0,
         previous=float(reference[0]),
     )
-
-
-def _start_up(scenario: Scenario, duration: float) -> float:
-    """Time for a value to meet a repeated reference [s], 0 for another; of several runs that of the first."""
-    profile, choice = PROFILES[scenario.reference.kind], scenario.reference
-    single = replace(choice, settings={name: first(setting) for name, setting in choice.settings.items()})
-    period = None if profile.period is None else profile.period(profile_parameters(single))
-    return 0.0 if period is None else start_up_of(period, duration, profile.is_wave)
 
 
 def settled_parts(scenario: Scenario, metrics: Mapping[str, Floats], least: float) -> list[SettledPart]:
