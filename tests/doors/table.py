@@ -336,10 +336,10 @@ def _chosen(base: str, *names: str) -> Case:
 SHORT = (
     Case("torque-task-slow-valve", "short", "torque-task-slow-valve", ("run.duration=60 ms",)),
     Case("late totals", "short", "step-response", ("run.duration=50 ms", "controller.rate=7 Hz")),
-    _chosen(VANE_BASE, "cascade", "late sensors", "late command", "cylinder", "thermal gas"),
+    _chosen(VANE_BASE, "cascade", "late sensors", "late command", "cylinder", "thermal gas", "seal friction"),
     _chosen(VANE_BASE, "difference", "supply lines", "bandwidth", "samples between steps", "parts of steps"),
     _chosen(VANE_BASE, "opening delays", "noise", "resolution"),
-    _chosen(VANE_BASE, "joint load", "Stribeck", "seal friction", "sensors late by parts of a step", "regulators"),
+    _chosen(VANE_BASE, "joint load", "Stribeck", "line resistance", "sensors late by parts of a step", "regulators"),
     _chosen(VANE_BASE, "leg of a gait"),
     _chosen(VANE_BASE, "prescribed", "line resistance", "records between steps"),
     _chosen(VANE_BASE, "bladder", "slew", "dead band", "damped", "smooth"),

@@ -47,6 +47,8 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
             f"at most {MOST_TICKS // 2 * TICK:.3g} s"
         )
     law, run = FIXED_LAWS[scenario.controller.kind], plan_run(scenario)
+    if run.program.valve.regulates:
+        raise ScenarioError(f"{scenario.name}: device.valve: the firmware sets no pressure; give a valve that it opens")
     if "sent_command" in run.program.ports_with_laws:
         raise ScenarioError(
             f"{scenario.name}: effects.opening: the firmware inverts no table of openings; omit the table"

@@ -76,13 +76,14 @@ class SetPressures(NamedTuple):
 
 
 class RegulatedPort(NamedTuple):
-    """Full conductance [kg/(s Pa)], pressures of source and atmosphere, set pressure and band [Pa].
+    """Conductances [kg/(s Pa)] of the fully open paths to source and atmosphere, their pressures [Pa absolute].
 
-    ``is_relieving`` is 1 where gas may flow back into the source, else 0.
+    ``is_relieving`` is 1 where gas may flow back into the source, else 0; set pressure and band in Pa.
     """
 
-    conductance: float
+    source_conductance: float
     source_pressure: float
+    vent_conductance: float
     vent_pressure: float
     is_relieving: float
     set_pressure: float
@@ -151,10 +152,12 @@ def regulated_ports(
     plant: PlantParameters, set_1: float, set_2: float, band: float
 ) -> tuple[RegulatedPort, RegulatedPort]:
     """Ports of both chambers for their set pressures and a band [Pa]."""
-    full, room, back = plant.valve_conductance, plant.atmospheric_pressure, plant.relieving
+    # Lines narrow the open path; a part of it has the same share of what they leave.
+    supply, exhaust = supply_path(plant.valve_conductance), exhaust_path(plant.valve_conductance)
+    room, back = plant.atmospheric_pressure, plant.relieving
     return (
-        RegulatedPort(full, plant.supply_pressure, room, back, set_1, band),
-        RegulatedPort(full, plant.dorsiflexion_pressure, room, back, set_2, band),
+        RegulatedPort(supply, plant.supply_pressure, exhaust, room, back, set_1, band),
+        RegulatedPort(supply, plant.dorsiflexion_pressure, exhaust, room, back, set_2, band),
     )
 
 
@@ -172,16 +175,16 @@ def regulated_port_flow(pressure: float, port: RegulatedPort, curve: FlowCurve) 
     """Flow into a chamber at ``pressure`` [Pa absolute] through its regulator, and its derivatives. Eqs (6) to (8)."""
     opening = (port.set_pressure - pressure) / port.band
     fed, vented = max(min(opening, 1.0), 0.0), max(min(-opening, 1.0), 0.0)
-    # Flows per conductance: the derivative has that of the opening, too.
-    source, by_source = single_port_flow(pressure, SinglePort(1.0, port.source_pressure, 1.0, port.is_relieving), curve)
-    vent, by_vent = single_port_flow(pressure, SinglePort(1.0, port.vent_pressure, 0.0, 1.0), curve)
-    supply, exhaust = supply_path(fed * port.conductance), exhaust_path(vented * port.conductance)
-    within = port.conductance / port.band
-    narrowing = -within * source.total if fed > 0.0 and fed < 1.0 else 0.0
-    widening = within * vent.total if vented > 0.0 and vented < 1.0 else 0.0
-    from_source, slope = supply * source.total, supply * by_source.total + narrowing
-    return PortFlow(from_source + exhaust * vent.total, from_source), PortSlopes(
-        slope + exhaust * by_vent.total + widening, slope
+    # The flows of open paths: the derivative has that of the opening, too.
+    open_source = SinglePort(port.source_conductance, port.source_pressure, 1.0, port.is_relieving)
+    open_vent = SinglePort(port.vent_conductance, port.vent_pressure, 0.0, 1.0)
+    source, by_source = single_port_flow(pressure, open_source, curve)
+    vent, by_vent = single_port_flow(pressure, open_vent, curve)
+    narrowing = source.total / port.band if fed > 0.0 and fed < 1.0 else 0.0
+    widening = vent.total / port.band if vented > 0.0 and vented < 1.0 else 0.0
+    from_source, slope = fed * source.total, fed * by_source.total - narrowing
+    return PortFlow(from_source + vented * vent.total, from_source), PortSlopes(
+        slope + vented * by_vent.total + widening, slope
     )
 
 
