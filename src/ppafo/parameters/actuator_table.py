@@ -156,7 +156,7 @@ def _units(header: Sequence[str], file: str) -> dict[str, str]:
             hint = "; how volumes follow from torques is in docs/how-to/extend.md" if "torque" in name.lower() else hint
             raise ParameterError(f"{file}: unknown column '{shown}'{hint}; allowed: {', '.join(COLUMNS)}")
         if name in units:
-            raise ParameterError(f"{file}: the column '{name}' occurs twice; rename or remove one of them")
+            raise ParameterError(f"{file}: the column '{name}' occurs twice")
         if not bracket:
             example = f"{name} [{COLUMNS[name].example}]"
             raise ParameterError(f"{file}: column '{name}' has no unit; write for example '{example}'")
@@ -193,12 +193,10 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
     lines = Counter(zip(angle.tolist(), pressure.tolist(), strict=True))
     repeated = next((pair for pair, count in lines.items() if count > 1), None)
     if repeated is not None:
-        raise ParameterError(f"{file}: has more than one line for {_point_text(*repeated)}; keep one of them")
+        raise ParameterError(f"{file}: has more than one line for {_point_text(*repeated)}")
     for pair in product(angles.tolist(), pressures.tolist()):
         if pair not in lines:
-            raise ParameterError(
-                f"{file}: there is no line for {_point_text(*pair)}; every angle needs one line for every pressure"
-            )
+            raise ParameterError(f"{file}: there is no line for {_point_text(*pair)}")
 
 
 def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file: str) -> None:
@@ -206,7 +204,7 @@ def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file
     if values.size > maximum:
         raise ParameterError(f"{file}: has {values.size} values of {name}; at most {maximum} are allowed")
     if values.size > 1 and float(np.diff(values).min()) < nearest:
-        raise ParameterError(f"{file}: two values of {name} are almost equal; round them to one value")
+        raise ParameterError(f"{file}: two values of {name} are almost equal")
 
 
 def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, resolution: float, file: str) -> None:
@@ -221,7 +219,7 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
         row, column = np.unravel_index(int(np.argmin(volume)), volume.shape)
         point = _point_text(angles[row], pressures[column])
         least = shown_text(float(volume.min()), "m^3")
-        raise ParameterError(f"{file}: {name} = {least} at {point} is negative; correct the volume")
+        raise ParameterError(f"{file}: {name} = {least} at {point} is negative")
     falls = np.argwhere(np.diff(volume, axis=1) < -unseen)
     if falls.size:
         row, column = falls[0]
@@ -429,5 +427,5 @@ def _check_curves(chamber: TabulatedChamber, bends: Floats, angles: Floats, name
             problem = "is negative" if is_volume else "decreases with pressure"
             raise ParameterError(
                 f"{file}: between the measured angles the interpolated {name} {problem} near "
-                f"{math.degrees(angle):.4g} deg; smooth the volumes, or measure at more angles there"
+                f"{math.degrees(angle):.4g} deg"
             )

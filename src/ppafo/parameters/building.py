@@ -215,7 +215,7 @@ def actuator_problem(actuator: Actuator) -> str:
         f"{math.degrees(low):.4g} to {math.degrees(high):.4g} deg"
         for low, high in ((table.first_angle, table.last_angle), (stops.angle_min, stops.angle_max))
     )
-    return f"the volume table covers {measured}, but the stops are at {wanted}; extend the table or move the stops"
+    return f"the volume table covers {measured}, but the stops are at {wanted}"
 
 
 def beyond_pressures(device: Device) -> Problem:
@@ -238,7 +238,7 @@ def beyond_pressures(device: Device) -> Problem:
         atmosphere = at(supply.atmospheric_pressure, run)
         with shown_in(counted_from(device.units, atmosphere)):
             covered, has = (shown_text(atmosphere + each, "Pa_a", ".4g") for each in (end, at(gauge, run)))
-        return f"the volume table covers pressures {way} to {covered}, but the supply has {has}; extend the table"
+        return f"the volume table covers pressures {way} to {covered}, but the supply has {has}"
 
     return is_beyond, line
 

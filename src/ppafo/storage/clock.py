@@ -64,9 +64,7 @@ def clock_seconds(
     seconds_of_day, zone_texts, date_texts = zip(*stamps, strict=True)
     zones = dict.fromkeys(re.sub(r"[+-].*", "", zone) for zone in zone_texts)
     if len(zones) > 1:
-        raise DataError(
-            f"the times are in several time zones ({', '.join(zones)}); give all times in one time zone, or as numbers"
-        )
+        raise DataError(f"the times are in several time zones ({', '.join(zones)})")
     seconds = np.array(seconds_of_day)
     days_in_words = date_texts if dates is None else [cell.strip() for cell in dates]
     if any(days_in_words):

@@ -80,7 +80,7 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
         raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', not '{names[0]}'{_MAPPED}; {_NO_TIMES}")
     twice = first_twice(names)
     if twice is not None:
-        raise DataError(f"the column '{twice}' occurs twice; rename or remove one of them")
+        raise DataError(f"the column '{twice}' occurs twice")
     return columns
 
 
@@ -206,7 +206,7 @@ def read_csv(
         rows: Iterator[list[str]] = csv.reader(islice(lines, first, None), delimiter=mark, strict=True)
         header = header_cells(next(rows, []), mark)
         if not header and not any(lines[first:]):
-            raise DataError("has no header; write the names of the columns in the first line")
+            raise DataError("has no header")
         # A first column without a name is the row number that pandas writes.
         is_counted = bool(header) and not header[0].strip()
         has_rows_only = row_time is not None and not any(cell.partition("[")[0].strip() == TIME for cell in header)
@@ -278,9 +278,7 @@ def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
             raise DataError(f"the comment '# {match[1]}:' names no kind of recording, did you mean '{near[0]}'?")
         named += [kind for kind in _MARKS if kind == match[1]]
     if len(set(named)) > 1:
-        raise DataError(
-            f"the comments name two kinds of recording, {' and '.join(dict.fromkeys(named))}; keep one of them"
-        )
+        raise DataError(f"the comments name two kinds of recording, {' and '.join(dict.fromkeys(named))}")
     return named[0] if named else "measured"
 
 

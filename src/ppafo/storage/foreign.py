@@ -446,9 +446,7 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
     direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
     moving = np.flatnonzero(direction)
     if moving.size == 0:
-        raise DataError(
-            f"direction.threshold = {wanted.threshold!r}: '{wanted.of}' never changes faster; give a lower threshold"
-        )
+        raise DataError(f"direction.threshold = {wanted.threshold!r}: '{wanted.of}' never changes faster")
     directed = recording.with_channel("direction", direction, PLAIN_NUMBER)
     if "repetition" in recording:
         return directed

@@ -123,7 +123,7 @@ def _own_variables(file: Any) -> dict[str, Any]:
         filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
         behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
         if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
-            raise DataError(f"'{name}' has an unsupported compression; save it with gzip, or uncompressed")
+            raise DataError(f"'{name}' has an unsupported compression")
     return variables
 
 
@@ -155,7 +155,7 @@ def _channel(name: str, variable: Any) -> Channel:
     """Convert a variable to a channel. Raises DataError if its attributes mark numbers as missing or packed."""
     for key in _PACKING:
         if key in variable.attrs:
-            raise DataError(f"'{name}' is packed (attribute '{key}'); save unpacked numbers")
+            raise DataError(f"'{name}' is packed (attribute '{key}')")
     values = np.asarray(variable[:], dtype=np.float64)
     for key in _GAPS:
         if key in variable.attrs and np.isin(values, np.asarray(variable.attrs[key], dtype=np.float64)).any():

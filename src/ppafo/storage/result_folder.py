@@ -120,13 +120,11 @@ def read_stored(folder: str | Path) -> StoredResult:
     if not (folder_path / RUN_FILE).is_file() and (folder_path / MARK).is_file():
         raise DataError(f"{folder}: is a result of 'ppafo {marking_command(folder_path)}', not of a run")
     if not (folder_path / RUN_FILE).is_file() and (folder_path / MANIFEST).is_file():
-        raise DataError(f"{folder}: contains the results of a study, not of a run; read them by load_study_results")
+        raise DataError(f"{folder}: contains the results of a study, not of a run")
     document = read_document(folder_path)
     if sha256(read_bytes(folder_path / NETCDF_FILE)).hexdigest() != document["recording"].get("sha256"):
         # Refused before it is opened: the HDF5 library can hang on a damaged one.
-        raise DataError(
-            f"{folder_path / NETCDF_FILE}: is not the file that was written with {RUN_FILE}; run the scenario again"
-        )
+        raise DataError(f"{folder_path / NETCDF_FILE}: is not the file that was written with {RUN_FILE}")
     return StoredResult(folder_path, read_netcdf(folder_path / NETCDF_FILE), document)
 
 

@@ -104,7 +104,7 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("# sythetic: by hand\ntime [s]\n0\n", "'# sythetic:' names no kind of recording, did you mean 'synthetic'\\?"),
         (
             "# synthetic: a\n# simulated: b\ntime [s]\n0\n",
-            "name two kinds of recording, synthetic and simulated; keep one",
+            "name two kinds of recording, synthetic and simulated",
         ),
         ('time [s],angle [rad]\n0,"1\n', "not a CSV file|not a number"),
     ],

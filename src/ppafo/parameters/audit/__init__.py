@@ -16,12 +16,12 @@ from ppafo.parameters.audit.chambers import (
     check_volumes,
 )
 from ppafo.parameters.audit.changes import changes
-from ppafo.parameters.audit.choked_flow import check_choked_flow
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, NamedValue, Severity
 from ppafo.parameters.audit.inertia import check_inertia
 from ppafo.parameters.audit.orifices import check_bores, check_flow, check_orifices
 from ppafo.parameters.audit.torque import check_published_torque, check_torque_ceiling, check_vacuum
 from ppafo.parameters.audit.values import (
+    check_choked_flow,
     check_contradictions,
     check_dimensions,
     check_gas_data,

@@ -209,7 +209,7 @@ def filled_mass(values: Mapping[str, float], entries: Mapping[str, Entry], fluid
         raise ParameterError(
             f"{file}: {path}: {fluid.name} is liquid above {limit}; give bottle.gas_mass instead"
             if has_liquid(fluid.table)
-            else f"{file}: {path}: the property table of {fluid.name} ends at {limit}; give a lower pressure"
+            else f"{file}: {path}: the property table of {fluid.name} ends at {limit}"
         )
     return values["bottle.volume"] * gas_density(fluid.table, temperature, pressure)
 
@@ -356,5 +356,5 @@ def _check_content(bottle: Bottle, file: str) -> None:
         raise ParameterError(
             f"{file}: the full bottle has {shown_text(content.pressure, 'Pa_a', '.4g', unit=unit)} at "
             f"{temperature:g} K, but the regulator needs {shown_text(required, 'Pa_a', '.4g', unit=unit)}, the sum of "
-            "regulator.set_pressure and regulator.pressure_margin; lower one of them"
+            "regulator.set_pressure and regulator.pressure_margin"
         )

@@ -68,7 +68,7 @@ def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
     read, file = read_model(FILE, PublicationFile, name_or_path)
     twice = first_twice(entry.id for entry in read.claims)
     if twice is not None:
-        raise ScenarioError(f"{file}: claims: '{twice}' appears twice; give each claim a different name")
+        raise ScenarioError(f"{file}: claims: '{twice}' appears twice")
     # What one field alone cannot say: these are rules between fields.
     for entry in read.claims:
         where = f"{file}: claims.{entry.id}"

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ppafo.parameters.audit.choked_flow import evaluate
+from ppafo.parameters.audit.values import evaluate
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def _read_nexus(path: str | Path) -> MotionTable:
         names[0] = "Frame"
         motions.append(table_of(path, block.rows, names, block.units, "Frame", frame_rate=block.rate, noun="markers"))
     if not motions:
-        raise DataError(f"{path}: has no block 'Trajectories' or 'Model Outputs'; export the trajectories from Nexus")
+        raise DataError(f"{path}: has no block 'Trajectories' or 'Model Outputs'")
     whole = motions[0]
     for table in motions[1:]:
         if table.time.size == whole.time.size:
@@ -102,9 +102,7 @@ def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBl
     delimiter = delimiter_of(head[2]) if len(head) == 4 else ","
     axes = cells_of(head[2], delimiter) if len(head) == 4 else []
     if [axis.lower() for axis in axes[:2]] != ["frame", "sub frame"]:
-        raise DataError(
-            f"{path}: line {start + 4}: must begin with 'Frame' and 'Sub Frame'; export the file from Nexus again"
-        )
+        raise DataError(f"{path}: line {start + 4}: must begin with 'Frame' and 'Sub Frame'")
     labels, last = [], ""
     written = cells_of(head[1], delimiter)
     for label in [*written, *[""] * len(axes)][: len(axes)]:
@@ -147,7 +145,7 @@ def _read_qualisys(path: str | Path) -> MotionTable:
     lines = lines_of(path)
     keys = {cells[0]: (number, cells[1:]) for number, cells in enumerate(cells_of(line, "\t") for line in lines)}
     if "MARKER_NAMES" not in keys:
-        raise DataError(f"{path}: has no line MARKER_NAMES; export the 3D data of Qualisys as TSV")
+        raise DataError(f"{path}: has no line MARKER_NAMES")
     at, labels = keys["MARKER_NAMES"]
     labels = [bare_label(label) for label in labels if label]
     line, (rate, *_) = keys.get("FREQUENCY", (0, ["missing"]))
@@ -181,9 +179,7 @@ def _read_motive(path: str | Path) -> MotionTable:
         # Some exports leave out what their rows are: types, names, and further ones above the quantities.
         rows = {"Type": above[0], "Name": above[1]}
     if at < 0 or "Name" not in rows:
-        raise DataError(
-            f"{path}: has no header 'Frame, Time (Seconds), X, Y, Z, ...' below the marker names; export the file again"
-        )
+        raise DataError(f"{path}: has no header 'Frame, Time (Seconds), X, Y, Z, ...' below the marker names")
     axes, quantities = cells_of(lines[at], ","), above[-1]
     kinds, labels = rows.get("Type", rows["Name"]), rows["Name"]
     names = []
@@ -192,7 +188,7 @@ def _read_motive(path: str | Path) -> MotionTable:
         is_marker = "marker" in kind.lower() and quantity.lower() == "position" and axis.lower() in AXES
         names.append(f"{bare_label(label)}.{axis.lower()}" if is_marker else "")
     if not any(names):
-        raise DataError(f"{path}: has no marker positions; export the take with Markers and Position")
+        raise DataError(f"{path}: has no marker positions")
     names[1] = "time"
     units = ["", "s", *[unit] * (len(names) - 2)]
     return table_of(path, NumberBlock(lines, at + 1, ","), names, units, "time", noun="markers")
