@@ -10,7 +10,7 @@ of figure 7, and how many of the six fitted rows of ``ppafo reproduce`` are met.
 
 import argparse
 
-from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
+from ppafo.analyses.reproduce.step_response import step_events, step_observations
 from ppafo.analyses.reproduce.torque_task import phased_runs, torque_task_claims, torque_task_observations
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
@@ -26,8 +26,7 @@ def row(dead: float, displacement: float | None) -> str:
     names = ("step-response", "torque-task-solenoid", "torque-task-proportional")
     step, solenoid, proportional = (simulate(load_scenario(name, overrides)) for name in names)
     supply = step.scenario.device.supply
-    levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
-    told = step_observations(step.recording, levels, step_events(step.recording))
+    told = step_observations(step.recording, supply, step_events(step.recording))
     swings = torque_task_observations(solenoid, proportional)
     claims = torque_task_claims(*phased_runs(solenoid), proportional, ())
     met = [not claim.is_missed for claim in claims]

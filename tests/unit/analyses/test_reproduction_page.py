@@ -12,14 +12,10 @@ from ppafo.analyses.reproduce.answer import (
 )
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.solve import Reproduction
-from ppafo.analyses.reproduce.step_response import SupplyLevels
 from ppafo.analyses.reproduce.torque_task import holding_torque
 from ppafo.report.style import drawn_at
 from ppafo.report.writing import typeset
 from tests.unit.report.test_width_of_figures import texts_of
-
-LEVELS = SupplyLevels(480536.0, 101325.0)
-
 
 DRAWN = {STEP_FIGURE: b"<svg>seven</svg>", TORQUE_FIGURE: b"<svg>eight</svg>"}
 
@@ -35,7 +31,7 @@ def words(page: str) -> str:
 
 
 def test_figure_7_has_the_four_panels_of_the_paper_in_its_units(reproduction: Reproduction) -> None:
-    figure = step_response_figure(reproduction.step.recording, LEVELS, reproduction.step_events)
+    figure = step_response_figure(reproduction.step.recording, 101325.0, reproduction.step_events)
     assert [axes.get_ylabel() for axes in figure.axes] == [
         "Angle (deg)",
         "Difference (psi)",

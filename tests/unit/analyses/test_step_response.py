@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from ppafo.analyses.reproduce.step_response import PASCALS_PER_PSI, SupplyLevels, step_events, step_observations
+from ppafo.analyses.reproduce.step_response import PASCALS_PER_PSI, step_events, step_observations
+from ppafo.parameters.device import Supply
 from ppafo.signals import Channel, Recording
 
 ATMOSPHERE = 101325.0
-LEVELS = SupplyLevels(ATMOSPHERE + 55.0 * PASCALS_PER_PSI, ATMOSPHERE)
+SUPPLY = Supply(*(ATMOSPHERE + 55.0 * PASCALS_PER_PSI,) * 2, ATMOSPHERE)
 TIME = np.linspace(0.0, 0.4, 401)
 BREAKAWAY, STOP = 0.05, 0.25
 
@@ -32,7 +33,7 @@ def recording(**changed: Channel) -> Recording:
 
 
 def held(changed: Recording) -> dict[str, bool]:
-    return {item.id: item.holds for item in step_observations(changed, LEVELS, step_events(changed))}
+    return {item.entry.id: item.holds for item in step_observations(changed, SUPPLY, step_events(changed))}
 
 
 def test_breakaway_is_the_last_sample_at_rest_and_stop_the_first() -> None:
@@ -43,7 +44,7 @@ def test_breakaway_is_the_last_sample_at_rest_and_stop_the_first() -> None:
 
 def test_a_recording_that_goes_as_the_text_tells_shows_every_sentence() -> None:
     assert [name for name, holds in held(recording()).items() if not holds] == []
-    found = {item.id: item.evidence for item in step_observations(recording(), LEVELS, step_events(recording()))}
+    found = {item.entry.id: item.evidence for item in step_observations(recording(), SUPPLY, step_events(recording()))}
     assert "40.0 psig" in found["pressure_1_rises_until_breakaway"]
 
 

@@ -21,7 +21,6 @@ from ppafo.analyses.reproduce.solve import (
     Reproduction,
     SyntheticEvidence,
 )
-from ppafo.analyses.reproduce.step_response import SupplyLevels
 from ppafo.analyses.reproduce.torque_task import WITHIN_REACH, holding_torque, reading_rows, result_on_u
 from ppafo.documents.json_text import fields_of
 from ppafo.identification.bench.law import figure_3
@@ -180,15 +179,16 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
 
 def _figures(reproduction: Reproduction) -> list[Section]:
     """Return the figures of the reproduction page as sections, each drawn on demand."""
-    supply = reproduction.step.scenario.device.supply
-    levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
+    atmosphere = reproduction.step.scenario.device.supply.atmospheric_pressure
     stated = {claim.entry.id: claim.entry.published or 0.0 for claim in reproduction.claims}
     # Without the bench figures 7 and 8 have the simulation alone.
     step, tasks, synthetic = None, None, reproduction.synthetic
     if isinstance(synthetic, SyntheticEvidence):
         step, tasks = synthetic.step, (synthetic.solenoid, synthetic.proportional)
     drawn: dict[str, Callable[[], Drawing]] = {
-        STEP_FIGURE: partial(step_response_figure, reproduction.step.recording, levels, reproduction.step_events, step),
+        STEP_FIGURE: partial(
+            step_response_figure, reproduction.step.recording, atmosphere, reproduction.step_events, step
+        ),
         TORQUE_FIGURE: partial(
             torque_task_figure,
             reproduction.solenoid.recording,

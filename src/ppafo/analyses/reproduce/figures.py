@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ppafo.analyses.reproduce.step_response import StepEvents, SupplyLevels
+from ppafo.analyses.reproduce.step_response import StepEvents
 from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
@@ -69,12 +69,13 @@ The inset with the first milliseconds has x, y, width and height as fractions of
 
 
 def step_response_figure(
-    recording: Recording, levels: SupplyLevels, events: StepEvents | None, synthetic: Recording | None = None
+    recording: Recording, atmosphere: float, events: StepEvents | None, synthetic: Recording | None = None
 ) -> "Figure":
     """Return figure 7: angle, pressure difference and both pressures over time, with ``events`` marked if known.
 
-    ``synthetic`` is a recording of the simulated bench, drawn as a thin line with a band from the smallest to the
-    largest readings; a further panel below each curve shows the measurement less the model.
+    Gauge pressures count from ``atmosphere`` [Pa absolute]. ``synthetic`` is a recording of the simulated bench, drawn
+    as a thin line with a band from the smallest to the largest readings; a further panel below each curve shows the
+    measurement less the model.
     """
     end = _MILLISECONDS * float(recording.time[-1])
     if events is not None:
@@ -88,9 +89,9 @@ def step_response_figure(
         for time, angle, name in zip(event_times, (120.0, 25.0), ("breaks away", "at rest"), strict=False)
     ]
     signals, errors = list[Panel](), list[Panel]()
-    readings = [None] * len(_STEP_PANELS) if synthetic is None else _curves(synthetic, levels)
+    readings = [None] * len(_STEP_PANELS) if synthetic is None else _curves(synthetic, atmosphere)
     for (title, axis, colour, inset), model, measured in zip(
-        _STEP_PANELS, _curves(recording, levels), readings, strict=True
+        _STEP_PANELS, _curves(recording, atmosphere), readings, strict=True
     ):
         line = Mark("line", _MILLISECONDS * recording.time, model, label="model", colour=colour, style={"zorder": 3})
         marks = [line]
@@ -117,10 +118,10 @@ def step_response_figure(
     return draw_panels(panels, 2, (3.15, 1.0), kind=(synthetic or recording).kind)
 
 
-def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
+def _curves(recording: Recording, atmosphere: float) -> tuple[Floats, ...]:
     """Return the values (samples,) of the panels of figure 7, in the order and units of ``_STEP_PANELS``."""
     first, second = recording["pressure_1"], recording["pressure_2"]
-    gauge = ((pressure - levels.atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
+    gauge = ((pressure - atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
     return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)
 
 

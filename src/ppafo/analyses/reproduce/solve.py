@@ -10,7 +10,7 @@ from typing import Any
 
 from ppafo.analyses.reproduce.claim import Claim, Observation, claim_on_text, verdict_counts
 from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED_CLAIM, arithmetic_claims, load_reported
-from ppafo.analyses.reproduce.step_response import StepEvents, SupplyLevels, step_events, step_observations
+from ppafo.analyses.reproduce.step_response import StepEvents, step_events, step_observations
 from ppafo.analyses.reproduce.torque_task import (
     InterpretationOfU,
     control_claims,
@@ -149,8 +149,7 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     completed = load_parameter_set(step.scenario.origin.parameter_set)
     assumed = assumed_values(scenarios)
     events, supply = step_events(step.recording), step.scenario.device.supply
-    levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
-    step_observed = tuple(step_observations(step.recording, levels, events))
+    step_observed = tuple(step_observations(step.recording, supply, events))
     torque_observed = tuple(torque_task_observations(solenoid, proportional))
     report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
     (pair_errors, pair_gas), task_assumptions = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ppafo.analyses.reproduce.claim import Observation, observation
 from ppafo.constants import PASCALS_PER_PSI
+from ppafo.parameters.device import Supply
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
@@ -42,23 +43,6 @@ class StepEvents:
     stop_time: float
 
 
-@dataclass(frozen=True, slots=True)
-class SupplyLevels:
-    """Supply and atmospheric pressure [Pa absolute], the limits of a step response."""
-
-    supply: float
-    atmosphere: float
-
-    @property
-    def range(self) -> float:
-        """Pressure range between supply and atmosphere [Pa]."""
-        return self.supply - self.atmosphere
-
-    def gauge(self, pressure: float) -> float:
-        """Return the gauge pressure [psi] of an absolute pressure [Pa]."""
-        return (pressure - self.atmosphere) / PASCALS_PER_PSI
-
-
 def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEvents | None:
     """Return breakaway and stop of a vane that moves from rest to rest; None for any other motion.
 
@@ -79,14 +63,14 @@ def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEve
     return StepEvents(breakaway, stop, float(recording.time[breakaway]), float(recording.time[stop]))
 
 
-def step_observations(recording: Recording, levels: SupplyLevels, events: StepEvents | None) -> list[Observation]:
+def step_observations(recording: Recording, supply: Supply, events: StepEvents | None) -> list[Observation]:
     """Return the verdict of the recording on each statement of the text.
 
     No statement holds if the vane does not move.
     """
     if events is None:
         return [observation(identifier, False, "the vane does not move from rest to rest") for identifier in _TESTS]
-    step = _Step(recording, levels, events)
+    step = _Step(recording, supply, events)
     return [observation(identifier, *judge(step)) for identifier, judge in _TESTS.items()]
 
 
@@ -95,21 +79,25 @@ class _Step:
     """Recording, supply levels and events of a step response, against which the statements of the text are tested."""
 
     recording: Recording
-    levels: SupplyLevels
+    supply: Supply
     events: StepEvents
 
+    @property
+    def range(self) -> float:
+        return self.supply.pressure - self.supply.atmospheric_pressure
+
     def gauge(self, pressure: float) -> str:
-        return f"{self.levels.gauge(pressure):.1f}"
+        return f"{(pressure - self.supply.atmospheric_pressure) / PASCALS_PER_PSI:.1f}"
 
     def milliseconds(self, index: int) -> str:
         return f"{1e3 * self.recording.time[index]:.0f} ms"
 
     def is_same(self, pressure: float, other: float) -> bool:
-        return bool(abs(pressure - other) < _SAME * self.levels.range)
+        return bool(abs(pressure - other) < _SAME * self.range)
 
     def only_rises(self, pressure: Floats) -> bool:
         fallen_back = float(np.max(np.maximum.accumulate(pressure) - pressure))
-        return bool(pressure[-1] > pressure[0] and fallen_back < _SAME * self.levels.range)
+        return bool(pressure[-1] > pressure[0] and fallen_back < _SAME * self.range)
 
 
 def _turns(step: _Step) -> tuple[bool, str]:
@@ -120,10 +108,10 @@ def _turns(step: _Step) -> tuple[bool, str]:
 
 
 def _rises(step: _Step) -> tuple[bool, str, str]:
-    breakaway, levels = step.events.breakaway, step.levels
+    breakaway, supply = step.events.breakaway, step.supply
     before = step.recording["pressure_1"][: breakaway + 1]
-    holds = step.only_rises(before) and before[-1] - before[0] > _CLEAR * levels.range
-    fraction = (before[-1] - levels.atmosphere) / levels.range
+    holds = step.only_rises(before) and before[-1] - before[0] > _CLEAR * step.range
+    fraction = (before[-1] - supply.atmospheric_pressure) / step.range
     has_torque = "torque" in step.recording
     torque = f", at a torque of {step.recording['torque'][breakaway]:.2f} N m" if has_torque else ""
     evidence = (
@@ -131,7 +119,7 @@ def _rises(step: _Step) -> tuple[bool, str, str]:
         f"the vane breaks away after {step.milliseconds(breakaway)}{torque}"
     )
     # Chamber 1 stands at the supply before the vane leaves: then it is chamber 2 that decides when.
-    is_full = before > levels.supply - _SAME * levels.range
+    is_full = before > supply.pressure - _SAME * step.range
     full = int(np.argmax(is_full))
     waits = step.recording.time[breakaway] - step.recording.time[full]
     difference = (
@@ -152,33 +140,33 @@ def _falls_in_motion(step: _Step) -> tuple[bool, str, str]:
     peak = int(np.argmax(pressure[: int(np.argmax(gone)) + 1]))
     lowest = peak + int(np.argmin(pressure[peak : step.events.stop + 1]))
     first, last = float(pressure[peak]), float(pressure[lowest])
-    holds = first - last > _CLEAR * step.levels.range
+    holds = first - last > _CLEAR * step.range
     evidence = f"from {step.gauge(first)} psig down to {step.gauge(last)} psig at {step.milliseconds(lowest)}"
     rise_after_breakaway = first - float(pressure[step.events.breakaway])
     rise_before_stop = float(pressure[step.events.stop]) - last
     differences = []
-    if rise_after_breakaway >= _SAME * step.levels.range:
+    if rise_after_breakaway >= _SAME * step.range:
         longer = 1e3 * (step.recording.time[peak] - step.events.breakaway_time)
         differences.append(
             f"after breakaway it still rises for {longer:.0f} ms, by {rise_after_breakaway / PASCALS_PER_PSI:.1f} psi"
         )
-    if rise_before_stop >= _SAME * step.levels.range:
+    if rise_before_stop >= _SAME * step.range:
         differences.append(f"it rises again by {rise_before_stop / PASCALS_PER_PSI:.1f} psi before the stop")
     return holds, evidence, ", and ".join(differences)
 
 
 def _to_supply(step: _Step) -> tuple[bool, str]:
     after = step.recording["pressure_1"][step.events.stop :]
-    holds = step.only_rises(after) and step.is_same(after[-1], step.levels.supply)
+    holds = step.only_rises(after) and step.is_same(after[-1], step.supply.pressure)
     return holds, (
         f"from {step.gauge(after[0])} psig at the stop ({step.milliseconds(step.events.stop)}) to "
-        f"{step.gauge(after[-1])} psig; the supply is {step.gauge(step.levels.supply)} psig"
+        f"{step.gauge(after[-1])} psig; the supply is {step.gauge(step.supply.pressure)} psig"
     )
 
 
 def _falls(step: _Step) -> tuple[bool, str]:
     before = step.recording["pressure_2"][: step.events.breakaway + 1]
-    holds = step.is_same(before[0], step.levels.supply) and bool(np.all(np.diff(before) < 0.0))
+    holds = step.is_same(before[0], step.supply.pressure) and bool(np.all(np.diff(before) < 0.0))
     return holds, f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig until breakaway"
 
 
@@ -202,12 +190,13 @@ def _slows(step: _Step) -> tuple[bool, str, str]:
         f"falls by {first:.2f} psi/ms at first, {slowed} at {step.milliseconds(slowest)}, falls by up to "
         f"{last:.1f} psi/ms later"
     )
-    return bool(holds), evidence, difference if rise >= _SAME * step.levels.range else ""
+    return bool(holds), evidence, difference if rise >= _SAME * step.range else ""
 
 
 def _to_atmosphere(step: _Step) -> tuple[bool, str]:
     last = float(step.recording["pressure_2"][-1])
-    return step.is_same(last, step.levels.atmosphere), f"{step.levels.gauge(last):.2f} psig at the end"
+    atmosphere = step.supply.atmospheric_pressure
+    return step.is_same(last, atmosphere), f"{(last - atmosphere) / PASCALS_PER_PSI:.2f} psig at the end"
 
 
 def _builds_up(step: _Step) -> tuple[bool, str]:
@@ -215,7 +204,7 @@ def _builds_up(step: _Step) -> tuple[bool, str]:
         float(step.recording["pressure_1"][index] - step.recording["pressure_2"][index]) for index in (0, -1)
     )
     # From full pressure one way to full pressure the other way: the range twice.
-    holds = abs(last - first - 2.0 * step.levels.range) < 2.0 * _SAME * step.levels.range
+    holds = abs(last - first - 2.0 * step.range) < 2.0 * _SAME * step.range
     return holds, f"from {first / PASCALS_PER_PSI:.1f} to {last / PASCALS_PER_PSI:.1f} psi"
 
 
