@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from os.path import commonprefix
+from pathlib import Path
 from typing import Literal, TypeVar
 
 Value = TypeVar("Value")
@@ -154,9 +155,13 @@ def one_line(text: object) -> str:
 
 
 def reason(error: OSError | ValueError) -> str:
-    """Return the reason of a failed file access as the end of a sentence."""
-    text = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error)
-    return text[:1].lower() + text[1:]
+    """Return the reason of a failed file access as the end of a sentence, with the nearest name of an absent file."""
+    text, hint = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error), ""
+    if isinstance(error, FileNotFoundError) and error.filename:
+        wanted = Path(error.filename)
+        with contextlib.suppress(OSError):
+            hint = nearest_name(wanted.name, [file.name for file in wanted.parent.iterdir()])
+    return f"{text[:1].lower()}{text[1:]}{hint}"
 
 
 @contextlib.contextmanager

@@ -203,7 +203,10 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
             numbers |= entries_of_opening(valve["opening"], folder, f"{file}: valves.{name}.opening")
             find_effects(numbers)
     actuator = _table(document, "actuator")
-    kind = actuator.get("kind", VANE)
+    kind, table = actuator.get("kind", VANE), None
+    if "file" in actuator:
+        with refused_as(ParameterError, f"{file}: actuator.file", ParameterError):
+            table = _measured_curves(kind, folder / actuator["file"])
     citation = document.get("citation")
     parent, joint = document.get("parent", ""), document.get("joint")
     return ParameterSet(
@@ -214,7 +217,7 @@ def _parameter_set(document: Mapping[str, Any], fields: Fields, file: str, folde
         valve_kinds={name: valve["kind"] for name, valve in document["valves"].items()},
         actuator_kind=kind,
         actuator_file=actuator.get("file", ""),
-        actuator_table=_measured_curves(kind, folder / actuator["file"]) if "file" in actuator else None,
+        actuator_table=table,
         numbers=numbers,
         texts=texts,
         flags=flags,

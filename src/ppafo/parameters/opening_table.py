@@ -45,7 +45,7 @@ def entries_of_opening(table: Mapping[str, Any], folder: Path, where: str) -> di
     if "file" in table:
         if any(lists):
             raise ParameterError(f"{where} has a file and numbers; give one of them")
-        where = label(str(folder / table["file"]))
+        where = f"{where}.file: {label(str(folder / table['file']))}"
         (_, header), *lines = lines_of_table(folder / table["file"], where, ",".join(COLUMNS))
         if sorted(header) != sorted(COLUMNS):
             raise ParameterError(f"{where}: must begin with 'command,opening', not '{one_line(','.join(header))}'")

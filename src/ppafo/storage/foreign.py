@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.constants import MOLAR_MASSES, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
@@ -38,7 +38,7 @@ from ppafo.storage.comma_separated import (
 )
 from ppafo.storage.files import read_bytes, text_of
 from ppafo.storage.matlab import MATLAB_SUFFIX, read_mapped_matlab, read_matlab
-from ppafo.wording import LONGEST_SHOWN, finite_number, nearest_name, one_line
+from ppafo.wording import LONGEST_SHOWN, finite_number, known_names, nearest_name, one_line
 
 _SHORTEST = 1e-12
 """Least time [s] between the two means of samples that give a slope; a shorter time is rounding."""
@@ -378,14 +378,17 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, atmosphere: f
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     """Return the unit of a channel; a volume flow measured as mass flow gets its reference condition and gas."""
-    from ppafo.units.spelling import flow_of, is_volume_flow, read_unit
+    from ppafo.units.spelling import flow_of, is_volume_flow, molar_mass_in, read_unit
 
     is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
         if mapped.at is not None or mapped.gas is not None:
-            raise UnitError("'at' and 'gas' are allowed only for a volume flow, such as 'L/min'")
+            raise UnitError("'at' and 'gas' are allowed only for a mass flow in a unit of volume flow, such as 'L/min'")
         return unit
     flow = flow_of(unit)
+    if mapped.gas is not None and molar_mass_in(f"{flow.name} ({mapped.gas})") is None:
+        known = known_names(mapped.gas, MOLAR_MASSES)
+        raise UnitError(f"there is no gas '{mapped.gas}'{known}, or a molar mass in kg/mol")
     by_unit = flow.at(mapped.at or "", mapped.gas or gas)
     by_map = flow_of(flow.unit).at(mapped.at or flow.condition, mapped.gas or "".join(flow.gases[:1]) or gas)
     if not math.isclose(read_unit(by_unit).scale, read_unit(by_map).scale, rel_tol=_SAME_DENSITY):

@@ -32,7 +32,7 @@ Answer = TypeVar("Answer")
 def executor_of(given: Executor | str | None) -> Executor | None:
     """Return an executor, the one that a word ``MODULE:OBJECT`` names, or the one that a named function makes."""
     found: Any = given
-    if isinstance(given, str):
+    if isinstance(given, str) and ":" in given:
         name_modules_in(given)
         # A function of the user may raise anything.
         with refused_as(StudyError, f"executor = '{given}'", Exception):

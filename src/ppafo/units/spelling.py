@@ -221,8 +221,8 @@ def _condition_of(text: str, unit: str) -> tuple[float, float, bool]:
     flow = flow_of(unit)._replace(condition="")
     named, own = (flow.at(condition, "air") for condition in ("ANR", "70 degF, 14.696 psi_a"))
     raise UnitError(
-        f"'{unit}'{said}; a mass flow needs a gas and a condition ({', '.join(_CONDITIONS)}, or temperature and "
-        f"pressure): write '{named}' (20 degC, 1 bar) or '{own}'; in a column map give at = 'ANR' and gas = 'air'"
+        f"'{flow.name}'{said}; a mass flow needs a gas and a condition ({', '.join(_CONDITIONS)}, or temperature and "
+        f"pressure): write '{named}' (20 degC, 1 bar) or '{own}'; in a column map give at = 'ANR'"
     )
 
 

@@ -175,6 +175,8 @@ def _remarks(
     """Return the remarks on strides, signs and sizes of the curves, zero of the ankle, and scatter."""
     means, count = {name: curve.mean for name, curve in curves.items()}, len(strides.taken)
     less = ": heel strikes and toe-offs are from shank_angle and less exact" if events == SHANK else ""
+    foot = source.columns.ankle_angle
+    zero = f"ankle angle from the markers {foot.heel} and {foot.toe}; zero from the flat foot"
     return [
         *(f"stride from {each.start:.4g} to {each.end:.4g} s left out: {why}" for each, why in strides.left_out),
         *(f"{name} covers {own} of {count} strides" for name in curves if (own := len(curves[name].strides)) < count),
@@ -182,6 +184,7 @@ def _remarks(
         *knee_remarks(source.columns.knee, walk, source.settings.stature),
         *sign_remarks(means["shank_angle"], means["ankle_angle"]),
         *(moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []),
+        *([zero] if foot.terms is None else []),
         *zero_remarks(means["shank_angle"], means["ankle_angle"]),
         *scatter_remarks(curves, errors),
     ]

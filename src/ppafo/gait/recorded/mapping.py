@@ -5,11 +5,12 @@ subtracts the column.
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -74,8 +75,8 @@ class AngleMap(StrictTable):
     terms: _Terms | None = None
     heel: Annotated[Text | None, Field(description="marker at the heel, instead of terms")] = None
     toe: Annotated[Text | None, Field(description="marker at the toes")] = None
-    forward: Annotated[Axis, Field(description="axis along the walk, with markers")] = "x"
-    vertical: Annotated[Vertical, Field(description="axis upwards, with markers")] = "z"
+    forward: Annotated[Axis, Field(description="axis along the walk, with markers; default: the shank's")] = "x"
+    vertical: Annotated[Vertical, Field(description="axis upwards, with markers; default: the shank's")] = "z"
     unit: _Unit = None
     positive: Annotated[_Flexion, Field(description="which motion is positive")]
     neutral: Annotated[
@@ -161,6 +162,20 @@ class GaitMap(StrictTable):
     vertical_force: ForceMap | None = Field(None, description=_OF_THE_FORM)
     centre_of_pressure: PressureMap | None = Field(None, description=_OF_THE_FORM)
     knee: KneeMap | None = Field(None, description=_OF_THE_FORM)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_laboratory(cls, tables: Any) -> Any:
+        # One walk has one forward axis: it is stated once, with the shank.
+        shank, ankle = (_stated(tables.get(name)) for name in ("shank_angle", "ankle_angle"))
+        axes = {axis: shank[axis] for axis in ("forward", "vertical") if axis in shank}
+        return {**tables, "ankle_angle": {**axes, **ankle}} if axes and ankle else tables
+
+
+def _stated(table: Any) -> Mapping[str, Any]:
+    """Return the keys that the map of a curve states."""
+    given = table.model_dump(exclude_unset=True) if isinstance(table, StrictTable) else table
+    return given if isinstance(given, Mapping) else {}
 
 
 CURVES = tuple(name for name in GaitMap.model_fields if name not in ("schema_version", "time"))

@@ -234,21 +234,22 @@ def check_contradictions(evidence: Evidence) -> Iterator[AuditFinding]:
 
 def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield a finding on values of a wrong dimension, and a finding on each value in the unit of its inverse."""
-    foreign = []
+    foreign = dict[str, UnitError]()
     for path, entry in evidence.parameter_set.numbers.items():
         quantity = evidence.declared[path]
         unit = quantity.unit
         inverse_unit = f"1/({unit})" if " " in unit or "/" in unit else f"1/{unit}"
-        with contextlib.suppress(UnitError):
+        try:
             entry_in_si(entry, quantity, evidence.atmosphere())
             continue
-        try:
+        except UnitError as error:
+            why = error
+        value = 0.0
+        with contextlib.suppress(UnitError):
             value = to_si(entry.value, entry.unit, inverse_unit)
-        except UnitError:
-            value = 0.0
         # What is 0 has no inverse, whatever its unit.
         if value == 0.0:
-            foreign.append(path)
+            foreign[path] = why
             continue
         name = path.rpartition(".")[2].replace("_", "-")
         yield AuditFinding(
@@ -262,10 +263,7 @@ def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
             why=f"{path} is declared as: {quantity.summary} [{quantity.unit}].",
         )
     if foreign:
-        declared = evidence.declared
-        described = "; ".join(
-            f"{path} must have the unit {declared[path].unit or '-'} ({declared[path].summary})" for path in foreign
-        )
+        described = "; ".join(f"{path}: {error}" for path, error in foreign.items())
         yield AuditFinding(
             id="dimensions",
             title="values with a unit that does not fit the equation",

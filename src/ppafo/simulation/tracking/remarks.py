@@ -32,7 +32,8 @@ def remarks_on(result: "RecordedResult", follows: bool) -> Iterator[str]:
             # A start on a stop is the scenario's, unless the joint never leaves the stop.
             at = np.flatnonzero(rests & ~np.concatenate([[not rests.all()], rests[:-1]]))
             name, share = f"its {side} stop ({level_text('rad', stop)})", f"{100.0 * np.mean(rests):.0f} % of the run"
-            reached += [f"{name} at {recording.time[index]:.3g} s and lies on it for {share}" for index in at[:1]]
+            lies = "" if share.startswith("0 ") else f" and lies on it for {share}"
+            reached += [f"{name} at {recording.time[index]:.3g} s{lies}" for index in at[:1]]
         if reached and follows and scenario.controlled != ANGLE and motion.leg is None:
             reached[-1] += f": there the stop bears the torque; not tried: lock the joint ({LOCKED.text}) or add a load"
     yield from (f"the joint reaches {text}" for text in reached)

@@ -69,13 +69,11 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
     backwards = "-" if forward.startswith("-") else ""
     angles = _label(labels, foot + _ANGLES)
     heel, toe = (_first(labels, foot, names) for names in (_HEELS, _TOES))
-    ankle_remarks: tuple[tuple[str, str], ...] = ()
     # The model's own angle is preferred: its zero comes from a static trial.
     if angles is None and heel is not None and toe is not None:
         # Without markers of the shank the axes are unknown: those of a gait map's shank follow later.
         axes: dict[str, Any] = {"forward": forward, "vertical": vertical} if shin else {}
         angle = AngleMap(heel=heel, toe=toe, positive="plantarflexion", **axes)
-        ankle_remarks = (("ankle_angle", f"ankle angle from the markers {heel} and {toe}; zero from the flat foot"),)
     else:
         column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
         angle = AngleMap(terms=(column,), positive="dorsiflexion", unit="deg")
@@ -87,7 +85,7 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
         **loads,
     )
     plates = tuple(name for name in table.columns if name.startswith(PLATE) and name.endswith(f".{vertical}"))
-    return Convention(columns, plates, remarks, (*ankle_remarks, *units))
+    return Convention(columns, plates, remarks, tuple(units))
 
 
 def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Side) -> Convention:
