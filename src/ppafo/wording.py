@@ -158,9 +158,8 @@ def reason(error: OSError | ValueError) -> str:
     """Return the reason of a failed file access as the end of a sentence, with the nearest name of an absent file."""
     text, hint = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error), ""
     if isinstance(error, FileNotFoundError) and error.filename:
-        wanted = Path(error.filename)
-        with contextlib.suppress(OSError):
-            hint = nearest_name(wanted.name, [file.name for file in wanted.parent.iterdir()])
+        absent = Path(error.filename)
+        hint = nearest_name(absent.name, (file.name for file in absent.parent.glob(f"*{absent.suffix}")))
     return f"{text[:1].lower()}{text[1:]}{hint}"
 
 

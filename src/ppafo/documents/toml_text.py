@@ -75,9 +75,7 @@ class TomlKind:
         try:
             return read_regular_file(path, MAXIMUM_BYTES_TYPED)
         except (OSError, ValueError) as error:
-            others = [each.name for each in path.parent.glob(f"*{_SUFFIX}") if each != path]
-            hint = nearest_name(path.name, others) if isinstance(error, FileNotFoundError) else ""
-            raise self.error(f"{label(name)}: cannot be read: {reason(error)}{hint}") from error
+            raise self.error(f"{label(name)}: cannot be read: {reason(error)}") from error
 
     def parse(self, content: bytes, file: str) -> dict[str, Any]:
         """Parse the bytes of a file; ``file`` is its label in messages."""
