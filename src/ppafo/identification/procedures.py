@@ -55,18 +55,19 @@ def with_tried_units(
     which may be of another device. ``run`` repeats the procedure with other recordings.
     """
     impossible = list[str]()
+    channels = {name: channel for source in sources for name, channel in source.recording.channels.items()}
+    # Recordings of a load or of a difference, which tell their unit by no scatter, have no meter beside them.
+    others = [name for name, channel in channels.items() if channel.unit in _OTHER_UNITS]
     for estimate in result.estimates:
         ratio = estimate.value / (context.number(estimate.path) or math.inf)
         is_coefficient = estimate.path.endswith(".discharge_coefficient") and estimate.value > _LARGEST_COEFFICIENT
-        if is_coefficient or not 1.0 / _IMPOSSIBLE < (ratio or 1.0) < _IMPOSSIBLE:
+        if is_coefficient or (others and not 1.0 / _IMPOSSIBLE < (ratio or 1.0) < _IMPOSSIBLE):
             impossible.append(estimate.path)
     if not (impossible or result.scatter > _LARGE_SCATTER):
         return result
     atmosphere = atmospheric_pressure(context.parameter_set)
-    channels = {name: channel for source in sources for name, channel in source.recording.channels.items()}
     pressures = tuple(name for name, channel in channels.items() if channel.unit == "Pa")
-    # All absolute pressures together, then each one; a load or a difference tells its unit by no scatter.
-    others = [name for name, channel in channels.items() if impossible and channel.unit in _OTHER_UNITS]
+    # All absolute pressures together, then each one.
     groups = dict.fromkeys((pressures, *((name,) for name in (*pressures, *others))))
     # Accusations first, then the least scatter.
     first, found = (True, math.inf), result
