@@ -2,14 +2,16 @@
 
 import math
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import ppafo
 from ppafo.engine.scheme.pneumatics import GAMMA
-from ppafo.errors import ParameterError
+from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.valves.kind import VENT
 from ppafo.model.valves.pressure_regulator import MODEL, STAGE, RegulatorSettings
@@ -160,3 +162,32 @@ def test_default_gains_follow_the_regulator(response: int) -> None:
 def test_what_regulators_cannot_do_is_refused(law: str, change: str, said: str) -> None:
     with pytest.raises(ParameterError, match=said):
         regulated(LOCKED, {"kind": law}, {"kind": "constant", "level": "1 N m"}, change)
+
+
+def test_questions_that_regulators_have_no_answer_to_are_refused() -> None:
+    scenario = regulated(LOCKED, {"kind": "pid"}, {"kind": "constant", "level": "1 N m"})
+    with pytest.raises(ScenarioError, match="regulates pressures, of which there is no linear model"):
+        ppafo.linearise(scenario)
+    with pytest.raises(ParameterError, match="fixed steps of a walk do not resolve"):
+        ppafo.load_walk("proportional", ["device.set=cylinder-lever", "device.valve=pressure_regulator"])
+
+
+@pytest.mark.long
+def test_the_response_time_is_fitted_to_a_step(tmp_path: Path) -> None:
+    recording = simulate(regulated(LOCKED, CONSTANT, None, "valve.response_time=70 ms")).recording
+    noise = np.random.default_rng(1).normal(0.0, 500.0, recording.time.size)
+    pressures = recording["pressure_1"] + noise, recording["pressure_2"]
+    rows = np.column_stack([recording.time, recording["command"], *pressures])
+    head = "time [s],command [-],pressure_1 [Pa_a],pressure_2 [Pa_a]"
+    np.savetxt(tmp_path / "step.csv", rows, delimiter=",", header=head, comments="")
+    problem = tmp_path / "problem.toml"
+    problem.write_text(
+        'schema_version = 1\nname = "fitted"\n[device]\nset = "cylinder-lever"\nvalve = "pressure_regulator"\n'
+        '[trajectory]\n[[trajectory.parameters]]\npath = "valve.response_time"\n[[trajectory.experiments]]\n'
+        'label = "step"\nrecording = "step.csv"\nlocked = "75 deg"\nchannels = ["pressure_1"]\n',
+        encoding="utf-8",
+    )
+    estimate = ppafo.identify(problem).found.estimates[0]
+    assert estimate.verdict == "identified"
+    assert estimate.low <= 0.07 <= estimate.high
+    assert estimate.value == pytest.approx(0.07, rel=0.02)
