@@ -30,7 +30,7 @@ from ppafo.simulation.declaration import (
     THERMAL,
     THERMAL_GAS,
     WALL_AREA,
-    controller_settings,
+    law_settings,
     line_quantities,
     reference_settings,
 )
@@ -110,12 +110,12 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
             controlled=controlled,
             beyond_reach=str(value_at(document, PURPOSE) or ""),
         )
-        scenario = with_settings(reading, scenario, controller_settings(kind, controlled))
+        law = CONTROLLERS[kind]
+        scenario = with_settings(reading, scenario, law_settings(law, controlled))
         problem = reference_problem(scenario)
         if problem:
             raise ScenarioError(f"{request.file}: {problem}")
         check_contradictions(scenario, reading)
-        law = CONTROLLERS[kind]
         try:
             if supply_line is not None:
                 device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")

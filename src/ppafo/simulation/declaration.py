@@ -176,11 +176,6 @@ def changes_reach(paths: Iterable[str]) -> bool:
     return any(path.startswith(_OF_REACH) for path in paths)
 
 
-def controller_settings(kind: str, controlled: str = TORQUE) -> tuple[Quantity, ...]:
-    """Return the settings of the named controller, in units of the controlled quantity; empty for an unknown name."""
-    return law_settings(CONTROLLERS[kind], controlled) if kind in CONTROLLERS else ()
-
-
 def law_settings(law: ControllerKind, controlled: str) -> tuple[Quantity, ...]:
     """Return the settings of a controller, in units of the controlled quantity."""
     # A law that knows no torque has its settings in units of its own.

@@ -11,6 +11,7 @@ import pytest
 from ppafo.arguments.reading import whole_number
 from ppafo.cli.main import main
 from ppafo.parameters.bottles.bottle import list_bottles
+from ppafo.walking import list_walks
 
 FULL = Path("/dev/full")
 
@@ -19,6 +20,7 @@ FULL = Path("/dev/full")
     ("words", "names"),
     [
         ("simulate", ("step-response", "torque-task-solenoid")),
+        ("walk", tuple(list_walks())),
         ("bottle", tuple(list_bottles())),
         ("tune", ("pid-gains",)),
         ("design", ("push-off",)),

@@ -14,7 +14,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.storage import read_csv
 from ppafo.storage.netcdf import read_netcdf
-from ppafo.walking import list_walks, loading
+from ppafo.walking import loading
 
 SHORT = ["--minutes", "0.1"]
 FILES = [
@@ -94,13 +94,6 @@ def test_tables_and_recordings_say_the_same_and_that_they_are_simulated(walked: 
     mean = (walked / "mean-stride.csv").read_text().splitlines()
     assert len(mean) == 2 + 101
     assert "angle [rad],angle_deviation [rad]" in mean[1]
-
-
-def test_the_list_names_every_walk(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["walk", "--list"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(list_walks())
-    assert main(["walk", "--list", "--json"]) == 0
-    assert [item["name"] for item in json.loads(capsys.readouterr().out)["walks"]] == list(list_walks())
 
 
 @pytest.fixture

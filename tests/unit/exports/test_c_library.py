@@ -278,7 +278,6 @@ THERMAL = (
     "gas_model.wall_area_per_volume=100 1/m",
     "supply_line.plantarflexion.droop=3e6 Pa s/kg",
 )
-needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 
 
 def built(scenario: Scenario, folder: Path) -> ctypes.CDLL:
@@ -319,7 +318,6 @@ def drawn(scenario: Scenario) -> tuple[dict[str, Any], Scenario]:
     )
 
 
-@needs_gcc
 @pytest.mark.parametrize(("name", "overrides"), [*VARIED.items(), ("step-response", THERMAL)])
 def test_c_makes_the_numbers_of_a_run_that_python_makes(name: str, overrides: tuple[str, ...], tmp_path: Path) -> None:
     scenario = load_scenario(name, overrides)

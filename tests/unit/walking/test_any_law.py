@@ -45,12 +45,6 @@ def test_a_constant_command_does_not_walk_and_the_answer_names_what_does() -> No
     assert "\n" not in str(caught.value)
 
 
-def test_the_law_of_the_paper_switches_solenoid_valves_and_a_pid_does_not() -> None:
-    assert load_walk("solenoid", ["controller.kind=on_off"]).controller.kind == "on_off"
-    with pytest.raises(ScenarioError, match="proportional valve"):
-        load_walk("solenoid", ["controller.kind=pid"])
-
-
 def test_the_law_of_the_paper_walks_and_follows_the_torque_of_its_phases() -> None:
     result = walk(load_walk("solenoid", ["controller.kind=on_off"]), minutes=0.1)
     assert result.status.is_completed

@@ -14,7 +14,6 @@ from ppafo.cli.main import main
 from ppafo.errors import DataError, ScenarioError
 from ppafo.loading import json_schema, list_all_scenarios, load_scenario, scenario_from_dict
 from ppafo.simulation.loading import load_scenario as load_vane
-from ppafo.simulation.numbers import declared_numbers
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 
@@ -150,8 +149,3 @@ def test_simulate_runs_a_walk_with_its_metrics_and_its_figure(
     assert {name: metrics[name]["value"] for name in walked} == {name: item.value for name, item in walked.items()}
     assert "rms_error" not in metrics
     assert {"figure.svg", "recording.nc", "report.html", "run.json"} <= {path.name for path in folder.iterdir()}
-
-
-def test_every_number_of_a_walk_can_vary_from_either_form(tmp_path: Path) -> None:
-    new = load_scenario(written(tmp_path, text_of(NAME) + MOTION))
-    assert declared_numbers(new).keys() == declared_numbers(load_scenario(NAME)).keys()

@@ -6,7 +6,7 @@ from ppafo.exports.c_library.conditions import choosing
 from ppafo.exports.c_library.library import c_identifier
 from ppafo.exports.c_library.settings import numbers_of_second_chamber
 from ppafo.metrics import METRICS
-from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.device import SonicOrifice
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
 from ppafo.simulation.motion_kind import WALK
@@ -32,7 +32,10 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     """Return README texts on a scenario or a walk; ``links`` has the parameters that follow others."""
     kind, device = scenario.motion.motion_kind, scenario.device
     laws = f"the valve, `{device.valve.kind}`, and the controller, `{scenario.controller.kind}`"
-    of_both = [*_fixed_of_device(scenario), _at_zero(device, kind.flaws(scenario))]
+    zero = [f"`valve_{name}`" for name in choosing(device) if not device.valve.settings[name] > 0.0]
+    flawless = [] if any(kind.flaws(scenario)) else ["the sensor errors of `sensors_`"]
+    selecting = f"which settings of valve and sensors are 0 (here {', '.join([*zero, *flawless]) or 'none'})"
+    of_both = [*_fixed_of_device(scenario), selecting]
     followers = _followers(links, numbers_of_second_chamber(scenario))
     if kind.layout != WALK:
         motion = f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}"
@@ -89,14 +92,6 @@ def _fixed_of_device(scenario: Scenario) -> list[str]:
         f"the gas, `{gas}`; {lines}, which {verb} gas flow back from a chamber at higher pressure",
         *([f"the effects, {effects}, none of which can be switched off"] if effects else []),
     ]
-
-
-def _at_zero(device: Device, flaws: Sequence[float]) -> str:
-    """Return the README text on parameters that select functions and are 0."""
-    zero = [f"`valve_{name}`" for name in choosing(device) if not device.valve.settings[name] > 0.0]
-    flawless = [] if any(flaws) else ["the sensor errors of `sensors_`"]
-    names = ", ".join([*zero, *flawless]) or "none"
-    return f"which settings of valve and sensors are 0 (here {names})"
 
 
 def _listed(items: Sequence[str]) -> str:

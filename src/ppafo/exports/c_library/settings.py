@@ -27,16 +27,24 @@ _DESCRIPTIONS = {
 """Descriptions of settings that differ from those in a file."""
 
 
-def settings_of(scenario: Scenario, recorded: float | None = None) -> tuple[ExportParameter, ...]:
+def settings_of(scenario: Scenario, recorded: float | None) -> tuple[ExportParameter, ...]:
     """Return every number of a scenario in SI units, by the path used in overrides.
 
     ``recorded`` is the output interval [s] of a walk, which follows from its duration; else the scenario has its own.
     """
-    run, declared = scenario.run, declared_settings(scenario)
-    times = {"run.duration": run.duration, "run.step": run.step, "controller.period": scenario.controller.period}
+    run, declared, period = scenario.run, declared_settings(scenario), scenario.controller.period
+    times = {"run.duration": run.duration, "run.step": run.step, "controller.period": period}
     times["run.output_interval"] = run.output_interval if recorded is None else recorded
     if recorded is None:
-        times["run.step"] = _longest_step(scenario)
+        # The step of the file, from which the engine makes one that divides a sample.
+        texts = time_texts(scenario)
+        step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
+        if step is not None:
+            times["run.step"] = parse_quantity(str(step), "s")
+        elif output is None:
+            times["run.step"] = step_unless_given(run.duration, period)
+        else:
+            times["run.step"] = step_with_output(run.duration, period, run.output_interval)
     else:
         # A library may walk longer than a file; its step is that of a walk. No file has the command of a plant alone.
         declared |= {f"run.{quantity.name}": quantity for quantity in RUN if quantity.name != "step"}
@@ -51,17 +59,6 @@ def settings_of(scenario: Scenario, recorded: float | None = None) -> tuple[Expo
         )
         for path, quantity in declared.items()
     )
-
-
-def _longest_step(scenario: Scenario) -> float:
-    """Return the step [s] of the file, from which the engine makes one that divides a sample."""
-    texts, duration, period = time_texts(scenario), scenario.run.duration, scenario.controller.period
-    step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
-    if step is not None:
-        return parse_quantity(str(step), "s")
-    if output is None:
-        return step_unless_given(duration, period)
-    return step_with_output(duration, period, scenario.run.output_interval)
 
 
 def links_of(scenario: Scenario, settings: Iterable[ExportParameter], of_times: Graph) -> Graph:
