@@ -113,7 +113,7 @@ def test_a_walk_the_other_way_is_seen_in_the_markers_and_a_map_may_name_axes_and
     assert knee_error(seen.gait, normative) < 0.15
     assert "walking direction is -x, upwards is z" in seen.remarks
     forwards = columns.model_copy(update={"shank_angle": ShankMap(knee="RKNE", ankle="RANK", forward="x")})
-    with pytest.raises(DataError, match="forward = 'x' is reversed: 'RANK' travels against it; give '-x'"):
+    with pytest.raises(DataError, match="forward = 'x' is reversed: 'RANK' travels against it; the axis is '-x'"):
         import_gait([path], ImportSettings(normative.body_mass, columns=forwards))
 
 
@@ -150,7 +150,7 @@ def test_a_label_of_two_points_refuses_nothing_but_itself(
     written: Callable[..., Path], normative: Gait, walk: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nobody = np.zeros((3, np.arange(0.0, walk.duration, 0.01).size))
-    found = import_gait([written({"C1": nobody, "Other:C1": nobody})], ImportSettings(normative.body_mass))
+    found = import_gait([written({"C1": nobody, "Other:C1": nobody + 1.0})], ImportSettings(normative.body_mass))
     assert same(found.gait, normative)
     assert "several points are named 'C1': they were renamed 'C1#1', 'C1#2'" in "\n".join(found.remarks)
     with pytest.raises(
