@@ -39,6 +39,8 @@ Initial = Annotated[str, Word("CHANNEL=VALUE")]
 Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
 KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}
 """Words of the report for the origin of a recording, so that model output does not pass for a measurement."""
+_OF_START = 3.0
+"""Error divided by noise [-] beyond which residuals that are noise are so with a fitted start alone."""
 _EXPLAINS = 0.5
 """Largest ratio of the residual with the nearest cause to the residual without a cause at which a cause is named."""
 _NEAR_LIMIT = 0.25
@@ -222,7 +224,9 @@ def verdict(validation: Validation) -> str:
     pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
     worst = max((channel for channel, _ in pairs), key=lambda channel: channel.in_noise)
     if causes.is_noise:
-        texts = ["nothing but noise is left"]
+        # The search fits the state at the start too, where a joint that moves already has no rest to read it from.
+        fitted = " once the state at the start is fitted" if worst.in_noise > _OF_START else ""
+        texts = [f"nothing but noise is left{fitted}"]
     else:
         share = f"{100 * worst.fraction:.2g} % of full range"
         texts = [f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"]
