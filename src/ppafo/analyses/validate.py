@@ -276,7 +276,11 @@ def _removed_delay(validation: Validation) -> str:
     removed = max(agreement.delay.correction for agreement in validation.recordings)
     if removed <= PRESSURE_ERRORS.delay:
         return ""
-    return f"a delay of {1.0e3 * removed:.3g} ms was removed"
+    delay = validation.device.valve.settings.get("delay")
+    of_valve = (
+        "" if delay is None else f", of the sensors or of the valve (valve.delay = {1.0e3 * (delay + removed):.3g} ms)"
+    )
+    return f"a delay of {1.0e3 * removed:.3g} ms was removed{of_valve}"
 
 
 def _times(size: float) -> str:

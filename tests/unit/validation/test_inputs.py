@@ -132,7 +132,6 @@ def test_a_fixed_volume_without_a_vane_is_filled_and_vented_as_an_independent_so
     agreement = agree(Recording("tank", TIMES, channels), device, volume=volume)
     assert [channel.channel for channel in agreement.channels] == ["pressure_1"]
     assert agreement.channels[0].fraction < 3e-4
-    assert any("a fixed volume of 60 cm^3 without a vane" in remark for remark in agreement.remarks)
     wrong = agree(Recording("tank", TIMES, channels), device, volume=1.1 * volume)
     assert wrong.channels[0].fraction > 5e-3
 
