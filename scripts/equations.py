@@ -4,26 +4,33 @@
     python scripts/equations.py ppafo.model.plant.net_torque
 
 Without a name it writes the lists of ``docs/equations.md`` from ``tests/reference/equations.toml``. With names it
-changes each function in a copy of the source, its result by 1.2 and by the term of the list, and prints what runs do.
+changes each function in a copy of the source, its result times 1.2 and by the term of the list, and prints what runs
+do. A process that has loaded the copy is forked for each function: loading takes as long as all that a run does.
 """
 
 import ast
+import gc
 import importlib
 import json
+import linecache
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
 PAGE, LIST = ROOT / "docs" / "equations.md", ROOT / "tests" / "reference" / "equations.toml"
 FACTOR = 1.2
 BULLET = "- [`"
+MAKERS = ("rigid",)
+"""Functions of a row of their arguments."""
 
 
 def listed() -> dict[str, Any]:
@@ -54,32 +61,55 @@ def bullet(one: dict[str, Any]) -> str:
     return f"{BULLET}{one['name']}`](../src/{path}.py){said}"
 
 
-def changed(text: str, name: str, term: str | None) -> str:
-    """Return the source of a module where a function returns ``FACTOR`` times its numbers, or these with a term.
+def changed(text: str, name: str, one: Mapping[str, Any]) -> str:
+    """Return the source of a module where a function returns ``FACTOR`` times its numbers, and these with a term.
 
-    Of a row the first number is changed.
+    Of a row its first number is changed, or that of its ``field``. ``one`` is what the list says of the function.
     """
     (function,) = (node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef) and node.name == name)
+    form = f"{one.get('factor', FACTOR)} * ({{}})"
+    form += f" + ({one['term']})" if "term" in one else ""
     lines = text.splitlines(keepends=True)
     returns = [node for node in ast.walk(function) if isinstance(node, ast.Return) and node.value is not None]
     for node in sorted(returns, key=lambda node: -node.lineno):
         assert node.value is not None, "only such are chosen"
-        indent, new = " " * node.col_offset, ast.unparse(_changed(node.value, term))
+        indent, new = " " * node.col_offset, ast.unparse(_changed(node.value, form, one.get("field")))
         lines[node.lineno - 1 : node.end_lineno] = [f"{indent}return {new}\n"]
     return "".join(lines)
 
 
-def _changed(value: ast.expr, term: str | None) -> ast.expr:
+def _changed(value: ast.expr, form: str, field: str | None) -> ast.expr:
     if isinstance(value, ast.Tuple):
-        return ast.Tuple([_changed(part, term) for part in value.elts], ast.Load())
-    if isinstance(value, ast.Call) and ast.unparse(value.func)[0].isupper():
+        return ast.Tuple([_changed(part, form, field) for part in value.elts], ast.Load())
+    # By its name a row, but for the makers of rows.
+    if isinstance(value, ast.Call) and (
+        ast.unparse(value.func).lstrip("_")[0].isupper() or ast.unparse(value.func) in MAKERS
+    ):
         if value.args:
-            value.args[0] = _changed(value.args[0], term)
+            value.args[0] = _changed(value.args[0], form, None)
         else:
-            value.keywords[0].value = _changed(value.keywords[0].value, term)
+            given = next((each for each in value.keywords if each.arg == field), value.keywords[0])
+            given.value = _changed(given.value, form, None)
         return value
-    new = f"({ast.unparse(value)}) + ({term})" if term else f"{FACTOR} * ({ast.unparse(value)})"
-    return ast.parse(new, mode="eval").body
+    return ast.parse(form.format(ast.unparse(value)), mode="eval").body
+
+
+def recorded(case: dict[str, Any]) -> dict[str, Any]:
+    """Bits of the recording of a walk, of one on a bottle, or of a bottle alone."""
+    import numpy as np
+
+    import ppafo
+    from ppafo.golden_bits import hash_of
+    from ppafo.walking.motion import with_duration
+
+    if "gas_per_stride" in case:
+        recording = ppafo.bottle(gas_per_stride=case["gas_per_stride"]).found.record()
+    elif "minutes" in case:
+        recording = ppafo.walk(case["walk"], minutes=case["minutes"], overrides=case["set"]).recording
+    else:
+        os.environ["PPAFO_BACKEND"] = "python"
+        recording = ppafo.simulate(with_duration(ppafo.load_walk(case["walk"]), 1.0)).recording
+    return {"recorded": hash_of(tuple(np.asarray(recording[name]) for name in recording.names))}
 
 
 def outcome(case: dict[str, Any]) -> dict[str, Any]:
@@ -97,11 +127,12 @@ def outcome(case: dict[str, Any]) -> dict[str, Any]:
     from ppafo.simulation.vane_recording import net_torques
     from tests.reference.reference_solver import compare_with_reference
 
+    if "scenario" not in case:
+        return recorded(case)
     found: dict[str, Any] = {}
     scenario = load_scenario(case["scenario"], case.get("set", []))
     run = plan_run(scenario)
     found["compiled"] = digest(run_batch(batch_of(run)))
-    recording = simulate(scenario).recording
     with tempfile.TemporaryDirectory() as folder:
         for file, content in c_library(scenario).items():
             (Path(folder) / file).write_bytes(content)
@@ -114,6 +145,7 @@ def outcome(case: dict[str, Any]) -> dict[str, Any]:
         agreement = compare_with_reference(run)
         found["apart"] = max(agreement.angle / 2e-4, agreement.pressure_1 / 1e-3, agreement.pressure_2 / 1e-3)
     if case.get("closes"):
+        recording = simulate(scenario).recording
         rows = {f"state.{name}": recording[name] for name in ("angle", "angular_velocity", "mass_1", "mass_2")}
         net = net_torques(run, rows, recording["torque"])
         pushed = run.plant.inertia * np.gradient(recording["angular_velocity"], recording.time)
@@ -123,46 +155,87 @@ def outcome(case: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def outcome_of(case: str, source: Path = ROOT / "src") -> dict[str, Any] | str:
-    """Outcome of a case with the package of a folder, or the last line of what it says against it."""
-    words = [sys.executable, "-c", f"from scripts import equations as e; e.print_outcome({case!r})"]
-    environment = {**os.environ, "PYTHONPATH": f"{source}{os.pathsep}{ROOT}", "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, env=environment)
-    if done.returncode:
-        return done.stderr.strip().splitlines()[-1]
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return found
+def turn(module: ModuleType, name: str, one: Mapping[str, Any]) -> None:
+    """Change a function of a loaded module, and the file of the module."""
+    path = Path(str(module.__file__))
+    text = changed(path.read_text(encoding="utf-8"), name, one)
+    path.write_text(text, encoding="utf-8")
+    compiled = compile(text, str(path), "exec", dont_inherit=True).co_consts
+    made = {code.co_name: code for code in compiled if isinstance(code, CodeType)}
+    # All functions of the module, whose lines the change may move.
+    old = {at: each for at, each in vars(module).items() if at in made and isinstance(each, FunctionType)}
+    new = {each.__code__: made[at] for at, each in old.items() if each.__code__.co_name == at}
+    # What was made of a function with its parts has the same code.
+    for each in gc.get_objects():
+        if isinstance(each, FunctionType) and each.__code__ in new:
+            each.__code__ = new[each.__code__]
+    linecache.checkcache()
 
 
-def print_outcome(case: str) -> None:
-    """Print the outcome of a case as JSON."""
-    print(json.dumps(outcome(listed()["case"][case])))
+def serve() -> None:
+    """Print the outcome of each line of the input: a case, and the name of a changed function or nothing."""
+    from ppafo.errors import PpafoError
+    from tests.reference import reference_solver  # noqa: F401
+
+    for needed in ("ppafo.exports.c_library", "ppafo.analyses.linearise.model", "ppafo.running", "scipy.integrate"):
+        importlib.import_module(needed)
+    for line in sys.stdin:
+        case, name = json.loads(line)
+        module = importlib.import_module(name.rpartition(".")[0]) if name else None
+        text = Path(str(module.__file__)).read_text(encoding="utf-8") if module else ""
+        end, begin = os.pipe()
+        if os.fork() == 0:
+            try:
+                if module:
+                    turn(module, name.rpartition(".")[2], functions()[name])
+                found: Any = outcome(listed()["case"][case])
+            except PpafoError as error:
+                found = f"{type(error).__name__}: {error}"
+            os.write(begin, json.dumps(found).encode())
+            os._exit(0)
+        os.close(begin)
+        with os.fdopen(end) as answer:
+            print(answer.read(), flush=True)
+        os.wait()
+        if module:
+            Path(str(module.__file__)).write_text(text, encoding="utf-8")
 
 
-def turned(name: str, case: str) -> Iterator[tuple[str, dict[str, Any] | str]]:
-    """Yield each change of a function and the outcome of a case with it."""
-    module, _, function = name.rpartition(".")
-    path = Path(*module.split(".")).with_suffix(".py")
-    one = functions()[name]
+@contextmanager
+def outcomes() -> Iterator[Callable[[str, str], dict[str, Any] | str]]:
+    """Yield a function of a case and the name of a changed function or nothing, for the outcome or the refusal."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "src"
         shutil.copytree(ROOT / "src", source, ignore=shutil.ignore_patterns("__pycache__"))
-        text = (source / path).read_text(encoding="utf-8")
-        terms = [None] if one.get("times", True) else []
-        for term in [*terms, one["term"]] if "term" in one else terms:
-            (source / path).write_text(changed(text, function, term), encoding="utf-8")
-            yield f"+ {term}" if term else f"times {FACTOR}", outcome_of(case, source)
+        words = [sys.executable, "-c", "from scripts import equations as e; e.serve()"]
+        environment = {**os.environ, "PYTHONPATH": f"{source}{os.pathsep}{ROOT}", "PYTHONDONTWRITEBYTECODE": "1"}
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        with subprocess.Popen(words, cwd=ROOT, env=environment, **pipes) as server:
+            assert server.stdin is not None
+            assert server.stdout is not None
+            asks, answers = server.stdin, server.stdout
+
+            def outcome_of(case: str, name: str) -> dict[str, Any] | str:
+                asks.write(json.dumps([case, name]) + "\n")
+                asks.flush()
+                found: dict[str, Any] | str = json.loads(answers.readline())
+                return found
+
+            yield outcome_of
+            asks.close()
 
 
 def main() -> None:
     """Write the page, or print what the change of functions does."""
-    for name in sys.argv[1:]:
-        case = functions()[name]["case"]
-        print(name, "in", case)
-        for change, found in turned(name, case):
-            print(" ", change, found if isinstance(found, str) else {k: v for k, v in found.items() if k != "linear"})
     if not sys.argv[1:]:
         PAGE.write_text(page_text(), encoding="utf-8")
+        return
+    with outcomes() as outcome_of:
+        for name in sys.argv[1:]:
+            case = functions()[name]["case"]
+            found = outcome_of(case, name)
+            print(name, "in", case)
+            print(" ", found if isinstance(found, str) else {k: v for k, v in found.items() if k != "linear"})
 
 
 if __name__ == "__main__":
