@@ -103,7 +103,8 @@ def recorded(case: dict[str, Any]) -> dict[str, Any]:
     from ppafo.walking.motion import with_duration
 
     if "gas_per_stride" in case:
-        recording = ppafo.bottle(gas_per_stride=case["gas_per_stride"]).found.record()
+        found: Any = ppafo.bottle(gas_per_stride=case["gas_per_stride"]).found
+        recording = found.record()
     elif "minutes" in case:
         recording = ppafo.walk(case["walk"], minutes=case["minutes"], overrides=case["set"]).recording
     else:

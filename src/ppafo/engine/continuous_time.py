@@ -10,7 +10,7 @@ from ppafo.engine.in_python import in_program
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.pneumatics import GasFlows, flow_rates, gas_flows
-from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows
+from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows, warm_chambers
 from ppafo.model.plant import (
     ActuatorFunctions,
     Openings,
@@ -54,18 +54,8 @@ def chambers_in_motion(
     """Both chambers at an angle [rad] and rate [rad/s] and two absolute pressures [Pa]."""
     angle, angular_velocity = motion
     pressure_1, pressure_2 = pressures
-    now = parts.chambers(plant, angle, pressure_1, pressure_2)
-    less = parts.chambers(plant, angle - NEAR, pressure_1, pressure_2)
-    more = parts.chambers(plant, angle + NEAR, pressure_1, pressure_2)
-    per_angle = angular_velocity / (2.0 * NEAR)
-    return WarmChambers(
-        volume_1=now.volume_1,
-        volume_2=now.volume_2,
-        growth_1=(more.volume_1 - less.volume_1) * per_angle,
-        growth_2=(more.volume_2 - less.volume_2) * per_angle,
-        give_1=pressure_1 * now.compliance_1 / now.volume_1,
-        give_2=pressure_2 * now.compliance_2 / now.volume_2,
-    )
+    rate = angular_velocity / (2.0 * NEAR)
+    return warm_chambers(plant, pressure_1, pressure_2, angle, angle - NEAR, angle + NEAR, rate, parts=parts)
 
 
 def gas_rates(

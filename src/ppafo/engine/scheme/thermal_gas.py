@@ -32,7 +32,6 @@ from ppafo.engine.scheme.pneumatics import (
     pressure_that_matters,
     refused_backflow,
 )
-from ppafo.model.actuators.kind import Chambers
 from ppafo.model.gas import enthalpy_flow_ratio, mass_flow_ratio
 from ppafo.model.plant import (
     ActuatorFunctions,
@@ -310,14 +309,6 @@ class _ThermalMatrix(NamedTuple):
     cooling_2: float
 
 
-class ThermalBegin(NamedTuple):
-    """Both chambers at the start of a step, and derivatives of absolute pressures by contents [Pa/kg]."""
-
-    chambers: WarmChambers
-    per_content_1: float
-    per_content_2: float
-
-
 class ThermalGas(NamedTuple):
     """First stage of a step with an energy balance.
 
@@ -400,50 +391,30 @@ def solve_thermal_stage(matrix: _ThermalMatrix, right: ThermalFlows) -> ThermalF
     )
 
 
-def widening(
-    now: Chambers, here: Chambers, ahead: Chambers, pressure_1: float, pressure_2: float, step: float
-) -> WarmChambers:
-    """Chamber volumes and compliances at ``now``, growing by ``ahead`` minus ``here`` in a step [s]; pressures [Pa]."""
-    duration = max(step, SHORTEST)
-    return WarmChambers(
-        volume_1=now.volume_1,
-        volume_2=now.volume_2,
-        growth_1=(ahead.volume_1 - here.volume_1) / duration,
-        growth_2=(ahead.volume_2 - here.volume_2) / duration,
-        give_1=pressure_1 * now.compliance_1 / now.volume_1,
-        give_2=pressure_2 * now.compliance_2 / now.volume_2,
-    )
-
-
-def chambers_at_begin(
-    plant: PlantParameters, state: PlantState, next_angle: float, step: float, *, parts: ActuatorFunctions
-) -> ThermalBegin:
-    """Both chambers at the start of a step [s] that ends at ``next_angle`` [rad]."""
-    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
-    # Volumes at both angles at one pressure: their difference is what the angle alone does.
-    here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
-    ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
-    return ThermalBegin(
-        chambers=widening(here, here, ahead, pressure_1, pressure_2, step),
-        per_content_1=plant.gas_product / (here.volume_1 + pressure_1 * here.compliance_1),
-        per_content_2=plant.gas_product / (here.volume_2 + pressure_2 * here.compliance_2),
-    )
-
-
-def chambers_at_end(
+def warm_chambers(
     plant: PlantParameters,
-    state: PlantState,
-    end: PlantState,
+    pressure_1: float,
+    pressure_2: float,
+    at: float,
+    angle: float,
     next_angle: float,
-    step: float,
+    rate: float,
     *,
     parts: ActuatorFunctions,
 ) -> WarmChambers:
-    """Both chambers at ``next_angle`` [rad] with the contents after the first stage of a step [s]."""
-    pressure_1, pressure_2 = parts.pressures(plant, next_angle, end.mass_1, end.mass_2)
-    here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
+    """Both chambers at the angle ``at`` [rad]; their volumes grow by those between two angles, times ``rate`` [1/s]."""
+    now = parts.chambers(plant, at, pressure_1, pressure_2)
+    # Volumes at both angles at one pressure: their difference is what the angle alone does.
+    here = parts.chambers(plant, angle, pressure_1, pressure_2)
     ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
-    return widening(ahead, here, ahead, pressure_1, pressure_2, step)
+    return WarmChambers(
+        volume_1=now.volume_1,
+        volume_2=now.volume_2,
+        growth_1=(ahead.volume_1 - here.volume_1) * rate,
+        growth_2=(ahead.volume_2 - here.volume_2) * rate,
+        give_1=pressure_1 * now.compliance_1 / now.volume_1,
+        give_2=pressure_2 * now.compliance_2 / now.volume_2,
+    )
 
 
 def begin_thermal_gas(
@@ -458,9 +429,11 @@ def begin_thermal_gas(
     parts: ActuatorFunctions,
 ) -> ThermalGas:
     """First stage of one step [s] with an energy balance; volumes change linearly up to ``next_angle`` [rad]."""
-    at_begin = chambers_at_begin(plant, state, next_angle, step, parts=parts)
-    at = at_begin.chambers
-    per_content_1, per_content_2 = at_begin.per_content_1, at_begin.per_content_2
+    rate = 1.0 / max(step, SHORTEST)
+    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
+    at = warm_chambers(plant, pressure_1, pressure_2, state.angle, state.angle, next_angle, rate, parts=parts)
+    per_content_1 = plant.gas_product / (at.volume_1 * (1.0 + at.give_1))
+    per_content_2 = plant.gas_product / (at.volume_2 * (1.0 + at.give_2))
     flows = thermal_flows(thermal, state, masses, at, flowing.flows)
     weight = GAMMA * step
     root_1 = math.sqrt(state.mass_1 / masses.mass_1)
@@ -475,13 +448,14 @@ def begin_thermal_gas(
     first = solve_thermal_stage(matrix, combine_flows(flows, 1.0, drift, 1.0))
     change = combine_flows(first, step, first, 0.0)
     end, end_masses = with_thermal_gas(state, masses, change)
+    end_1, end_2 = parts.pressures(plant, next_angle, end.mass_1, end.mass_2)
     return ThermalGas(
         matrix=matrix,
         first=first,
         drift=drift,
         end=end,
         end_masses=end_masses,
-        ended=chambers_at_end(plant, state, end, next_angle, step, parts=parts),
+        ended=warm_chambers(plant, end_1, end_2, next_angle, state.angle, next_angle, rate, parts=parts),
     )
 
 
