@@ -225,11 +225,11 @@ def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
         yield AuditFinding(
             id="rounded-table",
             severity="note" if rounding.torque_error < _FELT_TORQUE else "warning",
-            title=f"the measured volumes are rounded, which leaves the torque uncertain by {share:.1%}",
+            title=f"the measured volumes are rounded, which leaves the torque uncertain by {share:.1%} of its largest",
             sides=(
                 ComparedNumber("largest move", rounding.move, "m^3"),
                 ComparedNumber("last digit", rounding.resolution, "m^3"),
-                ComparedNumber("relative standard deviation of the torque", rounding.torque_error, "1"),
+                ComparedNumber("standard deviation of the torque over its largest", rounding.torque_error, "1"),
             ),
-            why="Half a digit either way leaves the torque unknown by two standard deviations; the volumes were moved.",
+            why="Half a digit leaves two of these unknown, more of the torque where it is small; volumes were moved.",
         )
