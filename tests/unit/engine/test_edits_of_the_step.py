@@ -75,7 +75,7 @@ def test_a_parameter_of_a_gas_that_nothing_gives_is_refused_with_the_line_that_d
 
 
 def test_an_export_prepares_a_parameter_of_a_gas_that_follows_the_plant(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plan, "_gas", lambda *_: gas_of_mine(half_of_it))
+    monkeypatch.setattr(plan, "isothermal", gas_of_mine(half_of_it))
     source = c_library(load_scenario("step-response", ("run.duration=20 ms",)))["step_response.c"].decode()
     assert "mine = half_of_it(plant)" in source
 
