@@ -284,7 +284,7 @@ def test_a_plain_table_with_opensims_names_is_read(
         ("PacketCounter,shank\n1,two\n", "or frames with time.rate of a gait map"),
         (
             "time,shank_angle [deg/s],ankle_angle [deg]\n" + "".join(f"{k},1,{75 + 5 * k}\n" for k in range(9)),
-            "; a rate is not integrated",
+            "integrate it over each stride, less its mean over the stride, and set the zero while standing",
         ),
         ("time,a,\n0,1,2\n", "a column has no name"),
         ("time,a\n0,1,2\n", "line 2 has 3 values for 2 columns"),

@@ -17,7 +17,7 @@ from ppafo.wording import nearest_name, one_line
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
 _RATE = "rad/s"
-_NOT_INTEGRATED = "; a rate is not integrated"
+_NOT_INTEGRATED = "; integrate it over each stride, less its mean over the stride, and set the zero while standing"
 _MOST_NAMES, _LONGEST_TEXT = 12, 160
 """Limits of an error message: number of column names, and characters of the names and of a remark."""
 
