@@ -16,9 +16,11 @@ from ppafo.model.catalog import ACTUATORS
 from ppafo.model.valves.kind import VENT
 from ppafo.model.valves.pressure_regulator import MODEL, STAGE, RegulatorSettings
 from ppafo.parameters.plant import plant_parameters
+from ppafo.parameters.reach import static_torque, supply_for, torque_reach
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
+from ppafo.simulation.tracking.shortfall import available_torque
 
 LOCKED = {"kind": "locked", "angle": "75 deg"}
 CONSTANT = {"kind": "constant", "command": 0.6, "rate": "1 kHz"}
@@ -156,6 +158,7 @@ def test_default_gains_follow_the_regulator(response: int) -> None:
     [
         ("pid_feedforward", "valve.delay=1 ms", "opens a valve for a flow"),
         ("pid", "valve.highest_pressure=0.01 bar_g", "lowest_pressure = 0.05 bar_g must be below"),
+        ("pid", "valve.lowest_pressure=-0.3 bar_g", "lowest_pressure = -0.3 bar_g must be at least supply.atmos"),
         ("pid", "supply.pressure=-0.3 bar_g", "needs a supply above atmospheric pressure"),
     ],
 )
@@ -191,3 +194,14 @@ def test_the_response_time_is_fitted_to_a_step(tmp_path: Path) -> None:
     assert estimate.verdict == "identified"
     assert estimate.low <= 0.07 <= estimate.high
     assert estimate.value == pytest.approx(0.07, rel=0.02)
+
+
+def test_the_torque_reaches_as_far_as_the_set_pressures() -> None:
+    changes = ("supply.pressure=9 bar_g", "supply.dorsiflexion_pressure=9 bar_g", "valve.lowest_pressure=3 bar_g")
+    scenario = regulated(LOCKED, CONSTANT, {"kind": "constant", "level": "1 N m"}, *changes)
+    angle, vented, valve = math.radians(75.0), 1.01325e5, scenario.device.valve
+    torque = static_torque(scenario.device)
+    highest = torque(angle, valve.highest_pressure, vented + 3.0e5)
+    assert torque_reach(scenario.device, angle)[1] == pytest.approx(highest)
+    assert available_torque(scenario)[1] == pytest.approx(highest)
+    assert supply_for(scenario.device, angle, 1.01 * highest) is None

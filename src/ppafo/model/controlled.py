@@ -133,7 +133,7 @@ class ControlledQuantity:
     size: float = 1.0
     sign: float = 1.0
     reach: Callable[[Ends], tuple[Any, Any]] | None = None
-    limits: str = "the range between atmosphere and supply"
+    limits: str = "the range of supply and valve"
 
     @property
     def reference(self) -> str:

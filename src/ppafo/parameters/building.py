@@ -328,16 +328,17 @@ def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
             else (path, "at least", ATMOSPHERE_PATH, gauge >= 0.0)
             for path, gauge in zip(SUPPLIES, sides, strict=True)
         ),
-        *_order_of_pressures(device.valve.settings),
+        *_order_of_pressures(device.valve.settings, supply.atmospheric_pressure),
         *_order_of_openings(device.effects.get("opening", {})),
     )
 
 
-def _order_of_pressures(settings: Mapping[str, Any]) -> Iterator[tuple[str, str, str, Any]]:
-    """Yield the rule between the lowest and the highest pressure of a regulator."""
+def _order_of_pressures(settings: Mapping[str, Any], room: Any) -> Iterator[tuple[str, str, str, Any]]:
+    """Yield the rules between the lowest pressure of a regulator, its highest one and the atmosphere."""
     if "highest_pressure" in settings:
-        is_ordered = settings["lowest_pressure"] < settings["highest_pressure"]
-        yield "valve.lowest_pressure", "below", "valve.highest_pressure", is_ordered
+        lowest, highest = settings["lowest_pressure"], settings["highest_pressure"]
+        yield "valve.lowest_pressure", "below", "valve.highest_pressure", lowest < highest
+        yield "valve.lowest_pressure", "at least", ATMOSPHERE_PATH, lowest >= room
 
 
 def _order_of_openings(table: Mapping[str, Any]) -> Iterator[tuple[str, str, str, Any]]:

@@ -9,7 +9,7 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
 from ppafo.model.catalog import ACTUATORS, VALVES
-from ppafo.model.columns import first, smaller
+from ppafo.model.columns import first, larger, smaller
 from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
@@ -244,6 +244,12 @@ class Device:
         if VALVES[self.valve.kind].regulation is None:
             return supplies
         return smaller(supplies[0], highest["highest_pressure"]), smaller(supplies[1], highest["highest_pressure"])
+
+    @property
+    def lowest_pressure(self) -> Any:
+        """Lowest pressure that a supply above the atmosphere lets a chamber fall to [Pa absolute]."""
+        room, settings = self.supply.atmospheric_pressure, self.valve.settings
+        return room if VALVES[self.valve.kind].regulation is None else larger(room, settings["lowest_pressure"])
 
     @property
     def has_torque_constant(self) -> bool:

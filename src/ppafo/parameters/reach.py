@@ -4,6 +4,7 @@ At the upper limit chamber 1 is at its supply pressure and chamber 2 is vented, 
 vacuum supply, chamber 2 raises the torque and chamber 1 lowers it.
 """
 
+import math
 from collections.abc import Callable
 
 from ppafo.model.catalog import ACTUATORS
@@ -34,7 +35,7 @@ def torque_reach(device: Device, angle: float, torque: StaticTorque | None = Non
     ``torque`` is the ``static_torque`` of the device, for repeated calls.
     """
     own = torque or static_torque(device)
-    vented = float(device.supply.atmospheric_pressure)
+    vented = float(device.lowest_pressure)
     highest_1, highest_2 = map(float, device.highest_pressures)
     by_1, by_2 = own(angle, highest_1, vented), own(angle, vented, highest_2)
     return (by_1, by_2) if device.supply.is_vacuum else (by_2, by_1)
@@ -51,19 +52,21 @@ def supply_for(device: Device, angle: float, torque: float) -> float | None:
     Chamber 1 raises the torque above the torque of the vented actuator, chamber 2 lowers it; with a vacuum the reverse.
     None if no supply up to ``HIGHEST_PRESSURE``, or no vacuum, gives the torque.
     """
-    own, vented = static_torque(device), float(device.supply.atmospheric_pressure)
+    own, vented = static_torque(device), float(device.lowest_pressure)
+    room, most = float(device.supply.atmospheric_pressure), device.valve.settings.get("highest_pressure", math.inf)
     sign = 1.0 if torque > own(angle, vented, vented) else -1.0
     is_first = supply_that_moves(device, sign > 0.0) == PRESSURE_PATH
 
     def is_enough(gauge: float) -> bool:
-        full = vented + gauge
+        # A regulator fills to the highest pressure that it can be set to, whatever its supply.
+        full = min(room + gauge, float(most))
         return sign * own(angle, *((full, vented) if is_first else (vented, full))) >= sign * torque
 
-    farthest = _LOWEST_PRESSURE - vented if device.supply.is_vacuum else HIGHEST_PRESSURE
+    farthest = _LOWEST_PRESSURE - room if device.supply.is_vacuum else HIGHEST_PRESSURE
     if not is_enough(farthest):
         return None
     low, high = 0.0, farthest
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if is_enough(middle) else (middle, high)
-    return vented + high
+    return room + high

@@ -325,7 +325,9 @@ def _scenario(experiment: str, device: str, valve: str | None, bench: Preset, ov
     changes = [*(text for text in of_bench if text.partition("=")[0].strip() not in given), *overrides]
     table = {"set": device} if valve is None else {"set": device, "valve": valve}
     if experiment in ("step-response", "torque-task"):
-        content = load_scenario(f"torque-task-{kind}" if experiment == "torque-task" else experiment).origin.content
+        # Any valve but a pair of switching ones takes the law of the proportional valve.
+        law = "solenoid" if kind == "solenoid" else "proportional"
+        content = load_scenario(f"torque-task-{law}" if experiment == "torque-task" else experiment).origin.content
         # As overrides, so that the scenario reports its values that replace values of another set.
         chosen = {"valve": load_parameter_set(device).default_valve, **table}
         of_device = (f"device.{key}={value}" for key, value in chosen.items() if value != content["device"][key])

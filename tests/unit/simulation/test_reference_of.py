@@ -84,9 +84,9 @@ def test_a_profile_has_levels_and_differences() -> None:
         (document("angle", "90 deg", "on_off_dead_zone", **FREE), "'controller.dead_zone' is missing"),
         (
             document("pressure_1", "60 psi_g"),
-            "leaves the range between atmosphere and supply.*60 psi_g at 0 s",
+            "leaves the range of supply and valve.*60 psi_g at 0 s",
         ),
-        (document("pressure_2", "-1 psi_g"), "leaves the range between atmosphere and supply.*-1 psi_g"),
+        (document("pressure_2", "-1 psi_g"), "leaves the range of supply and valve.*-1 psi_g"),
         (document("pressure_difference", "-51 psi_d"), "leaves the range.*-50 psi to 50 psi"),
     ],
     ids=[

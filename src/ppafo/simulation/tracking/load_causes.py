@@ -136,8 +136,9 @@ def torque_beyond_reach(case: Case) -> TrackingCause | None:
     supply = supply_that_moves(device, worst.upwards)
     stop = stop_of(scenario, case.recording["angle"][case.samples]) if isinstance(scenario.motion, FreeMotion) else ""
     lies = f"only the {stop} stop, on which the joint lies, resists the torque: " if stop else ""
+    filled = float(device.highest_pressures[supply != PRESSURE_PATH])
     text = (
-        f"{lies}at {level_text('rad', worst.angle)} and {level_text('Pa', number_at(scenario, supply))} the "
+        f"{lies}at {level_text('rad', worst.angle)} and {level_text('Pa', filled)} the "
         f"actuator gives {reach_text(worst.reach, worst.upwards)}"
     )
     if lies:

@@ -41,14 +41,15 @@ def available_torque(scenario: Scenario) -> tuple[Floats, Floats]:
     the largest torque counts.
     """
     device = scenario.device
-    actuator, supply, locked = device.actuator, device.supply, scenario.motion.locked_angle
+    actuator, locked = device.actuator, scenario.motion.locked_angle
     fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
     first, travel = (actuator.angle_min, actuator.angle_max - actuator.angle_min) if locked is None else (locked, 0.0)
-    model, plant, vented = ACTUATORS[actuator.kind].model, plant_parameters(device), supply.atmospheric_pressure
+    model, plant, vented = ACTUATORS[actuator.kind].model, plant_parameters(device), device.lowest_pressure
+    most_1, most_2 = device.highest_pressures
     angles = [first + fraction * travel for fraction in fractions]
-    highest = [torque_of(model, plant, angle, supply.pressure, vented) for angle in angles]
-    lowest = [torque_of(model, plant, angle, vented, supply.dorsiflexion_pressure) for angle in angles]
-    if supply.is_vacuum:
+    highest = [torque_of(model, plant, angle, most_1, vented) for angle in angles]
+    lowest = [torque_of(model, plant, angle, vented, most_2) for angle in angles]
+    if device.supply.is_vacuum:
         highest, lowest = lowest, highest
     return np.min(lowest, axis=0), np.max(highest, axis=0)
 
