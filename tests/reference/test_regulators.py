@@ -12,14 +12,17 @@ from scipy.integrate import solve_ivp
 import ppafo
 from ppafo.engine.scheme.pneumatics import GAMMA
 from ppafo.errors import ParameterError, ScenarioError
+from ppafo.metrics.settled import SettledPart
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.valves.kind import VENT
 from ppafo.model.valves.pressure_regulator import MODEL, STAGE, RegulatorSettings
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import static_torque, supply_for, torque_reach
+from ppafo.remedy_trials import tried
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
+from ppafo.simulation.tracking.case import Case
 from ppafo.simulation.tracking.shortfall import available_torque
 
 LOCKED = {"kind": "locked", "angle": "75 deg"}
@@ -151,6 +154,53 @@ def test_default_gains_follow_the_regulator(response: int) -> None:
     ):
         result = simulate(regulated(motion, {"kind": law}, reference, *changes, duration="2.5 s"))
         assert not result.tracking.fails, result.tracking.sentence
+
+
+@pytest.mark.parametrize(
+    ("changes", "share"),
+    [
+        (("valve.hysteresis=0.2",), 0.0),
+        (("valve.resolution=0.5",), 0.0),
+        (("valve.response_time=5 s",), 0.0),
+        (("valve.highest_pressure=9 bar_g", "valve.hysteresis=0"), 0.0),
+        (("valve.sonic_conductance=0.001 l/(s bar)",), 1.0),
+    ],
+)
+def test_a_regulator_is_fully_open_where_it_passes_the_flow_of_an_open_one(
+    changes: tuple[str, ...], share: float
+) -> None:
+    scenario = regulated(LOCKED, {**CONSTANT, "command": 0.7}, None, *changes, duration="2 s")
+    recording = simulate(scenario).recording
+    is_open = Case(scenario, None, recording, SettledPart(1.0), None).is_fully_open
+    assert np.mean(is_open[recording.time > 0.5]) == pytest.approx(share, abs=0.01)
+
+
+WAVE = {"of": "angle", "kind": "sine", "level": "90 deg", "amplitude": "10 deg", "frequency": "2 Hz"}
+
+
+@pytest.mark.parametrize(
+    ("law", "level", "changes", "number"),
+    [
+        ({"kind": "pid"}, "2 N m", ("response_time=0.2 s", "hysteresis=0.5", "resolution=0"), "hysteresis = 0.5"),
+        (
+            {"kind": "pid", "rate": "200 Hz"},
+            "0.5 N m",
+            ("response_time=0.2 s", "hysteresis=0.02", "resolution=0.2"),
+            "resolution = 0.2",
+        ),
+        ({"kind": "cascade"}, "", ("response_time=1 s",), "response_time = 1 s"),
+    ],
+)
+def test_a_verdict_names_the_number_of_the_regulator_that_is_at_fault(
+    law: dict[str, Any], level: str, changes: tuple[str, ...], number: str
+) -> None:
+    torque = {"kind": "ramp_hold", "level": level, "ramp_time": "0.5 s"}
+    motion, reference = (LOCKED, torque) if level else ({**FREE, "angle": "90 deg"}, WAVE)
+    overrides = (f"valve.{each}" for each in ("sonic_conductance=1 l/(s bar)", *changes))
+    scenario = regulated(motion, law, reference, *overrides, duration="3 s")
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict.cause == f"the set pressure is kept off the command by `valve.{number}`"
+    assert "it follows, as a further run shows" in verdict.tried
 
 
 @pytest.mark.parametrize(

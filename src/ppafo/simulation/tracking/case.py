@@ -6,12 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
+from ppafo.engine.in_python import over_samples
 from ppafo.metrics.command import requested_samples
 from ppafo.metrics.metric import controlled_in, followed
 from ppafo.metrics.settled import SettledPart
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, SHUT, reversals
 from ppafo.model.catalog import VALVES
-from ppafo.parameters.plant import valve_settings
+from ppafo.model.orifice import orifice_flow
+from ppafo.model.plant import PlantParameters
+from ppafo.parameters.plant import plant_parameters
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.remedies import Remedy
@@ -19,8 +22,9 @@ from ppafo.simulation.tracking.rule import Failure, only_switches
 
 _FULLY_OPEN = 0.98
 """Command above which a valve counts as fully open [-]."""
-_FAR, _FAR_OF_RANGE = 2.0, 0.05
-"""Deviation from the set pressure beyond which a regulator counts as fully open: in bands, and of its range [-]."""
+_FULL_FLOW, _HARDLY = 0.9, 0.05
+"""Share of the flow through an open regulator from which it counts as fully open, and share of the largest such flow up
+to which it gives hardly any [-]."""
 
 
 class Case(NamedTuple):
@@ -57,11 +61,8 @@ class Case(NamedTuple):
     @property
     def is_fully_open(self) -> NDArray[np.bool_]:
         """True for each sample of the recording with a fully open valve."""
-        valve = self.scenario.device.valve
-        regulation = VALVES[valve.kind].regulation
-        if regulation is not None:
-            span, band, _ = regulation(valve_settings(valve))
-            return _is_far_from_set(self.recording, valve.lowest_pressure, span, band)
+        if VALVES[self.scenario.device.valve.kind].regulation is not None:
+            return _flows_fully(self.recording, plant_parameters(self.scenario.device))
         command, settings = np.abs(self.recording["command"]), self.scenario.controller.settings
         # An on/off law may open its valves by less on purpose.
         return np.asarray((command >= _FULLY_OPEN * min(settings.get("opening", 1.0), 1.0)) & (command <= 1.0 + SHUT))
@@ -86,19 +87,19 @@ class Case(NamedTuple):
         return np.asarray((value - reference)[self.samples])
 
 
-def _is_far_from_set(recording: Recording, lowest: float, span: float, band: float) -> NDArray[np.bool_]:
-    """Return for each sample whether a pressure is off the one that its regulator is set to, far beyond its band [Pa].
-
-    ``lowest`` is the lowest set pressure and ``span`` the range above it [Pa].
-    """
-    command = recording["command"]
-    far = np.zeros(command.shape, dtype=np.bool_)
-    for chamber, sign in (("pressure_1", 1.0), ("pressure_2", -1.0)):
-        # An actuator with one chamber has no second pressure.
-        if chamber in recording:
-            wanted = lowest + span * np.clip(sign * command, 0.0, 1.0)
-            far |= np.abs(wanted - recording[chamber]) > max(_FAR * band, _FAR_OF_RANGE * span)
-    return far
+def _flows_fully(recording: Recording, plant: PlantParameters) -> NDArray[np.bool_]:
+    """Return for each sample whether a chamber gains or loses as much gas as its regulator passes when fully open."""
+    full = np.zeros(recording.time.shape, dtype=np.bool_)
+    for number, source in ((1, plant.supply_pressure), (2, plant.dorsiflexion_pressure)):
+        # An actuator with one chamber has no second one.
+        if f"mass_{number}" not in recording:
+            continue
+        pressure, gain = recording[f"pressure_{number}"], np.gradient(recording[f"mass_{number}"], recording.time)
+        for node, way in ((source, 1.0), (plant.atmospheric_pressure, -1.0)):
+            flow = over_samples(orifice_flow, node, pressure, plant.valve_conductance, 1.0, plant.valve_curve)[0]
+            most = np.maximum(way * flow, _HARDLY * np.max(way * flow))
+            full |= way * gain > _FULL_FLOW * most
+    return full
 
 
 def only_opens_fully(recording: Recording) -> bool:

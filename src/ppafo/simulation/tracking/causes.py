@@ -67,6 +67,8 @@ _DELAYS_OF_VALVE = {"delay": -1.0, "spool_frequency": 1.0}
 """Numbers of a valve that delay its opening, and the sign of the change that reduces the delay."""
 _QUICKER_DEVICE = (3.0, 10.0, 100.0)
 """Factors by which valve or controller become quicker in trials [-]."""
+_FLAWS_OF_VALVE = (("hysteresis",), ("resolution",), ("hysteresis", "resolution"), ("response_time",))
+"""Numbers of a valve that keep a set pressure off its command, which are reduced together in trials."""
 _SLOW = 0.01
 """Period of a controller from which its rate is named [s]."""
 _DELAY, _LONG_DELAY = "sensors.delay", 0.1
@@ -266,6 +268,8 @@ def _fast_loop(case: Case, law: ControllerKind, gain: str) -> TrackingCause:
     if sensors.angle_noise or sensors.pressure_noise:
         noise = f"{change_text(ANGLE, sensors.angle_noise)} and {change_text('pressure_1', sensors.pressure_noise)}"
         reason = f"sensor noise ({noise}) reverses the command"
+    elif any(scenario.device.valve.settings.get(name, 0.0) > 0.0 for name in _FLAWS_OF_VALVE[2]):
+        reason = "it includes neither hysteresis nor resolution of the valve"
     elif sensors.delay or scenario.supply_lines is not None:
         reason = "the delay of sensors or supply lines causes it"
     elif np.ptp(angle) > _MOVING:
@@ -440,6 +444,18 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
     return TrackingCause(", and ".join(filter(None, (late, others))), tuple(remedies))
 
 
+def _flaw_of_valve(names: tuple[str, ...], oscillates: bool, case: Case) -> TrackingCause | None:
+    """Cause: numbers of a regulator that keep its set pressure off the command, for a loop that oscillates or not."""
+    scenario, declared = case.scenario, declared_numbers(case.scenario)
+    numbers = {path: number_at(scenario, path) for path in (f"valve.{name}" for name in names) if path in declared}
+    if case.oscillates != oscillates or len(numbers) < len(names) or not min(numbers.values()) > 0.0:
+        return None
+    told = " and ".join(f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in numbers.items())
+    smaller = [{path: number / factor for path, number in numbers.items()} for factor in _QUICKER_DEVICE[:2]]
+    remedies = tuple(remedy(scenario, each) for each in smaller)
+    return TrackingCause(f"the set pressure is kept off the command by {told}", remedies)
+
+
 def _law_without_torque_loop(case: Case) -> TrackingCause | None:
     """Cause: an angle controller without inner torque loop, slow because the gas spring swings the joint."""
     scenario, law, error = case.scenario, case.law, case.settled.rms_error
@@ -502,7 +518,10 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _still_approaching,
     _law_without_torque_loop,
     _late_device,
+    # Of a loop that does not oscillate, these are less certain than any other cause.
+    *(partial(_flaw_of_valve, names, True) for names in _FLAWS_OF_VALVE),
     _poor_sensors,
     _not_settled,
+    *(partial(_flaw_of_valve, names, False) for names in _FLAWS_OF_VALVE),
 )
-"""Causes of a task, most certain first; the last one always applies."""
+"""Causes of a task, most certain first; ``_not_settled`` always applies."""
