@@ -42,7 +42,7 @@ from ppafo.identification.bench.law import (
     sought,
 )
 from ppafo.identification.bench.readings import check_no_wrong_reading, check_sources, meter_readings
-from ppafo.identification.estimate import Verdict
+from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import SHAPE, Conflict
 from ppafo.identification.least_squares import FitVariable, Flags
 from ppafo.identification.source import RecordingSource, pool
@@ -239,16 +239,8 @@ class ValveMapProblem(FlowLaw):
         if not self.nodes:
             return result
         result = _with_nodes(result, band, self.nodes, openings)
-        coefficient, full = context.number(f"{path}.discharge_coefficient"), result.estimates[0]
-        if not (coefficient and full.is_usable):
-            return result
-        # The set has area and coefficient, of which the map knows the product alone.
-        area, own = 1e6 * full.value / coefficient, 1e6 * (context.number(f"{path}.area") or 0.0)
-        remark = (
-            f"the opening is a share of the full area: with the Cd of the set {path}.area = {area:.4g} mm^2, and the "
-            f"set has {own:.4g} mm^2, which stays; no interval counts that the opening is straight between two nodes"
-        )
-        return replace(result, remarks=(*result.remarks, remark))
+        remark = _of_full_opening(path, result.estimates[0], context, gas)
+        return replace(result, remarks=(*result.remarks, *filter(None, [remark])))
 
     def _unknowns(
         self, where: str, size: Floats, areas: Floats, band: str, openings: Sequence[str]
@@ -284,6 +276,25 @@ class ValveMapProblem(FlowLaw):
             # Just inside the highest command, beyond which no reading changes with it.
             sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         )
+
+
+def _of_full_opening(path: str, full: Estimate, context: BenchContext, gas: GasAt) -> str:
+    """Return a remark on the number of the set that the full opening of a table contradicts or confirms, or ""."""
+    coefficient = context.number(f"{path}.discharge_coefficient")
+    conductance = context.number(f"{path}.sonic_conductance")
+    if not full.is_usable or not (coefficient or conductance):
+        return ""
+    if coefficient:
+        # The set has area and coefficient, of which the map knows the product alone.
+        area, own = 1e6 * full.value / coefficient, 1e6 * (context.number(f"{path}.area") or 0.0)
+        read, has = f"with the Cd of the set {path}.area = {area:.4g} mm^2", f"{own:.4g} mm^2"
+    else:
+        measured = 1e8 * full.value * gas.choked_flow_constant / gas.flow_per_sonic_conductance
+        read, has = f"{path}.sonic_conductance = {measured:.4g} L/(s bar)", f"{1e8 * (conductance or 0.0):.4g}"
+    return (
+        f"the opening is a share of the full one: {read}, and the set has {has}, which stays; no interval counts that "
+        "the opening is straight between two nodes"
+    )
 
 
 def table_of(nodes: Sequence[float], openings: Sequence[float], size: Floats) -> Floats:
