@@ -210,7 +210,7 @@ def test_the_fit_starts_from_what_the_bench_found_and_keeps_the_rest_of_it(solve
         assert held[path].before_error == pytest.approx(half / 1.96, rel=5e-3)
     started = solve(f"{STATIC}{FIT}[[trajectory.parameters]]\npath = 'friction.static_torque'\n").trajectory
     assert started is not None
-    friction = next(one for one in started.fit.numbers if one.path == "friction.static_torque")
+    friction = next(one for one in started.numbers if one.path == "friction.static_torque")
     known = static["friction.static_torque"]
     assert friction.free.start == pytest.approx(known.value, abs=5e-3 * known.wider_half_width)
 
