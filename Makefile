@@ -21,7 +21,7 @@ validation: $(READY)
 test: check
 	$(TESTS) -m "not long"
 
-# What `make test` leaves out. Continuous integration runs a fifth of it after each change: PART=I/5 is the I-th of five parts
+# What `make test` leaves out. Continuous integration runs an eighth of it after each change: PART=I/8 is the I-th of eight parts
 # of about equal cost.
 PART ?= 0/1
 test-long: $(READY)
