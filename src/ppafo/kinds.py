@@ -78,12 +78,6 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         """Return the loaded components by name, first those of this package."""
         return {name: self._kinds[name] for name in self if name in self._kinds}
 
-    def loaded_or_own(self) -> dict[str, Kind]:
-        """Return the loaded components by name; without any, all components of this package."""
-        if not self._kinds:
-            self.load_own()
-        return self.loaded()
-
     def is_own(self, name: str) -> bool:
         """Return whether a name is a component of this package."""
         return name in self._own

@@ -147,7 +147,7 @@ def sweep_into_folder(
 ) -> Finding[StudyResults]:
     """Run a study into a folder with its figure, page and text: the command.
 
-    An interrupt is raised again with a message that tells whether the same command resumes the study.
+    An interrupt is raised again with a message on whether the same command resumes the study.
     """
     from ppafo.report.drawing import load_drawing
     from ppafo.report.finding import page_files, text_of

@@ -319,7 +319,7 @@ def rig_simulate(
     from ppafo.rig.experiments import NOTICE, record
     from ppafo.rig.folder import check_rig_folder, write_rig_recording
 
-    # A refused folder is told before anything runs.
+    # A folder that cannot be used is refused before anything runs.
     with blame_out_option():
         check_rig_folder(out, experiment)
     rig_recording = record(experiment, preset, seed, device, overrides, valve)

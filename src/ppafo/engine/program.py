@@ -155,11 +155,6 @@ class Program:
         return functions_of_actuator(self.actuator)
 
     @property
-    def has_vane(self) -> bool:
-        """True if the actuator is a vane, whose volumes do not depend on pressure."""
-        return self.actuator == VANE
-
-    @property
     def inverts_valve(self) -> bool:
         """True if the law sends the command for the opening that it wants, where it also passes a dead band."""
         return "sent_command" in self.ports_with_laws and DEAD_BAND in getattr(self.controller, "quantities", ())

@@ -6,6 +6,7 @@ vacuum supply, chamber 2 raises the torque and chamber 1 lowers it.
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from ppafo.model.catalog import ACTUATORS
 from ppafo.parameters.device import Device
@@ -34,11 +35,15 @@ def torque_reach(device: Device, angle: float, torque: StaticTorque | None = Non
 
     ``torque`` is the ``static_torque`` of the device, for repeated calls.
     """
-    own = torque or static_torque(device)
-    vented = float(device.lowest_pressure)
-    highest_1, highest_2 = map(float, device.highest_pressures)
-    by_1, by_2 = own(angle, highest_1, vented), own(angle, vented, highest_2)
-    return (by_1, by_2) if device.supply.is_vacuum else (by_2, by_1)
+    own, (at_lowest, at_highest) = torque or static_torque(device), reaching_pressures(device)
+    return own(angle, *at_lowest), own(angle, *at_highest)
+
+
+def reaching_pressures(device: Device) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+    """Return the pressures of both chambers [Pa absolute] at the lowest and highest torque; arrays (runs,) too."""
+    (highest_1, highest_2), vented = device.highest_pressures, device.lowest_pressure
+    of_1, of_2 = (highest_1, vented), (vented, highest_2)
+    return (of_1, of_2) if device.supply.is_vacuum else (of_2, of_1)
 
 
 def supply_that_moves(device: Device, upwards: bool) -> str:

@@ -43,6 +43,9 @@ class RecordedResult:
         def status(self) -> Any:
             """End of the run: a ``Status``."""
 
+        def _figure(self) -> "Figure":
+            """Return the figure of the run."""
+
     @in_own_units
     def plot(self, width: float | str | None = None) -> "Figure":
         """Return the figure of the run; ``.savefig(...)`` saves it.
@@ -54,9 +57,6 @@ class RecordedResult:
 
         with drawn_at(width):
             return shown(self._figure())
-
-    def _figure(self) -> "Figure":
-        raise NotImplementedError
 
     def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
         """Return a channel's values, in SI (``result["torque"]``) or a given unit (``result["pressure_1", "psi_g"]``).

@@ -162,7 +162,7 @@ def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[s
 def merged(
     written: Sequence[str], columns: Mapping[str, Floats], noun: str
 ) -> tuple[dict[str, Floats], tuple[str, ...]]:
-    """Return columns, told apart, with those that repeat a name and its values as one column of that name.
+    """Return columns with unique names; those that repeat a name and its values are one column of that name.
 
     ``written`` are the names in the file. Also returns a remark on each name whose columns differ, in words of the
     ``noun`` of columns; above a limit, only a count. A marker repeats with all its coordinates.

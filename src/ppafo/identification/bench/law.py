@@ -1,6 +1,7 @@
 """Bench law: a table of a problem file that makes a result of recordings; readings, priors, fit, verdicts, panels."""
 
 import math
+from abc import abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -123,12 +124,12 @@ class BenchLaw(StrictTable):
     columns: Columns = None
     confidence: Confidence = 0.95
 
+    @abstractmethod
     def run(self, sources: tuple[RecordingSource, ...], context: BenchContext) -> BenchResult:
         """Identify what the law has from recordings.
 
         Raises IdentificationError, with file and sample, for recordings that do not determine it.
         """
-        raise NotImplementedError
 
 
 class TimedLaw(BenchLaw):

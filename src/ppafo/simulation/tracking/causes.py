@@ -39,6 +39,7 @@ from ppafo.simulation.tracking.remedies import (
     sized_valves,
     smaller_pair,
     speed_settings,
+    stated_number,
     stiffened,
     stiffer_laws,
     torque_asked,
@@ -120,14 +121,14 @@ def _late_device(case: Case, least: float = LARGEST_SHARE) -> TrackingCause | No
         saved |= {path: dead_time - loop.dead_time for path, loop in trials.items()}
     path = max(saved, key=saved.__getitem__)
     if path in quicker:
-        number = level_text(declared_numbers(scenario)[path].unit, number_at(scenario, path))
+        stated = stated_number(scenario, path)
         remedies = tuple(remedy(scenario, {path: each}) for each in quicker[path])
     else:
         rates = [rate for rate in dict.fromkeys((10.0 / period, 100.0 / period, _USUAL_RATE)) if rate <= _USUAL_RATE]
-        number = f"{1.0 / period:.4g} Hz"
+        stated = f"`{path} = {1.0 / period:.4g} Hz`"
         remedies = tuple(Remedy({}, (f"controller.rate={rate:g} Hz",)) for rate in rates if rate * period > 1.0)
     moved = f", in which the reference moves by {change_text(scenario.controlled, moves)}" * (moves > 0.0)
-    text = f"`{path} = {number}` gives most of the loop's dead time of {level_text('s', dead_time)}{moved}"
+    text = f"{stated} gives most of the loop's dead time of {level_text('s', dead_time)}{moved}"
     return TrackingCause(text, remedies, "use a faster valve or controller, or a slower reference")
 
 
@@ -438,7 +439,7 @@ def _poor_sensors(case: Case) -> TrackingCause | None:
     # Gains are changed with less effort than sensors.
     remedies = [*rescaled_gains(scenario, case.law, (0.5,))]
     remedies += [remedy(scenario, {path: number / factor}) for path, number in found.items() for factor in _LESS]
-    told = [f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in found.items()]
+    told = [stated_number(scenario, path) for path in found]
     late = f"the measured {CONTROLLED[scenario.controlled].words} comes late ({told.pop(0)})" if _DELAY in found else ""
     others = f"the sensors are not accurate enough for the controlled quantity ({', '.join(told)})" if told else ""
     return TrackingCause(", and ".join(filter(None, (late, others))), tuple(remedies))
@@ -450,10 +451,10 @@ def _flaw_of_valve(names: tuple[str, ...], oscillates: bool, case: Case) -> Trac
     numbers = {path: number_at(scenario, path) for path in (f"valve.{name}" for name in names) if path in declared}
     if case.oscillates != oscillates or len(numbers) < len(names) or not min(numbers.values()) > 0.0:
         return None
-    told = " and ".join(f"`{path} = {level_text(declared[path].unit, number)}`" for path, number in numbers.items())
+    stated = " and ".join(stated_number(scenario, path) for path in numbers)
     smaller = [{path: number / factor for path, number in numbers.items()} for factor in _QUICKER_DEVICE[:2]]
     remedies = tuple(remedy(scenario, each) for each in smaller)
-    return TrackingCause(f"the set pressure is kept off the command by {told}", remedies)
+    return TrackingCause(f"the set pressure is kept off the command by {stated}", remedies)
 
 
 def _law_without_torque_loop(case: Case) -> TrackingCause | None:

@@ -77,6 +77,11 @@ def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
     return Remedy(dict(numbers), tuple(overrides))
 
 
+def stated_number(scenario: Scenario, path: str) -> str:
+    """Number of a scenario or its device as a cause states it: path and value in its display unit."""
+    return f"`{path} = {level_text(declared_numbers(scenario)[path].unit, number_at(scenario, path))}`"
+
+
 def level_text(unit: str, number: float) -> str:
     """Value with its display unit, from a number in an SI unit; pressures as gauge pressures, or as differences."""
     value, shown = metric_level(float(number), unit)

@@ -13,6 +13,7 @@ from ppafo.metrics.settled import SettledPart
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.controlled import TORQUE
 from ppafo.parameters.plant import plant_parameters
+from ppafo.parameters.reach import reaching_pressures
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import excess_of_part, only_switches
@@ -44,13 +45,11 @@ def available_torque(scenario: Scenario) -> tuple[Floats, Floats]:
     actuator, locked = device.actuator, scenario.motion.locked_angle
     fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
     first, travel = (actuator.angle_min, actuator.angle_max - actuator.angle_min) if locked is None else (locked, 0.0)
-    model, plant, vented = ACTUATORS[actuator.kind].model, plant_parameters(device), device.lowest_pressure
-    most_1, most_2 = device.highest_pressures
+    model, plant = ACTUATORS[actuator.kind].model, plant_parameters(device)
+    at_lowest, at_highest = reaching_pressures(device)
     angles = [first + fraction * travel for fraction in fractions]
-    highest = [torque_of(model, plant, angle, most_1, vented) for angle in angles]
-    lowest = [torque_of(model, plant, angle, vented, most_2) for angle in angles]
-    if device.supply.is_vacuum:
-        highest, lowest = lowest, highest
+    highest = [torque_of(model, plant, angle, *at_highest) for angle in angles]
+    lowest = [torque_of(model, plant, angle, *at_lowest) for angle in angles]
     return np.min(lowest, axis=0), np.max(highest, axis=0)
 
 
