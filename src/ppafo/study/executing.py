@@ -113,7 +113,7 @@ def _computed(sent: bytes, block: Any, version: str, _mark: str) -> Any:
 
 @cache
 def _end_with_caller() -> None:
-    """Make the process of a worker end with the one that started it: the workers of a pool outlive a killed caller."""
+    """Make the process of a worker that computes end with the one that started it: a pool's outlive a killed caller."""
     if (parent := multiprocessing.parent_process()) is not None:
 
         def end() -> None:
