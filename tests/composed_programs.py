@@ -11,7 +11,7 @@ from ppafo.engine.loop_text import write_lanes
 from ppafo.engine.program import Program
 from ppafo.engine.replay import RECORDED_ANGLE
 from ppafo.engine.source_text import SourceCollector
-from ppafo.engine.step import energy_balance, isothermal, lines, walk
+from ppafo.engine.step import lines, walk
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import MetricKind
 from ppafo.model.catalog import EFFECTS, VALVES
@@ -75,7 +75,7 @@ def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:
             effects=tuple(
                 item for item in EFFECTS.values() if not (walks and item.section == "sensors") and draw.random() < 0.3
             ),
-            gas=energy_balance if draw.random() < 0.4 else isothermal,
+            is_thermal=draw.random() < 0.4,
             leg=walk if walks else None,
             feed=lines if draw.random() < 0.4 else None,
             # A free vane always goes through its steps in parts, a leg never as its error asks.

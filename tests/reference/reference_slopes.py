@@ -6,18 +6,17 @@ from collections.abc import Callable
 from ppafo.engine.continuous_time import chambers_in_motion, flows_at, free_motion
 from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.generator import StepText
-from ppafo.engine.groups import Role, rows_of
 from ppafo.engine.linking import link_program
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme.pneumatics import flow_rates
-from ppafo.engine.scheme.thermal_gas import thermal_flows
+from ppafo.engine.scheme.thermal_gas import WarmGas, thermal_flows
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import NoParameters
 from ppafo.model.binding import made_of
 from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.leg import FootLoad
-from ppafo.model.plant import PlantState, ThermalState
+from ppafo.model.plant import ThermalParameters
 
 PLANT_UNKNOWNS = 7
 
@@ -40,7 +39,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
     """Groups of numbers that the right-hand side needs, in order."""
     return {
         "plant": program.actuator.plant,
-        **rows_of(program.gas.groups(program), Role.PARAMETER),
+        **({"thermal": ThermalParameters} if program.is_thermal else {}),
         "valve": program.valve.parameters,
         "path": NoParameters if program.angle is None else program.angle.parameters,
         **({} if program.shank is None else {"load": FootLoad, "shank": program.shank.parameters}),
@@ -140,11 +139,10 @@ def gas_lines(program: Program, add: Callable[..., str]) -> list[str]:
     return [
         flowing,
         f"chambers = {moved}(plant, (angle, rate), (pressure_1, pressure_2))",
-        f"state = {add(PlantState)}(angle, rate, y[2], y[3], y[4], y[5], y[6])",
-        f"masses = {add(ThermalState)}(y[7], y[8], 0.0, 0.0, 0.0, 0.0)",
-        f"gas = {add(thermal_flows)}(thermal, state, masses, chambers, flowing)",
-        "slopes[2] = gas.content_1",
-        "slopes[3] = gas.content_2",
+        f"warm = {add(thermal_flows)}(thermal, {add(WarmGas)}(y[2], y[3], y[7], y[8]), chambers, flowing)",
+        "gas = warm.gas",
+        "slopes[2] = warm.mass_1",
+        "slopes[3] = warm.mass_2",
         "slopes[7] = gas.mass_1",
         "slopes[8] = gas.mass_2",
     ]

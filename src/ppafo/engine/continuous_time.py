@@ -10,14 +10,12 @@ from ppafo.engine.in_python import in_program
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.pneumatics import GasFlows, flow_rates, gas_flows
-from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows, warm_chambers
+from ppafo.engine.scheme.thermal_gas import WarmChambers, WarmGas, thermal_flows, warm_chambers
 from ppafo.model.plant import (
     ActuatorFunctions,
     Openings,
     PlantParameters,
-    PlantState,
     ThermalParameters,
-    ThermalState,
     blended_port_flow,
     blended_ports,
     chamber_mass,
@@ -80,8 +78,6 @@ def gas_rates(
         flows = flow_rates(flowing)
         gained_1 = flows.mass_1
         gained_2 = flows.mass_2
-        supplied = flows.supplied_1 + flows.supplied_2
-        vented = supplied - gained_1 - gained_2
         warming_1 = 0.0
         warming_2 = 0.0
     else:
@@ -89,25 +85,22 @@ def gas_rates(
         content_2 = chamber_mass(pressure_2, at.volume_2, product)
         mass_1 = content_1 * thermal.temperature / temperatures[0]
         mass_2 = content_2 * thermal.temperature / temperatures[1]
-        # Neither motion nor totals act on the rates of the gas: zeros stand for them.
-        state = PlantState(*[0.0] * len(PlantState._fields))._replace(mass_1=content_1, mass_2=content_2)
-        masses = ThermalState(*[0.0] * len(ThermalState._fields))._replace(mass_1=mass_1, mass_2=mass_2)
-        found = thermal_flows(thermal, state, masses, at, flowing)
-        gained_1 = found.content_1
-        gained_2 = found.content_2
-        supplied = found.supplied_1 + found.supplied_2
-        vented = supplied - found.mass_1 - found.mass_2
+        found = thermal_flows(thermal, WarmGas(content_1, content_2, mass_1, mass_2), at, flowing)
+        flows = found.gas
+        gained_1 = found.mass_1
+        gained_2 = found.mass_2
         # A temperature is the walls' times content over mass.
-        warming_1 = temperatures[0] * (gained_1 / content_1 - found.mass_1 / mass_1)
-        warming_2 = temperatures[1] * (gained_2 / content_2 - found.mass_2 / mass_2)
+        warming_1 = temperatures[0] * (gained_1 / content_1 - flows.mass_1 / mass_1)
+        warming_2 = temperatures[1] * (gained_2 / content_2 - flows.mass_2 / mass_2)
         # The contents have the work of the moving wall in them: of equation (3) only the volumes are left.
+    supplied = flows.supplied_1 + flows.supplied_2
     return GasRates(
         pressure_1=(product * gained_1 - pressure_1 * at.growth_1) / (at.volume_1 * (1.0 + at.give_1)),
         pressure_2=(product * gained_2 - pressure_2 * at.growth_2) / (at.volume_2 * (1.0 + at.give_2)),
         temperature_1=warming_1,
         temperature_2=warming_2,
         supplied=supplied,
-        vented=vented,
+        vented=supplied - flows.mass_1 - flows.mass_2,
     )
 
 

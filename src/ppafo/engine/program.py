@@ -1,10 +1,9 @@
 """Program: combination of the components (valve, controller, gas, ...) of one compiled model."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 from ppafo.control.kind import DEAD_BAND, OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
@@ -14,7 +13,8 @@ from ppafo.engine.plain_python import place
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.actuators import functions_of_actuator
 from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
-from ppafo.engine.scheme.pneumatics import GasFlows, HeldChambers, SlopedFlows
+from ppafo.engine.scheme.pneumatics import Flows, GasFlows, GasStage, HeldChambers, SlopedFlows
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalStage
 from ppafo.engine.step.lane import LaneResult, LaneTiming, NoParameters
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.kind import ActuatorModel
@@ -22,61 +22,11 @@ from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect, State
-from ppafo.model.plant import ActuatorFunctions, PlantState
+from ppafo.model.plant import ActuatorFunctions, PlantState, ThermalParameters, ThermalState
 from ppafo.model.ports import exhaust_path, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import LED_SHANK, REQUESTED, WALK, MeterKind, ReferenceSummary
-
-if TYPE_CHECKING:
-    from ppafo.engine.scheme.pneumatics import Flows
-    from ppafo.engine.scheme.thermal_gas import ThermalFlows
-    from ppafo.engine.step.lane import Lane
-
-
-class GasPhases(Protocol):
-    """Two-stage step of the gas in both chambers: protocol of a module of ``engine.step``."""
-
-    @property
-    def IS_THERMAL(self) -> bool:  # noqa: N802 - constants of modules
-        """True if the gas has an energy balance."""
-
-    @property
-    def START(self) -> Callable[..., Any] | None:  # noqa: N802
-        """Function of the initial ``PlantState`` for the initial gas state; None without a gas state."""
-
-    def groups(self, parts: "Program") -> Groups:
-        """Return the groups of numbers of this kind of gas."""
-
-    def begin(self, parts: "Program", lane: "Lane", next_angle: float, length: float) -> None:
-        """Set the first stage over a length [s], with volumes that end at ``next_angle`` [rad]."""
-
-    def ends(self, parts: "Program", lane: "Lane") -> tuple[float, float]:
-        """Return the pressures [Pa] of both chambers after the first stage."""
-
-    def first(self, parts: "Program", lane: "Lane") -> "Flows | ThermalFlows":
-        """Return the rates of the first stage [kg/s]."""
-
-    def changes(self, parts: "Program", lane: "Lane") -> "Flows | ThermalFlows":
-        """Return the changes in the step [kg]."""
-
-    def change(self, parts: "Program", lane: "Lane", length: float) -> None:
-        """Set the second stage, and the changes from both stages."""
-
-    def error(self, parts: "Program", lane: "Lane", ahead: float, length: float) -> float:
-        """Return the pressure error divided by the allowed error [-], with volumes that end at ``ahead`` [rad]."""
-
-    def shift_error(self, parts: "Program", lane: "Lane", shift: float, ahead: float, length: float) -> float:
-        """Return the pressure error due to a relative opening change ``shift``, divided by the allowed error [-]."""
-
-    def add(self, parts: "Program", lane: "Lane") -> None:
-        """Set ``lane.fed``, the state with the gas of the step, and ``lane.warmed``, the masses of thermal gas."""
-
-    def move(self, parts: "Program", lane: "Lane", state: PlantState, assumed: float, reached: float) -> PlantState:
-        """Return the state for the angle reached [rad] instead of the assumed angle [rad]."""
-
-    def work(self, parts: "Program", lane: "Lane") -> None:
-        """Add the work of the gas on the vane to the totals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +39,7 @@ class Program:
         angle: profile that prescribes the angle; None for an unconstrained vane or a walk
         ideal_sensors: False for signals with noise and quantisation
         late_commands: True for a dead time before the valve
-        gas: module of ``engine.step`` for the gas
+        is_thermal: True if the gas has an energy balance
         late_signals: True for delayed signals
         leg: module ``walk`` for a walking leg, whose foot is free or moved by ground and gait, with sensors
         feed: module ``lines`` for supply lines; None for constant supply pressures
@@ -111,7 +61,7 @@ class Program:
     angle: ProfileKind | None
     ideal_sensors: bool
     late_commands: bool
-    gas: GasPhases
+    is_thermal: bool = False
     late_signals: bool = False
     leg: ModuleType | None = None
     feed: ModuleType | None = None
@@ -196,11 +146,6 @@ class Program:
     def effect_states(self) -> dict[str, type]:
         """Groups of rows of the effect states, by name."""
         return {f"{name}_state": kind.row for name, kind in self.stated.items()}
-
-    @property
-    def is_thermal(self) -> bool:
-        """True if the gas has an energy balance."""
-        return self.gas.IS_THERMAL
 
     @property
     def walks(self) -> bool:
@@ -321,8 +266,9 @@ def groups_of(program: Program) -> Groups:
     """Return all groups of numbers of a program by name, in the order of their rows."""
     leg, feed, shank = program.leg, program.feed, program.shank
     is_alone = program.angle is None and leg is None
+    is_thermal = program.is_thermal
     controller = program.controller
-    before = {
+    own = {
         "timing": given(LaneTiming),
         "result": kept(LaneResult),
         "pace": kept(StepControl),
@@ -332,8 +278,9 @@ def groups_of(program: Program) -> Groups:
         **({"begun": handed(FreePart)} if is_alone else {}),
         **({"prescribed": handed(PrescribedStep)} if program.angle is not None and not program.is_locked else {}),
         "flowing": handed(SlopedFlows),
-    }
-    after = {
+        **({"thermal": given(ThermalParameters), "masses": kept(ThermalState)} if is_thermal else {}),
+        "gas_stage": handed(ThermalStage if is_thermal else GasStage),
+        **({"change": handed(ThermalFlows if is_thermal else Flows)} if program.angle is None else {}),
         "passing": handed(GasFlows),
         "valve": given(program.valve.parameters),
         "valve_state": kept(program.valve.state),
@@ -354,7 +301,7 @@ def groups_of(program: Program) -> Groups:
         **({"gas_error": handed(float)} if program.is_adaptive and program.angle is None else {}),
     }
     return {
-        **merged(before, program.gas.groups(program), after, *worn, foot, last),
+        **merged(own, *worn, foot, last),
         # Linking refuses an effect with a name that is here already.
         **{effect.name: given(effect.parameters) for effect in program.effects},
         **{name: kept(row) for name, row in program.effect_states.items()},
@@ -366,7 +313,7 @@ def groups_of(program: Program) -> Groups:
 
 def place_of_group(program: Program, name: str) -> str:
     """Return file and line of the function that declares a group of a component; else the name of the group."""
-    for part in (program.gas, program.leg, program.feed):
+    for part in (program.leg, program.feed):
         if part is not None and name in part.groups(program):
             code = part.groups.__code__
             return place(code.co_filename, code.co_firstlineno)

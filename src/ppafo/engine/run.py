@@ -14,6 +14,7 @@ from ppafo.engine.program import Program, place_of_group
 from ppafo.engine.rows import of_each, row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import StepControl
+from ppafo.engine.scheme.thermal_gas import masses_at_start
 from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
 from ppafo.model.columns import larger, truncated
 from ppafo.model.effects.kind import PlantSnapshot
@@ -220,8 +221,7 @@ def _alike_together(run: Run, runs: int, members: Members) -> Members:
 
 def gas_at_start(run: Run) -> Any:
     """Return the initial gas state beyond ``PlantState``, the true masses; arrays (runs,) if the run has arrays."""
-    start = run.program.gas.START
-    return NoParameters() if start is None else start(run.initial)
+    return masses_at_start(run.initial) if run.program.is_thermal else NoParameters()
 
 
 def states_at_start(run: Run) -> list[Any]:

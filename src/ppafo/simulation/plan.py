@@ -13,12 +13,11 @@ import numpy as np
 
 from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.program import GasPhases, Program
+from ppafo.engine.program import Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
-from ppafo.engine.step import isothermal
 from ppafo.engine.step.lane import NoParameters
 from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
@@ -122,7 +121,6 @@ def compose_run(
     feed: ModuleType | None = None
     foot: ModuleType | None = None
     walking: ModuleType | None = None
-    gas: GasPhases = isothermal
     # Most runs have neither lines nor a leg, and keep their temperature.
     lines = None
     if supply_lines is not None:
@@ -134,8 +132,6 @@ def compose_run(
         from ppafo.engine.step import foot
     if walk is not None:
         from ppafo.engine.step import walk as walking
-    if scenario.gas_model is not None:
-        from ppafo.engine.step import energy_balance as gas
     program = Program(
         actuator=ACTUATORS[device.actuator.kind].model,
         valve=valve,
@@ -147,7 +143,7 @@ def compose_run(
         # Of the first run, for all runs of one program have a delay or none has.
         late_commands=first(delay) > 0.0,
         late_signals=first(signal_delay) > 0.0,
-        gas=gas,
+        is_thermal=scenario.gas_model is not None,
         leg=walking,
         feed=feed,
         is_adaptive=bool(first(needs_parts)),

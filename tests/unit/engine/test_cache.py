@@ -9,7 +9,6 @@ import pytest
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.program import Program
-from ppafo.engine.step import isothermal
 from ppafo.model.valves.proportional import IDEAL
 from tests.composed_programs import lane_source
 
@@ -60,7 +59,7 @@ def test_second_start_finds_the_compiled_model_and_changed_physics_does_not(tmp_
 
 def program() -> Program:
     """A program as the torque task uses it."""
-    return Program(IDEAL, PROFILES["ramp_hold"], CONTROLLERS["pid"], PROFILES["constant"], True, False, isothermal)
+    return Program(IDEAL, PROFILES["ramp_hold"], CONTROLLERS["pid"], PROFILES["constant"], True, False)
 
 
 def test_source_changes_with_a_number_deep_in_the_physics(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,86 +7,85 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from ppafo.engine import step
 from ppafo.engine.groups import Groups, given, handed
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.program import Program
 from ppafo.engine.run import Run, batch_of
-from ppafo.engine.step import isothermal, phases
+from ppafo.engine.step import lines, phases
 from ppafo.engine.step.lane import Lane
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library import c_library
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.plant import PlantParameters
-from ppafo.simulation import plan
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 
 begun = phases.begin_step
+LINES = ("run.duration=20 ms", "supply_line.plantarflexion.droop=3e6 Pa s/kg")
 BACKENDS = pytest.mark.parametrize("backend", ["", "python"])
 
 
 class Mine(NamedTuple):
-    """A parameter of a gas: its share of the usual change of mass [-]."""
+    """A parameter of lines: the share of their usual gas [-]."""
 
     share: float
 
 
 def all_of_it(plant: PlantParameters) -> Mine:
-    """The parameter of a gas as usual."""
+    """The parameter of lines as usual."""
     return Mine(1.0)
 
 
 def half_of_it(plant: PlantParameters) -> Mine:
-    """The parameter of a gas of which half flows."""
+    """The parameter of lines that lose half their gas in each part."""
     return Mine(0.5 * plant.supply_pressure / plant.supply_pressure)
 
 
-def change(parts: Program, lane: Any, length: float) -> None:
-    """The change by both stages, of which the parameter leaves a share."""
-    isothermal.change(parts, lane, length)
+def end(parts: Program, lane: Any, length: float) -> None:
+    """The lines at the end of a part, of whose gas the parameter leaves a share."""
+    lines.end(parts, lane, length)
     lane.halved = 0.5 * lane.mine.share
-    share = lane.halved + lane.halved
-    supplied_1, supplied_2 = share * lane.change.supplied_1, share * lane.change.supplied_2
-    lane.change = lane.change._replace(mass_1=share * lane.change.mass_1, supplied_1=supplied_1, supplied_2=supplied_2)
+    lane.next_lines = lane.next_lines._replace(mass_1=(lane.halved + lane.halved) * lane.next_lines.mass_1)
 
 
-def gas_of_mine(of_plant: PlainFunction | None) -> Any:
-    """The module of a gas that is isothermal but for its change of mass."""
+def lines_of_mine(of_plant: PlainFunction | None) -> Any:
+    """The module of lines that lose gas."""
 
     def groups(parts: Program) -> Groups:
-        """Groups of the gas, with the parameter and one that a phase hands on."""
-        return {**isothermal.groups(parts), "mine": given(Mine, of_plant), "halved": handed(float)}
+        """Groups of the lines, with the parameter and one that a phase hands on."""
+        return {**lines.groups(parts), "mine": given(Mine, of_plant), "halved": handed(float)}
 
-    made = ModuleType("gas_of_mine")
-    vars(made).update({name: value for name, value in vars(isothermal).items() if not name.startswith("__")})
-    made.groups, made.change = groups, change  # type: ignore[attr-defined]
+    made = ModuleType("lines_of_mine")
+    vars(made).update({name: value for name, value in vars(lines).items() if not name.startswith("__")})
+    made.groups, made.end = groups, end  # type: ignore[attr-defined]
     return made
 
 
-def with_gas_of_mine(of_plant: PlainFunction | None = None) -> Run:
-    run = plan_run(load_scenario("step-response", ("run.duration=20 ms",)))
-    return replace(run, program=replace(run.program, gas=gas_of_mine(of_plant)))
+def with_lines_of_mine(of_plant: PlainFunction | None = None) -> Run:
+    run = plan_run(load_scenario("step-response", LINES))
+    return replace(run, program=replace(run.program, feed=lines_of_mine(of_plant)))
 
 
-def test_a_parameter_of_a_gas_that_nothing_gives_is_refused_with_the_line_that_declares_it() -> None:
+def test_a_parameter_of_lines_that_nothing_gives_is_refused_with_the_line_that_declares_it() -> None:
     said = r"test_edits_of_the_step\.py:\d+: parameters: 'mine' must be a Mine\(share\); no value was given"
     with pytest.raises(ProgramError, match=said):
-        batch_of(with_gas_of_mine())
+        batch_of(with_lines_of_mine())
 
 
-def test_an_export_prepares_a_parameter_of_a_gas_that_follows_the_plant(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plan, "isothermal", gas_of_mine(half_of_it))
-    source = c_library(load_scenario("step-response", ("run.duration=20 ms",)))["step_response.c"].decode()
+def test_an_export_prepares_a_parameter_of_lines_that_follows_the_plant(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(step, "lines", lines_of_mine(half_of_it))
+    source = c_library(load_scenario("step-response", LINES))["step_response.c"].decode()
     assert "mine = half_of_it(plant)" in source
 
 
 @BACKENDS
-def test_a_gas_with_a_parameter_and_a_group_that_is_set_and_read_does_what_it_says(
+def test_lines_with_a_parameter_and_a_group_that_is_set_and_read_does_what_it_says(
     backend: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PPAFO_BACKEND", backend)
-    usual = run_batch(batch_of(plan_run(load_scenario("step-response", ("run.duration=20 ms",))))).record
-    records = [run_batch(batch_of(with_gas_of_mine(of_plant))).record for of_plant in (all_of_it, half_of_it)]
+    usual = run_batch(batch_of(plan_run(load_scenario("step-response", LINES)))).record
+    records = [run_batch(batch_of(with_lines_of_mine(of_plant))).record for of_plant in (all_of_it, half_of_it)]
     assert np.array_equal(records[0], usual)
     assert not np.array_equal(records[1], usual)
 

@@ -14,22 +14,12 @@ import pytest
 
 from ppafo.engine.compilers import FLAGS, Effort
 from ppafo.engine.run import batch_of
-from ppafo.engine.step import (
-    energy_balance,
-    foot,
-    isothermal,
-    lines,
-    meters,
-    phases,
-    sample,
-    stated,
-    walk,
-)
+from ppafo.engine.step import foot, gas, lines, meters, phases, sample, stated, walk
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.translation.c99 import program_source
 
-MODULES: list[ModuleType] = [*(energy_balance, foot, isothermal, lines, meters, phases, sample, stated, walk)]
+MODULES: list[ModuleType] = [*(foot, gas, lines, meters, phases, sample, stated, walk)]
 
 
 def functions() -> list[tuple[str, Callable[..., Any]]]:

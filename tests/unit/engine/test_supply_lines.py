@@ -10,7 +10,6 @@ import pytest
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
-from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
     Flows,
     GasStage,
@@ -19,6 +18,7 @@ from ppafo.engine.scheme.pneumatics import (
     gas_change,
     gas_flows,
     second_stage,
+    with_gas,
 )
 from ppafo.engine.scheme.supply_lines import lines_after, plant_at_line_pressures, with_lines
 from ppafo.model.orifice import orifice_flow
@@ -72,7 +72,7 @@ def flowing_now(plant: PlantParameters, state: PlantState, ports: tuple[SinglePo
 def end_of(plant: PlantParameters, begun: GasStage, ports: tuple[SinglePort, SinglePort], step: float) -> Flows:
     """What a step [s] adds [kg], from its first stage."""
     flowing = gas_flows(plant, begun.end_1, begun.end_2, *ports, single_port_flow).flows
-    return gas_change(plant, begun, second_stage(begun, begun.drift, flowing), step)
+    return gas_change(plant, begun.first, second_stage(begun, begun.drift, flowing), step)
 
 
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:

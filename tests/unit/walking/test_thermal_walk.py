@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.engine.step import energy_balance
 from ppafo.errors import ScenarioError
 from ppafo.metrics import evaluate
 from ppafo.simulation.plan import plan_run
@@ -37,7 +36,7 @@ def test_warm_gas_has_steps_that_follow_the_faster_chambers() -> None:
     assert warm.program.is_thermal
     assert not plain.program.is_thermal
     assert plain.step / warm.step >= 1.0
-    assert warm.program == replace(plain.program, gas=energy_balance)
+    assert warm.program == replace(plain.program, is_thermal=True)
 
 
 @pytest.mark.parametrize("name", ["solenoid", "solenoid-regulators"])

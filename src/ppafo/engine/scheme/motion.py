@@ -11,7 +11,7 @@ A step may be divided into parts. Each part ends at an abrupt change, and its le
 import math
 from typing import NamedTuple
 
-from ppafo.engine.scheme.pneumatics import Flows, HeldChambers
+from ppafo.engine.scheme.pneumatics import HeldChambers
 from ppafo.model.plant import (
     ActuatorFunctions,
     PlantParameters,
@@ -483,16 +483,3 @@ def depart_free(
 def with_motion(state: PlantState, angle: float, angular_velocity: float) -> PlantState:
     """State with a new angle [rad] and angular velocity [rad/s]."""
     return state._replace(angle=angle, angular_velocity=angular_velocity)
-
-
-def with_gas(state: PlantState, gas: Flows) -> PlantState:
-    """State of the plant after adding the gas of a step [kg], with the angle and the angular velocity unchanged."""
-    supplied = gas.supplied_1 + gas.supplied_2
-    vented = supplied - gas.mass_1 - gas.mass_2
-    return state._replace(
-        mass_1=state.mass_1 + gas.mass_1,
-        mass_2=state.mass_2 + gas.mass_2,
-        supplied_mass=state.supplied_mass + supplied,
-        vented_mass=state.vented_mass + vented,
-        leaked_mass=state.leaked_mass + abs(gas.leaked),
-    )

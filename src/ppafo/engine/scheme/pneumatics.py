@@ -99,7 +99,6 @@ class Linearisation(NamedTuple):
 
     Attributes:
         a, b, c, d: matrix elements by rows [-]
-        scale: 1 divided by the determinant [-]
         supplied_by_1, supplied_by_2: gamma h times the derivatives of both supply flows, each by its chamber's mass [-]
 
     The leakage needs no elements of its own: gamma h times its derivatives are ``-c`` and ``b``.
@@ -109,7 +108,6 @@ class Linearisation(NamedTuple):
     b: float
     c: float
     d: float
-    scale: float
     supplied_by_1: float
     supplied_by_2: float
 
@@ -117,10 +115,12 @@ class Linearisation(NamedTuple):
 class GasStage(NamedTuple):
     """First stage of a step: linearised flows, stage slopes [kg/s], and absolute pressures [Pa] after the stage.
 
-    ``drift`` is gamma h times the time derivative of all flows between moving volumes [kg/s].
+    ``scale`` [-] is 1 divided by the determinant of the matrix, ``drift`` gamma h times the time derivative of all
+    flows between moving volumes [kg/s].
     """
 
     linear: Linearisation
+    scale: float
     first: Flows
     drift: Flows
     end_1: float
@@ -176,13 +176,13 @@ def added_flows(one: Flows, other: Flows) -> Flows:
     )
 
 
-def solve_stage(linear: Linearisation, right: Flows) -> Flows:
+def solve_stage(linear: Linearisation, scale: float, right: Flows) -> Flows:
     """Stage slopes k [kg/s] from the right-hand sides of both masses and both totals [kg/s].
 
     ``(1 - gamma h J) k = right`` is solved by Cramer's rule; the totals follow, because no flow depends on them.
     """
-    rate_1 = (linear.d * right.mass_1 - linear.b * right.mass_2) * linear.scale
-    rate_2 = (linear.a * right.mass_2 - linear.c * right.mass_1) * linear.scale
+    rate_1 = (linear.d * right.mass_1 - linear.b * right.mass_2) * scale
+    rate_2 = (linear.a * right.mass_2 - linear.c * right.mass_1) * scale
     return Flows(
         mass_1=rate_1,
         mass_2=rate_2,
@@ -199,20 +199,19 @@ def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: 
     """
     weight_1 = GAMMA * step * per_mass_1
     weight_2 = GAMMA * step * per_mass_2
-    a = 1.0 - (flowing.slopes_1.total - flowing.leak_by_1) * weight_1
-    b = flowing.leak_by_2 * weight_2
-    c = -flowing.leak_by_1 * weight_1
-    d = 1.0 - (flowing.slopes_2.total + flowing.leak_by_2) * weight_2
-    scale = 1.0 / (a * d - b * c)
     return Linearisation(
-        a=a,
-        b=b,
-        c=c,
-        d=d,
-        scale=scale,
+        a=1.0 - (flowing.slopes_1.total - flowing.leak_by_1) * weight_1,
+        b=flowing.leak_by_2 * weight_2,
+        c=-flowing.leak_by_1 * weight_1,
+        d=1.0 - (flowing.slopes_2.total + flowing.leak_by_2) * weight_2,
         supplied_by_1=flowing.slopes_1.from_source * weight_1,
         supplied_by_2=flowing.slopes_2.from_source * weight_2,
     )
+
+
+def inverse_determinant(a: float, b: float, c: float, d: float) -> float:
+    """One divided by the determinant of a matrix [-], whose elements are given by rows."""
+    return 1.0 / (a * d - b * c)
 
 
 def begin_still_gas(
@@ -226,11 +225,12 @@ def begin_still_gas(
 ) -> GasStage:
     """First stage of one step [s] with a vane at rest."""
     linear = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
-    first = solve_stage(linear, flow_rates(flowing.flows))
+    scale = inverse_determinant(linear.a, linear.b, linear.c, linear.d)
+    first = solve_stage(linear, scale, flow_rates(flowing.flows))
     # Pressures as in a step with moving volumes: a locked joint has the bits of an exported plant at rest.
     ended = state._replace(mass_1=state.mass_1 + step * first.mass_1, mass_2=state.mass_2 + step * first.mass_2)
     end_1, end_2 = parts.held_pressures(plant, held, ended)
-    return GasStage(linear=linear, first=first, drift=STILL, end_1=end_1, end_2=end_2)
+    return GasStage(linear=linear, scale=scale, first=first, drift=STILL, end_1=end_1, end_2=end_2)
 
 
 def begin_moving_gas(
@@ -262,25 +262,28 @@ def begin_moving_gas(
         pressure_1 * (here.volume_1 - ahead.volume_1) * per_duration,
         pressure_2 * (here.volume_2 - ahead.volume_2) * per_duration,
     )
-    first = solve_stage(linear, added_flows(flow_rates(flowing.flows), drift))
+    scale = inverse_determinant(linear.a, linear.b, linear.c, linear.d)
+    first = solve_stage(linear, scale, added_flows(flow_rates(flowing.flows), drift))
     end_1, end_2 = parts.pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
-    return GasStage(linear=linear, first=first, drift=drift, end_1=end_1, end_2=end_2)
+    return GasStage(linear=linear, scale=scale, first=first, drift=drift, end_1=end_1, end_2=end_2)
 
 
-def second_stage(begun: GasStage, drift: Flows, flowing: GasFlows) -> Flows:
-    """Slopes of the second stage [kg/s], from the flows after the first."""
-    flows = flow_rates(flowing)
-    first = begun.first
-    right = Flows(
+def second_right(flows: Flows, first: Flows, drift: Flows) -> Flows:
+    """Right-hand sides of the second stage [kg/s]: the flows after the first, less twice that stage and the drift."""
+    return Flows(
         mass_1=flows.mass_1 - 2.0 * first.mass_1 - drift.mass_1,
         mass_2=flows.mass_2 - 2.0 * first.mass_2 - drift.mass_2,
         supplied_1=flows.supplied_1 - 2.0 * first.supplied_1 - drift.supplied_1,
         supplied_2=flows.supplied_2 - 2.0 * first.supplied_2 - drift.supplied_2,
         leaked=flows.leaked - 2.0 * first.leaked - drift.leaked,
     )
-    return solve_stage(begun.linear, right)
+
+
+def second_stage(begun: GasStage, drift: Flows, flowing: GasFlows) -> Flows:
+    """Slopes of the second stage [kg/s], from the flows after the first."""
+    return solve_stage(begun.linear, begun.scale, second_right(flow_rates(flowing), begun.first, drift))
 
 
 def of_both_stages(first: float, second: float, step: float) -> float:
@@ -296,30 +299,76 @@ def refused_backflow(plant: PlantParameters, supplied: float) -> float:
     return admitted_flow(supplied, plant.relieving) - supplied
 
 
-def gas_change(plant: PlantParameters, begun: GasStage, second: Flows, step: float) -> Flows:
-    """Changes [kg] in one step [s], from both stages."""
-    first = begun.first
-    supplied_1 = of_both_stages(first.supplied_1, second.supplied_1, step)
-    supplied_2 = of_both_stages(first.supplied_2, second.supplied_2, step)
-    kept_1 = refused_backflow(plant, supplied_1)
-    kept_2 = refused_backflow(plant, supplied_2)
+def change_by_stages(first: Flows, second: Flows, step: float, kept_1: float, kept_2: float) -> Flows:
+    """Changes [kg] in one step [s] from both stages, with what the supplies did not take back [kg]."""
     return Flows(
         mass_1=of_both_stages(first.mass_1, second.mass_1, step) + kept_1,
         mass_2=of_both_stages(first.mass_2, second.mass_2, step) + kept_2,
-        supplied_1=supplied_1 + kept_1,
-        supplied_2=supplied_2 + kept_2,
+        supplied_1=of_both_stages(first.supplied_1, second.supplied_1, step) + kept_1,
+        supplied_2=of_both_stages(first.supplied_2, second.supplied_2, step) + kept_2,
         leaked=of_both_stages(first.leaked, second.leaked, step),
     )
 
 
-def gas_error(
+def kept_gas(plant: PlantParameters, first: Flows, second: Flows, step: float) -> tuple[float, float]:
+    """Gas [kg] that either supply did not take back in one step [s], from both stages."""
+    kept_1 = refused_backflow(plant, of_both_stages(first.supplied_1, second.supplied_1, step))
+    return kept_1, refused_backflow(plant, of_both_stages(first.supplied_2, second.supplied_2, step))
+
+
+def gas_change(plant: PlantParameters, first: Flows, second: Flows, step: float) -> Flows:
+    """Changes [kg] in one step [s], from both stages."""
+    kept_1, kept_2 = kept_gas(plant, first, second, step)
+    return change_by_stages(first, second, step, kept_1, kept_2)
+
+
+def with_gas(state: PlantState, gas: Flows) -> PlantState:
+    """State of the plant after adding the gas of a step [kg], with the angle and the angular velocity unchanged."""
+    supplied = gas.supplied_1 + gas.supplied_2
+    vented = supplied - gas.mass_1 - gas.mass_2
+    return state._replace(
+        mass_1=state.mass_1 + gas.mass_1,
+        mass_2=state.mass_2 + gas.mass_2,
+        supplied_mass=state.supplied_mass + supplied,
+        vented_mass=state.vented_mass + vented,
+        leaked_mass=state.leaked_mass + abs(gas.leaked),
+    )
+
+
+OF_STAGES = 0.5 / ALLOWED_OF_PRESSURE
+"""Weight of a step's error: half the sum of both stages, divided by the allowed error [-]."""
+OF_OPENING = 1.0 / (12.0 * GAMMA * ALLOWED_OF_PRESSURE)
+"""Weight of the error due to a moving valve: the mean of a product exceeds that of means by a twelfth of both changes.
+
+The matrix of the step gives gamma times the change of the flow.
+"""
+
+
+def pressure_error(
     plant: PlantParameters,
-    begun: GasStage,
-    second: Flows,
+    weight: float,
+    rate_1: float,
+    rate_2: float,
+    end_1: float,
+    end_2: float,
     next_angle: float,
     step: float,
     *,
     parts: ActuatorFunctions,
+) -> float:
+    """Larger ratio of the error of a pressure in a step [s] to the allowed error [-], from error rates [kg/s].
+
+    ``end_1`` and ``end_2`` [Pa] are the pressures after the first stage, ``weight`` is ``OF_STAGES``, or ``OF_OPENING``
+    times the relative change of the opening; with that the error rates are those of ``opening_response``.
+    """
+    volume_1, volume_2 = parts.rest_volumes(plant, next_angle)
+    content_1 = volume_1 * pressure_that_matters(plant, end_1)
+    content_2 = volume_2 * pressure_that_matters(plant, end_2)
+    return weight * step * plant.gas_product * larger_share(abs(rate_1), content_1, abs(rate_2), content_2)
+
+
+def gas_error(
+    plant: PlantParameters, begun: GasStage, second: Flows, next_angle: float, step: float, *, parts: ActuatorFunctions
 ) -> float:
     """Ratio of the estimated error of both pressures at the end of a step [s] to the allowed error [-].
 
@@ -327,48 +376,17 @@ def gas_error(
     chamber does not require short steps. Gas that a supply without relief would have taken back inside the step is
     added.
     """
-    linear = begun.linear
-    refused_1 = refused_backflow(plant, of_both_stages(begun.first.supplied_1, second.supplied_1, 1.0))
-    refused_2 = refused_backflow(plant, of_both_stages(begun.first.supplied_2, second.supplied_2, 1.0))
-    added_1 = linear.d * (begun.first.mass_1 + second.mass_1) - linear.b * (begun.first.mass_2 + second.mass_2)
-    added_2 = linear.a * (begun.first.mass_2 + second.mass_2) - linear.c * (begun.first.mass_1 + second.mass_1)
-    volume_1, volume_2 = parts.rest_volumes(plant, next_angle)
+    refused_1, refused_2 = kept_gas(plant, begun.first, second, 1.0)
     # Damped by the matrix once, not twice: the estimate stays above the error that it stands for.
-    scale = abs(linear.scale)
-    content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)
-    content_2 = volume_2 * pressure_that_matters(plant, begun.end_2)
-    missed = larger_share(scale * abs(added_1) + refused_1, content_1, scale * abs(added_2) + refused_2, content_2)
-    return 0.5 / ALLOWED_OF_PRESSURE * step * plant.gas_product * missed
+    damped = solve_stage(begun.linear, begun.scale, added_flows(begun.first, second))
+    missed_1, missed_2 = abs(damped.mass_1) + refused_1, abs(damped.mass_2) + refused_2
+    return pressure_error(plant, OF_STAGES, missed_1, missed_2, begun.end_1, begun.end_2, next_angle, step, parts=parts)
 
 
 def larger_share(part_1: float, whole_1: float, part_2: float, whole_2: float) -> float:
     """Larger of ``part_1 / whole_1`` and ``part_2 / whole_2`` with positive denominators, in one division."""
     # A division costs ten products.
     return max(part_1 * whole_2, part_2 * whole_1) / (whole_1 * whole_2)
-
-
-def opening_error(
-    plant: PlantParameters,
-    begun: GasStage,
-    shift: float,
-    next_angle: float,
-    step: float,
-    *,
-    parts: ActuatorFunctions,
-) -> float:
-    """Error due to using the mean valve opening of a step [s], divided by the allowed error [-].
-
-    ``shift`` [-] is the relative change of the opening. Opening and flow change together, and the mean misses a twelfth
-    of the product of both changes; the matrix of the step gives the change of the flow.
-    """
-    volume_1, volume_2 = parts.rest_volumes(plant, next_angle)
-    response_1 = abs(begun.linear.a - 1.0) * abs(begun.first.mass_1)
-    response_2 = abs(begun.linear.d - 1.0) * abs(begun.first.mass_2)
-    content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)
-    content_2 = volume_2 * pressure_that_matters(plant, begun.end_2)
-    # A twelfth of the product of both changes is what the mean of a product exceeds the product of means by.
-    weight = 1.0 / (12.0 * GAMMA * ALLOWED_OF_PRESSURE)
-    return weight * shift * step * plant.gas_product * larger_share(response_1, content_1, response_2, content_2)
 
 
 def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:

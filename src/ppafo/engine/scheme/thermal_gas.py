@@ -3,7 +3,8 @@
 The energy of a chamber is expressed as its gas content, ``P V M / (R T_0)`` [kg]: the mass that would give its pressure
 at the reference temperature. Content divided by true mass is ``T / T_0``. Gas from the source and from the atmosphere
 enters at ``T_0``. For isothermal gas the content is the mass, so that code which reads pressures from ``PlantState``
-applies unchanged; the true masses are stored in addition. The matrix neglects the dependence of the flows on the
+applies unchanged; the true masses are stored in addition. True masses and the contents that the gas carries are both
+``Flows`` as of isothermal gas, with a ratio for each path. The matrix neglects the dependence of the flows on the
 upstream temperature, which changes no faster than a chamber fills; the method keeps its order with any matrix.
 
 A chamber may expand under pressure. With its volume ``V(angle, P)``, part of the entering energy becomes work on the
@@ -24,72 +25,66 @@ import math
 from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import (
-    ALLOWED_OF_PRESSURE,
     GAMMA,
+    OF_STAGES,
     SHORTEST,
+    Flows,
     GasFlows,
+    Linearisation,
     SlopedFlows,
-    pressure_that_matters,
-    refused_backflow,
+    added_flows,
+    change_by_stages,
+    flow_rates,
+    inverse_determinant,
+    kept_gas,
+    linearise,
+    of_both_stages,
+    pressure_error,
+    response,
+    second_right,
+    with_gas,
 )
 from ppafo.model.gas import enthalpy_flow_ratio, mass_flow_ratio
 from ppafo.model.plant import (
     ActuatorFunctions,
     PlantParameters,
     PlantState,
+    PortFlow,
+    PortSlopes,
     ThermalParameters,
     ThermalState,
 )
+
+ALLOWED_OF_TEMPERATURE = 2.5e-4
+"""Allowed error of one step divided by the reference temperature [-]; the error of a run then stays below 2e-3."""
+NEARLY_EQUAL = 1.0e-4
+"""Relative difference of two pressures [-] below which the flow may reverse within a step."""
+
+
+class WarmGas(NamedTuple):
+    """Gas in both chambers: contents and true masses [kg]."""
+
+    content_1: float
+    content_2: float
+    mass_1: float
+    mass_2: float
 
 
 class ThermalFlows(NamedTuple):
     """Rates of gas with an energy balance [kg/s].
 
     Attributes:
-        content_1, content_2: contents of both chambers
-        mass_1, mass_2: true masses of both chambers
-        supplied_1, supplied_2: masses drawn from both supplies
-        leaked: mass through the vane leakage from chamber 1 to 2
-        source_content: content drawn from the source
-        port_content: content through both ports
+        mass_1, mass_2: contents of both chambers, the masses of ``PlantState``
+        gas: true masses
+        energy: contents that the gas carries through ports and leakage
         heat: content equivalent to the heat from the chamber walls
     """
 
-    content_1: float
-    content_2: float
     mass_1: float
     mass_2: float
-    supplied_1: float
-    supplied_2: float
-    leaked: float
-    source_content: float
-    port_content: float
+    gas: Flows
+    energy: Flows
     heat: float
-
-
-class _FlowSlopes(NamedTuple):
-    """Gamma h times the derivatives of ``ThermalFlows`` with respect to both contents [-], without walls and work.
-
-    Derivatives of contents apply to the content that enters the chambers; the chambers retain the fractions ``kept_1``
-    and ``kept_2`` [-].
-    """
-
-    content_1_by_1: float
-    content_1_by_2: float
-    content_2_by_1: float
-    content_2_by_2: float
-    mass_1_by_1: float
-    mass_1_by_2: float
-    mass_2_by_1: float
-    mass_2_by_2: float
-    supplied_by_1: float
-    supplied_by_2: float
-    leaked_by_1: float
-    leaked_by_2: float
-    source_content_by_1: float
-    source_content_by_2: float
-    kept_1: float
-    kept_2: float
 
 
 class WarmChambers(NamedTuple):
@@ -106,37 +101,95 @@ class WarmChambers(NamedTuple):
     give_2: float
 
 
-class Transport(NamedTuple):
-    """Mass and content carried by a flow, each divided by the flow at the reference temperature [-]."""
+class PathRatios(NamedTuple):
+    """A number for the gas in each path [-]: ``sqrt(T / T_0)`` upstream, or a flow over that at ``T_0``."""
 
-    mass: float
-    content: float
-
-
-def transport(thermal: ThermalParameters, flow: float, root_from: float, root_to: float) -> Transport:
-    """Mass and content carried by a flow according to its direction; roots are ``sqrt(T / T_0)`` [-]."""
-    root = root_from if flow >= 0.0 else root_to
-    return Transport(mass_flow_ratio(root), enthalpy_flow_ratio(root, thermal.heat_capacity_ratio))
+    source_1: float
+    vent_1: float
+    source_2: float
+    vent_2: float
+    leak: float
 
 
-ALLOWED_OF_TEMPERATURE = 2.5e-4
-"""Allowed error of one step divided by the reference temperature [-]; the error of a run then stays below 2e-3."""
-NEARLY_EQUAL = 1.0e-4
-"""Relative difference of two pressures [-] below which the flow may reverse within a step."""
+def upstream_roots(gas: WarmGas, flowing: GasFlows) -> PathRatios:
+    """Roots ``sqrt(T / T_0)`` of the gas in each path [-], according to the direction of its flow."""
+    root_1, root_2 = math.sqrt(gas.content_1 / gas.mass_1), math.sqrt(gas.content_2 / gas.mass_2)
+    in_1, in_2 = flowing.in_1, flowing.in_2
+    return PathRatios(
+        source_1=1.0 if in_1.from_source >= 0.0 else root_1,
+        vent_1=1.0 if in_1.total - in_1.from_source >= 0.0 else root_1,
+        source_2=1.0 if in_2.from_source >= 0.0 else root_2,
+        vent_2=1.0 if in_2.total - in_2.from_source >= 0.0 else root_2,
+        leak=root_1 if flowing.leak >= 0.0 else root_2,
+    )
 
 
-def steeper_transport(
-    thermal: ThermalParameters, flow: float, turns: float, root_from: float, root_to: float
-) -> Transport:
-    """Transport of a flow [kg/s]; the larger value of both sides below ``turns`` [kg/s], where the flow may reverse.
+def steeper_roots(gas: WarmGas, flowing: SlopedFlows, per_content_1: float, per_content_2: float) -> PathRatios:
+    """Roots as ``upstream_roots``; the larger value of both sides in a vent whose flow may reverse within the step.
 
     When the flow of a settled chamber reverses, outflowing cold gas becomes inflowing warm gas, more than the matrix
     assumes. A matrix that is too steep damps this error; a matrix that is too flat lets the error grow from step to
-    step.
+    step. Pressures divided by contents are in Pa/kg.
     """
-    steeper = max(root_from, root_to)
-    is_settled = abs(flow) < turns
-    return transport(thermal, flow, steeper if is_settled else root_from, steeper if is_settled else root_to)
+    flows = flowing.flows
+    roots = upstream_roots(gas, flows)
+    slope_1 = flowing.slopes_1.total - flowing.slopes_1.from_source
+    slope_2 = flowing.slopes_2.total - flowing.slopes_2.from_source
+    turns_1 = abs(slope_1) * (NEARLY_EQUAL * per_content_1 * gas.content_1)
+    turns_2 = abs(slope_2) * (NEARLY_EQUAL * per_content_2 * gas.content_2)
+    steeper_1 = max(1.0, math.sqrt(gas.content_1 / gas.mass_1))
+    steeper_2 = max(1.0, math.sqrt(gas.content_2 / gas.mass_2))
+    return roots._replace(
+        vent_1=steeper_1 if abs(flows.in_1.total - flows.in_1.from_source) < turns_1 else roots.vent_1,
+        vent_2=steeper_2 if abs(flows.in_2.total - flows.in_2.from_source) < turns_2 else roots.vent_2,
+    )
+
+
+def mass_ratios(roots: PathRatios) -> PathRatios:
+    """Mass flow in each path over that at the reference temperature [-]."""
+    return PathRatios(
+        source_1=mass_flow_ratio(roots.source_1),
+        vent_1=mass_flow_ratio(roots.vent_1),
+        source_2=mass_flow_ratio(roots.source_2),
+        vent_2=mass_flow_ratio(roots.vent_2),
+        leak=mass_flow_ratio(roots.leak),
+    )
+
+
+def enthalpy_ratios(thermal: ThermalParameters, roots: PathRatios) -> PathRatios:
+    """Content that the gas in each path carries, over its mass flow at the reference temperature [-]."""
+    ratio = thermal.heat_capacity_ratio
+    return PathRatios(
+        source_1=enthalpy_flow_ratio(roots.source_1, ratio),
+        vent_1=enthalpy_flow_ratio(roots.vent_1, ratio),
+        source_2=enthalpy_flow_ratio(roots.source_2, ratio),
+        vent_2=enthalpy_flow_ratio(roots.vent_2, ratio),
+        leak=enthalpy_flow_ratio(roots.leak, ratio),
+    )
+
+
+def carried(flowing: GasFlows, by: PathRatios) -> GasFlows:
+    """Flows [kg/s], each times the ratio of its path."""
+    in_1, in_2 = flowing.in_1, flowing.in_2
+    fed_1, fed_2 = in_1.from_source * by.source_1, in_2.from_source * by.source_2
+    return GasFlows(
+        PortFlow(fed_1 + (in_1.total - in_1.from_source) * by.vent_1, fed_1),
+        PortFlow(fed_2 + (in_2.total - in_2.from_source) * by.vent_2, fed_2),
+        flowing.leak * by.leak,
+    )
+
+
+def carried_slopes(flowing: SlopedFlows, by: PathRatios) -> SlopedFlows:
+    """Flows whose derivatives are those of what each path carries; their temperature is constant."""
+    to_1, to_2 = flowing.slopes_1, flowing.slopes_2
+    fed_1, fed_2 = to_1.from_source * by.source_1, to_2.from_source * by.source_2
+    return SlopedFlows(
+        flowing.flows,
+        PortSlopes(fed_1 + (to_1.total - to_1.from_source) * by.vent_1, fed_1),
+        PortSlopes(fed_2 + (to_2.total - to_2.from_source) * by.vent_2, fed_2),
+        flowing.leak_by_1 * by.leak,
+        flowing.leak_by_2 * by.leak,
+    )
 
 
 def wall_rate(thermal: ThermalParameters, volume: float, content: float, mass: float) -> float:
@@ -155,209 +208,104 @@ def content_rate(thermal: ThermalParameters, entering: float, work: float, heat:
     return (entering * kept - work + heat * kept) / (1.0 + thermal.heat_capacity_ratio * give)
 
 
-def thermal_flows(
-    thermal: ThermalParameters,
-    state: PlantState,
-    masses: ThermalState,
-    at: WarmChambers,
-    flowing: GasFlows,
-) -> ThermalFlows:
+def thermal_flows(thermal: ThermalParameters, gas: WarmGas, at: WarmChambers, flowing: GasFlows) -> ThermalFlows:
     """All rates of gas with an energy balance [kg/s], from the flows at the reference temperature [kg/s]."""
-    in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
-    root_1 = math.sqrt(state.mass_1 / masses.mass_1)
-    root_2 = math.sqrt(state.mass_2 / masses.mass_2)
-    vent_1 = in_1.total - in_1.from_source
-    vent_2 = in_2.total - in_2.from_source
-    source_1_carries = transport(thermal, in_1.from_source, 1.0, root_1)
-    source_2_carries = transport(thermal, in_2.from_source, 1.0, root_2)
-    vent_1_carries = transport(thermal, vent_1, 1.0, root_1)
-    vent_2_carries = transport(thermal, vent_2, 1.0, root_2)
-    leak_carries = transport(thermal, leak, root_1, root_2)
-    supplied_1 = in_1.from_source * source_1_carries.mass
-    supplied_2 = in_2.from_source * source_2_carries.mass
-    leaked = leak * leak_carries.mass
-    source_1 = in_1.from_source * source_1_carries.content
-    source_2 = in_2.from_source * source_2_carries.content
-    enthalpy_1 = source_1 + vent_1 * vent_1_carries.content
-    enthalpy_2 = source_2 + vent_2 * vent_2_carries.content
-    heat_1 = wall_rate(thermal, at.volume_1, state.mass_1, masses.mass_1)
-    heat_2 = wall_rate(thermal, at.volume_2, state.mass_2, masses.mass_2)
-    leaked_enthalpy = leak * leak_carries.content
+    roots = upstream_roots(gas, flowing)
+    energy = flow_rates(carried(flowing, enthalpy_ratios(thermal, roots)))
+    heat_1 = wall_rate(thermal, at.volume_1, gas.content_1, gas.mass_1)
+    heat_2 = wall_rate(thermal, at.volume_2, gas.content_2, gas.mass_2)
     # In units of content, the work P dV of a chamber is (k - 1) times its content over its volume.
     less = thermal.heat_capacity_ratio - 1.0
-    work_1 = less * at.growth_1 * state.mass_1 / at.volume_1
-    work_2 = less * at.growth_2 * state.mass_2 / at.volume_2
+    work_1 = less * at.growth_1 * gas.content_1 / at.volume_1
+    work_2 = less * at.growth_2 * gas.content_2 / at.volume_2
     return ThermalFlows(
-        content_1=content_rate(thermal, enthalpy_1 - leaked_enthalpy, work_1, heat_1, at.give_1),
-        content_2=content_rate(thermal, enthalpy_2 + leaked_enthalpy, work_2, heat_2, at.give_2),
-        mass_1=supplied_1 + vent_1 * vent_1_carries.mass - leaked,
-        mass_2=supplied_2 + vent_2 * vent_2_carries.mass + leaked,
-        supplied_1=supplied_1,
-        supplied_2=supplied_2,
-        leaked=leaked,
-        source_content=source_1 + source_2,
-        port_content=enthalpy_1 + enthalpy_2,
+        mass_1=content_rate(thermal, energy.mass_1, work_1, heat_1, at.give_1),
+        mass_2=content_rate(thermal, energy.mass_2, work_2, heat_2, at.give_2),
+        gas=flow_rates(carried(flowing, mass_ratios(roots))),
+        energy=energy,
         heat=heat_1 + heat_2,
     )
 
 
-def flow_slopes(
-    thermal: ThermalParameters,
-    root_1: float,
-    root_2: float,
-    weight_1: float,
-    weight_2: float,
-    flowing: SlopedFlows,
-    near_1: float,
-    near_2: float,
-    at: WarmChambers,
-) -> _FlowSlopes:
-    """Gamma h times the derivatives of all flows with respect to both contents [-].
-
-    ``root_1`` and ``root_2`` are ``sqrt(T / T_0)`` of both chambers [-]. The weights are gamma h times pressure divided
-    by content [Pa s/kg]. ``near_1`` and ``near_2`` [Pa] are pressure differences below which a flow may reverse.
-    """
-    in_1, in_2, leak = flowing.flows.in_1, flowing.flows.in_2, flowing.flows.leak
-    slopes_1, slopes_2 = flowing.slopes_1, flowing.slopes_2
-    leak_carries = transport(thermal, leak, root_1, root_2)
-    source_1 = transport(thermal, in_1.from_source, 1.0, root_1)
-    source_2 = transport(thermal, in_2.from_source, 1.0, root_2)
-    vent_slope_1 = slopes_1.total - slopes_1.from_source
-    vent_slope_2 = slopes_2.total - slopes_2.from_source
-    turns_1, turns_2 = abs(vent_slope_1) * near_1, abs(vent_slope_2) * near_2
-    vent_1 = steeper_transport(thermal, in_1.total - in_1.from_source, turns_1, 1.0, root_1)
-    vent_2 = steeper_transport(thermal, in_2.total - in_2.from_source, turns_2, 1.0, root_2)
-    by_1 = flowing.leak_by_1 * weight_1
-    by_2 = flowing.leak_by_2 * weight_2
-    return _FlowSlopes(
-        content_1_by_1=(slopes_1.from_source * source_1.content + vent_slope_1 * vent_1.content) * weight_1
-        - by_1 * leak_carries.content,
-        content_1_by_2=-by_2 * leak_carries.content,
-        content_2_by_1=by_1 * leak_carries.content,
-        content_2_by_2=(slopes_2.from_source * source_2.content + vent_slope_2 * vent_2.content) * weight_2
-        + by_2 * leak_carries.content,
-        mass_1_by_1=(slopes_1.from_source * source_1.mass + vent_slope_1 * vent_1.mass) * weight_1
-        - by_1 * leak_carries.mass,
-        mass_1_by_2=-by_2 * leak_carries.mass,
-        mass_2_by_1=by_1 * leak_carries.mass,
-        mass_2_by_2=(slopes_2.from_source * source_2.mass + vent_slope_2 * vent_2.mass) * weight_2
-        + by_2 * leak_carries.mass,
-        supplied_by_1=slopes_1.from_source * source_1.mass * weight_1,
-        supplied_by_2=slopes_2.from_source * source_2.mass * weight_2,
-        leaked_by_1=by_1 * leak_carries.mass,
-        leaked_by_2=by_2 * leak_carries.mass,
-        source_content_by_1=slopes_1.from_source * source_1.content * weight_1,
-        source_content_by_2=slopes_2.from_source * source_2.content * weight_2,
-        kept_1=kept_share(thermal.heat_capacity_ratio, at.give_1),
-        kept_2=kept_share(thermal.heat_capacity_ratio, at.give_2),
-    )
-
-
-def flow_response(slopes: _FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
-    """Gamma h times the rate of change of all flows except heat [kg/s], for given rates of both contents [kg/s]."""
-    return ThermalFlows(
-        content_1=slopes.kept_1 * (slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2),
-        content_2=slopes.kept_2 * (slopes.content_2_by_1 * content_1 + slopes.content_2_by_2 * content_2),
-        mass_1=slopes.mass_1_by_1 * content_1 + slopes.mass_1_by_2 * content_2,
-        mass_2=slopes.mass_2_by_1 * content_1 + slopes.mass_2_by_2 * content_2,
-        supplied_1=slopes.supplied_by_1 * content_1,
-        supplied_2=slopes.supplied_by_2 * content_2,
-        leaked=slopes.leaked_by_1 * content_1 + slopes.leaked_by_2 * content_2,
-        source_content=slopes.source_content_by_1 * content_1 + slopes.source_content_by_2 * content_2,
-        port_content=(slopes.content_1_by_1 + slopes.content_2_by_1) * content_1
-        + (slopes.content_1_by_2 + slopes.content_2_by_2) * content_2,
-        heat=0.0,
-    )
-
-
-def combine_flows(one: ThermalFlows, factor_one: float, other: ThermalFlows, factor_other: float) -> ThermalFlows:
-    """Sum of two sets of rates [kg/s], each multiplied by a factor [-]."""
-    return ThermalFlows(
-        content_1=factor_one * one.content_1 + factor_other * other.content_1,
-        content_2=factor_one * one.content_2 + factor_other * other.content_2,
-        mass_1=factor_one * one.mass_1 + factor_other * other.mass_1,
-        mass_2=factor_one * one.mass_2 + factor_other * other.mass_2,
-        supplied_1=factor_one * one.supplied_1 + factor_other * other.supplied_1,
-        supplied_2=factor_one * one.supplied_2 + factor_other * other.supplied_2,
-        leaked=factor_one * one.leaked + factor_other * other.leaked,
-        source_content=factor_one * one.source_content + factor_other * other.source_content,
-        port_content=factor_one * one.port_content + factor_other * other.port_content,
-        heat=factor_one * one.heat + factor_other * other.heat,
-    )
-
-
-class _ThermalMatrix(NamedTuple):
-    """Matrix of a step with an energy balance, after elimination of the masses.
+class ThermalMatrix(NamedTuple):
+    """Matrix of a step with an energy balance, after elimination of the true masses.
 
     Attributes:
-        slopes: derivatives of all flows with respect to both contents
-        a, b, c, d: matrix elements by rows [-]
-        scale: 1 divided by the determinant [-]
+        a, b, c, d: matrix elements by rows, for the contents [-]
+        gas, energy: derivatives of true masses and of carried contents with respect to the contents
+        kept_1, kept_2: fractions of the entering energy that stay in the chambers [-]
         wall_1, wall_2: gamma h times the derivatives of the wall heat with respect to the masses [-]
         cooling_1, cooling_2: gamma h times the decrease of the wall heat with the contents [-]
     """
 
-    slopes: _FlowSlopes
     a: float
     b: float
     c: float
     d: float
-    scale: float
+    gas: Linearisation
+    energy: Linearisation
+    kept_1: float
+    kept_2: float
     wall_1: float
     wall_2: float
     cooling_1: float
     cooling_2: float
 
 
-class ThermalGas(NamedTuple):
+class ThermalStage(NamedTuple):
     """First stage of a step with an energy balance.
 
     Attributes:
-        matrix: matrix of the step
+        linear: matrix of the step
+        scale: 1 divided by the determinant of the matrix [-]
         first: stage slopes [kg/s]
-        drift: gamma h times the time derivatives of all flows [kg/s]
-        end: state of the plant after the stage
-        end_masses: true masses and totals after the stage
-        ended: chambers after the stage
+        lost_1, lost_2: rates of the contents that lower the pressures as the growing volumes do [kg/s]
+        gas, at: gas and chambers after the stage
+        end_1, end_2: absolute pressures after the stage [Pa]
     """
 
-    matrix: _ThermalMatrix
+    linear: ThermalMatrix
+    scale: float
     first: ThermalFlows
-    drift: ThermalFlows
-    end: PlantState
-    end_masses: ThermalState
-    ended: WarmChambers
+    lost_1: float
+    lost_2: float
+    gas: WarmGas
+    at: WarmChambers
+    end_1: float
+    end_2: float
 
 
 def thermal_matrix(
+    plant: PlantParameters,
     thermal: ThermalParameters,
-    state: PlantState,
-    masses: ThermalState,
+    gas: WarmGas,
     at: WarmChambers,
-    weight: float,
-    slopes: _FlowSlopes,
-) -> _ThermalMatrix:
-    """Matrix of a step with an energy balance; ``weight`` is gamma h [s]."""
-    cooling_1 = weight * thermal.wall_exchange * at.volume_1 / masses.mass_1
-    cooling_2 = weight * thermal.wall_exchange * at.volume_2 / masses.mass_2
-    wall_1 = cooling_1 * state.mass_1 / masses.mass_1
-    wall_2 = cooling_2 * state.mass_2 / masses.mass_2
-    ratio = thermal.heat_capacity_ratio
+    flowing: SlopedFlows,
+    step: float,
+) -> ThermalMatrix:
+    """Matrix of a step [s] with an energy balance."""
+    ratio, weight = thermal.heat_capacity_ratio, GAMMA * step
+    per_content_1 = plant.gas_product / (at.volume_1 * (1.0 + at.give_1))
+    per_content_2 = plant.gas_product / (at.volume_2 * (1.0 + at.give_2))
+    roots = steeper_roots(gas, flowing, per_content_1, per_content_2)
+    by_mass = linearise(per_content_1, per_content_2, carried_slopes(flowing, mass_ratios(roots)), step)
+    by_energy = linearise(per_content_1, per_content_2, carried_slopes(flowing, enthalpy_ratios(thermal, roots)), step)
+    cooling_1 = weight * thermal.wall_exchange * at.volume_1 / gas.mass_1
+    cooling_2 = weight * thermal.wall_exchange * at.volume_2 / gas.mass_2
+    wall_1, wall_2 = cooling_1 * gas.content_1 / gas.mass_1, cooling_2 * gas.content_2 / gas.mass_2
     work_1 = weight * (ratio - 1.0) * at.growth_1 / (at.volume_1 * (1.0 + ratio * at.give_1))
     work_2 = weight * (ratio - 1.0) * at.growth_2 / (at.volume_2 * (1.0 + ratio * at.give_2))
-    kept_1, kept_2 = slopes.kept_1, slopes.kept_2
+    kept_1, kept_2 = kept_share(ratio, at.give_1), kept_share(ratio, at.give_2)
     # The masses are eliminated first: they respond to the contents alone, so that a 2 by 2 matrix is left.
-    a = 1.0 - kept_1 * slopes.content_1_by_1 + work_1 + kept_1 * cooling_1 - kept_1 * wall_1 * slopes.mass_1_by_1
-    b = -kept_1 * slopes.content_1_by_2 - kept_1 * wall_1 * slopes.mass_1_by_2
-    c = -kept_2 * slopes.content_2_by_1 - kept_2 * wall_2 * slopes.mass_2_by_1
-    d = 1.0 - kept_2 * slopes.content_2_by_2 + work_2 + kept_2 * cooling_2 - kept_2 * wall_2 * slopes.mass_2_by_2
-    return _ThermalMatrix(
-        slopes=slopes,
-        a=a,
-        b=b,
-        c=c,
-        d=d,
-        scale=1.0 / (a * d - b * c),
+    return ThermalMatrix(
+        a=1.0 - kept_1 * (1.0 - by_energy.a - cooling_1 + wall_1 * (1.0 - by_mass.a)) + work_1,
+        b=kept_1 * (by_energy.b + wall_1 * by_mass.b),
+        c=kept_2 * (by_energy.c + wall_2 * by_mass.c),
+        d=1.0 - kept_2 * (1.0 - by_energy.d - cooling_2 + wall_2 * (1.0 - by_mass.d)) + work_2,
+        gas=by_mass,
+        energy=by_energy,
+        kept_1=kept_1,
+        kept_2=kept_2,
         wall_1=wall_1,
         wall_2=wall_2,
         cooling_1=cooling_1,
@@ -365,29 +313,46 @@ def thermal_matrix(
     )
 
 
-def solve_thermal_stage(matrix: _ThermalMatrix, right: ThermalFlows) -> ThermalFlows:
+def thermal_response(matrix: ThermalMatrix, content_1: float, content_2: float) -> ThermalFlows:
+    """Gamma h times the rate of change of all flows except heat [kg/s], for given rates of both contents [kg/s]."""
+    energy = response(matrix.energy, content_1, content_2)
+    return ThermalFlows(
+        mass_1=matrix.kept_1 * energy.mass_1,
+        mass_2=matrix.kept_2 * energy.mass_2,
+        gas=response(matrix.gas, content_1, content_2),
+        energy=energy,
+        heat=0.0,
+    )
+
+
+def solve_thermal_stage(matrix: ThermalMatrix, scale: float, right: ThermalFlows) -> ThermalFlows:
     """Stage slopes [kg/s] of a step with an energy balance, from the right-hand sides [kg/s]."""
     # Right-hand sides of the contents after the masses are eliminated.
-    right_1 = right.content_1 + matrix.slopes.kept_1 * matrix.wall_1 * right.mass_1
-    right_2 = right.content_2 + matrix.slopes.kept_2 * matrix.wall_2 * right.mass_2
-    content_1 = (matrix.d * right_1 - matrix.b * right_2) * matrix.scale
-    content_2 = (matrix.a * right_2 - matrix.c * right_1) * matrix.scale
-    by_contents = flow_response(matrix.slopes, content_1, content_2)
-    mass_1 = right.mass_1 + by_contents.mass_1
-    mass_2 = right.mass_2 + by_contents.mass_2
-    warmed_1 = matrix.wall_1 * mass_1 - matrix.cooling_1 * content_1
-    warmed_2 = matrix.wall_2 * mass_2 - matrix.cooling_2 * content_2
+    right_1 = right.mass_1 + matrix.kept_1 * matrix.wall_1 * right.gas.mass_1
+    right_2 = right.mass_2 + matrix.kept_2 * matrix.wall_2 * right.gas.mass_2
+    content_1 = (matrix.d * right_1 - matrix.b * right_2) * scale
+    content_2 = (matrix.a * right_2 - matrix.c * right_1) * scale
+    by_contents = thermal_response(matrix, content_1, content_2)
+    gas = added_flows(right.gas, by_contents.gas)
+    warmed_1 = matrix.wall_1 * gas.mass_1 - matrix.cooling_1 * content_1
+    warmed_2 = matrix.wall_2 * gas.mass_2 - matrix.cooling_2 * content_2
     return ThermalFlows(
-        content_1=content_1,
-        content_2=content_2,
-        mass_1=mass_1,
-        mass_2=mass_2,
-        supplied_1=right.supplied_1 + by_contents.supplied_1,
-        supplied_2=right.supplied_2 + by_contents.supplied_2,
-        leaked=right.leaked + by_contents.leaked,
-        source_content=right.source_content + by_contents.source_content,
-        port_content=right.port_content + by_contents.port_content,
+        mass_1=content_1,
+        mass_2=content_2,
+        gas=gas,
+        energy=added_flows(right.energy, by_contents.energy),
         heat=right.heat + warmed_1 + warmed_2,
+    )
+
+
+def added_thermal_flows(one: ThermalFlows, other: ThermalFlows) -> ThermalFlows:
+    """Sum of two sets of rates [kg/s]."""
+    return ThermalFlows(
+        mass_1=one.mass_1 + other.mass_1,
+        mass_2=one.mass_2 + other.mass_2,
+        gas=added_flows(one.gas, other.gas),
+        energy=added_flows(one.energy, other.energy),
+        heat=one.heat + other.heat,
     )
 
 
@@ -427,109 +392,90 @@ def begin_thermal_gas(
     step: float,
     *,
     parts: ActuatorFunctions,
-) -> ThermalGas:
+) -> ThermalStage:
     """First stage of one step [s] with an energy balance; volumes change linearly up to ``next_angle`` [rad]."""
     rate = 1.0 / max(step, SHORTEST)
     pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
     at = warm_chambers(plant, pressure_1, pressure_2, state.angle, state.angle, next_angle, rate, parts=parts)
-    per_content_1 = plant.gas_product / (at.volume_1 * (1.0 + at.give_1))
-    per_content_2 = plant.gas_product / (at.volume_2 * (1.0 + at.give_2))
-    flows = thermal_flows(thermal, state, masses, at, flowing.flows)
-    weight = GAMMA * step
-    root_1 = math.sqrt(state.mass_1 / masses.mass_1)
-    root_2 = math.sqrt(state.mass_2 / masses.mass_2)
-    near_1, near_2 = NEARLY_EQUAL * per_content_1 * state.mass_1, NEARLY_EQUAL * per_content_2 * state.mass_2
-    weight_1, weight_2 = weight * per_content_1, weight * per_content_2
-    slopes = flow_slopes(thermal, root_1, root_2, weight_1, weight_2, flowing, near_1, near_2, at)
-    matrix = thermal_matrix(thermal, state, masses, at, weight, slopes)
+    gas = WarmGas(state.mass_1, state.mass_2, masses.mass_1, masses.mass_2)
+    linear = thermal_matrix(plant, thermal, gas, at, flowing, step)
     # A growing volume lowers the pressure as a loss of content at this rate would.
     lost_1, lost_2 = -state.mass_1 * at.growth_1 / at.volume_1, -state.mass_2 * at.growth_2 / at.volume_2
-    drift = flow_response(slopes, lost_1, lost_2)
-    first = solve_thermal_stage(matrix, combine_flows(flows, 1.0, drift, 1.0))
-    change = combine_flows(first, step, first, 0.0)
-    end, end_masses = with_thermal_gas(state, masses, change)
-    end_1, end_2 = parts.pressures(plant, next_angle, end.mass_1, end.mass_2)
-    return ThermalGas(
-        matrix=matrix,
+    flows = thermal_flows(thermal, gas, at, flowing.flows)
+    scale = inverse_determinant(linear.a, linear.b, linear.c, linear.d)
+    first = solve_thermal_stage(linear, scale, added_thermal_flows(flows, thermal_response(linear, lost_1, lost_2)))
+    end = WarmGas(
+        content_1=state.mass_1 + step * first.mass_1,
+        content_2=state.mass_2 + step * first.mass_2,
+        mass_1=masses.mass_1 + step * first.gas.mass_1,
+        mass_2=masses.mass_2 + step * first.gas.mass_2,
+    )
+    end_1, end_2 = parts.pressures(plant, next_angle, end.content_1, end.content_2)
+    return ThermalStage(
+        linear=linear,
+        scale=scale,
         first=first,
-        drift=drift,
-        end=end,
-        end_masses=end_masses,
-        ended=warm_chambers(plant, end_1, end_2, next_angle, state.angle, next_angle, rate, parts=parts),
+        lost_1=lost_1,
+        lost_2=lost_2,
+        gas=end,
+        at=warm_chambers(plant, end_1, end_2, next_angle, state.angle, next_angle, rate, parts=parts),
+        end_1=end_1,
+        end_2=end_2,
     )
 
 
-def end_pressures(plant: PlantParameters, begun: ThermalGas) -> tuple[float, float]:
-    """Absolute pressures [Pa] of both chambers after the first stage. Equation (3)."""
-    return (
-        begun.end.mass_1 * plant.gas_product / begun.ended.volume_1,
-        begun.end.mass_2 * plant.gas_product / begun.ended.volume_2,
-    )
-
-
-def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing: GasFlows) -> ThermalFlows:
+def second_thermal_stage(thermal: ThermalParameters, begun: ThermalStage, flowing: GasFlows) -> ThermalFlows:
     """Slopes of the second stage [kg/s] of a step with an energy balance."""
-    flows = thermal_flows(thermal, begun.end, begun.end_masses, begun.ended, flowing)
-    # Right-hand side of ROS2: the flows at the end of the first stage less twice that stage, less the drift.
-    right = combine_flows(combine_flows(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
-    return solve_thermal_stage(begun.matrix, right)
+    flows, first = thermal_flows(thermal, begun.gas, begun.at, flowing), begun.first
+    drift = thermal_response(begun.linear, begun.lost_1, begun.lost_2)
+    right = ThermalFlows(
+        mass_1=flows.mass_1 - 2.0 * first.mass_1 - drift.mass_1,
+        mass_2=flows.mass_2 - 2.0 * first.mass_2 - drift.mass_2,
+        gas=second_right(flows.gas, first.gas, drift.gas),
+        energy=second_right(flows.energy, first.energy, drift.energy),
+        heat=flows.heat - 2.0 * first.heat,
+    )
+    return solve_thermal_stage(begun.linear, begun.scale, right)
 
 
 def thermal_change(
-    plant: PlantParameters, thermal: ThermalParameters, begun: ThermalGas, second: ThermalFlows, step: float
+    plant: PlantParameters, thermal: ThermalParameters, begun: ThermalStage, second: ThermalFlows, step: float
 ) -> ThermalFlows:
     """Changes [kg] in one step [s] from both stages; supplies without relief are treated as in ``gas_change``."""
-    change = combine_flows(begun.first, 1.5 * step, second, 0.5 * step)
-    kept_1 = refused_backflow(plant, change.supplied_1)
-    kept_2 = refused_backflow(plant, change.supplied_2)
+    first = begun.first
+    kept_1, kept_2 = kept_gas(plant, first.gas, second.gas, step)
     carries = enthalpy_flow_ratio(1.0, thermal.heat_capacity_ratio)
+    warm_1, warm_2 = kept_1 * carries, kept_2 * carries
     return ThermalFlows(
-        content_1=change.content_1 + kept_1 * carries * begun.matrix.slopes.kept_1,
-        content_2=change.content_2 + kept_2 * carries * begun.matrix.slopes.kept_2,
-        mass_1=change.mass_1 + kept_1,
-        mass_2=change.mass_2 + kept_2,
-        supplied_1=change.supplied_1 + kept_1,
-        supplied_2=change.supplied_2 + kept_2,
-        leaked=change.leaked,
-        source_content=change.source_content + (kept_1 + kept_2) * carries,
-        port_content=change.port_content + (kept_1 + kept_2) * carries,
-        heat=change.heat,
+        mass_1=of_both_stages(first.mass_1, second.mass_1, step) + begun.linear.kept_1 * warm_1,
+        mass_2=of_both_stages(first.mass_2, second.mass_2, step) + begun.linear.kept_2 * warm_2,
+        gas=change_by_stages(first.gas, second.gas, step, kept_1, kept_2),
+        energy=change_by_stages(first.energy, second.energy, step, warm_1, warm_2),
+        heat=of_both_stages(first.heat, second.heat, step),
     )
 
 
-def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlows, step: float) -> float:
+def thermal_error(
+    plant: PlantParameters,
+    begun: ThermalStage,
+    second: ThermalFlows,
+    next_angle: float,
+    step: float,
+    *,
+    parts: ActuatorFunctions,
+) -> float:
     """Estimated error of pressures and temperatures after a step [s] divided by the allowed error, as ``gas_error``.
 
     In a chamber that is flushed within a step, the pressure is settled but the temperature is not.
     """
-    added = solve_thermal_stage(begun.matrix, combine_flows(begun.first, 1.0, second, 1.0))
-    return 0.5 * max(over_allowed(plant, begun, added.content_1, added.content_2, step), warming(begun, added, step))
-
-
-def warming(begun: ThermalGas, added: ThermalFlows, step: float) -> float:
-    """Larger temperature error of both chambers divided by the allowed error [-], from error rates [kg/s]."""
-    # The temperature over the reference is content over mass: what a little of both changes it by.
-    mass_1, mass_2 = begun.end_masses.mass_1, begun.end_masses.mass_2
-    warmer_1 = (added.content_1 - begun.end.mass_1 / mass_1 * added.mass_1) / mass_1
-    warmer_2 = (added.content_2 - begun.end.mass_2 / mass_2 * added.mass_2) / mass_2
-    return max(abs(warmer_1), abs(warmer_2)) * step / ALLOWED_OF_TEMPERATURE
-
-
-def thermal_opening_error(plant: PlantParameters, begun: ThermalGas, shift: float, step: float) -> float:
-    """Error due to the mean valve opening of a step [s] divided by the allowed error [-], as ``opening_error``."""
-    response_1 = (begun.matrix.a - 1.0) * begun.first.content_1
-    response_2 = (begun.matrix.d - 1.0) * begun.first.content_2
-    return shift / (12.0 * GAMMA) * over_allowed(plant, begun, response_1, response_2, step)
-
-
-def over_allowed(plant: PlantParameters, begun: ThermalGas, rate_1: float, rate_2: float, step: float) -> float:
-    """Larger pressure error of both chambers divided by the allowed error [-], from error rates [kg/s]."""
-    end_1, end_2 = end_pressures(plant, begun)
-    larger = max(
-        abs(rate_1) / (begun.ended.volume_1 * pressure_that_matters(plant, end_1)),
-        abs(rate_2) / (begun.ended.volume_2 * pressure_that_matters(plant, end_2)),
+    added, held = solve_thermal_stage(begun.linear, begun.scale, added_thermal_flows(begun.first, second)), begun.gas
+    pressed = pressure_error(
+        plant, OF_STAGES, added.mass_1, added.mass_2, begun.end_1, begun.end_2, next_angle, step, parts=parts
     )
-    return larger * step * plant.gas_product / ALLOWED_OF_PRESSURE
+    # The temperature over the reference is content over mass: what a little of both changes it by.
+    warmer_1 = (added.mass_1 - held.content_1 / held.mass_1 * added.gas.mass_1) / held.mass_1
+    warmer_2 = (added.mass_2 - held.content_2 / held.mass_2 * added.gas.mass_2) / held.mass_2
+    return max(pressed, 0.5 / ALLOWED_OF_TEMPERATURE * step * max(abs(warmer_1), abs(warmer_2)))
 
 
 def after_motion(
@@ -565,21 +511,15 @@ def after_motion(
 
 def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlows) -> tuple[PlantState, ThermalState]:
     """Plant state, gas masses and energy totals after the changes [kg] of one step, without the work of the gas."""
-    supplied = change.supplied_1 + change.supplied_2
-    vented = supplied - change.mass_1 - change.mass_2
+    source = change.energy.supplied_1 + change.energy.supplied_2
+    after = with_gas(state, change.gas)
     return (
-        state._replace(
-            mass_1=state.mass_1 + change.content_1,
-            mass_2=state.mass_2 + change.content_2,
-            supplied_mass=state.supplied_mass + supplied,
-            vented_mass=state.vented_mass + vented,
-            leaked_mass=state.leaked_mass + abs(change.leaked),
-        ),
+        after._replace(mass_1=state.mass_1 + change.mass_1, mass_2=state.mass_2 + change.mass_2),
         masses._replace(
-            mass_1=masses.mass_1 + change.mass_1,
-            mass_2=masses.mass_2 + change.mass_2,
-            supplied_content=masses.supplied_content + change.source_content,
-            vented_content=masses.vented_content + change.source_content - change.port_content,
+            mass_1=masses.mass_1 + change.gas.mass_1,
+            mass_2=masses.mass_2 + change.gas.mass_2,
+            supplied_content=masses.supplied_content + source,
+            vented_content=masses.vented_content + source - change.energy.mass_1 - change.energy.mass_2,
             heat_content=masses.heat_content + change.heat,
         ),
     )

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # a lane is of these, and makes none of them
     from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
-    from ppafo.engine.scheme.pneumatics import Flows, GasFlows, GasStage, HeldChambers, SlopedFlows
-    from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
+    from ppafo.engine.scheme.pneumatics import GasFlows, HeldChambers, SlopedFlows
     from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
     from ppafo.model.gait import GaitMeasured, GaitNow, GaitPlace, GaitSeries, GaitTiming
     from ppafo.model.leg import FootLoad, LegParameters
@@ -130,12 +129,10 @@ class Lane:
     shown: Any  # what the valve shows beside its openings
     next_valve: Any  # state of the valve at the end of a part
     flowing: "SlopedFlows"  # flows as the step begins, with their derivatives
-    gas_stage: "GasStage"  # first stage of the gas,
-    thermal_gas: "ThermalGas"  # with an energy balance
+    gas_stage: Any  # first stage of the gas, by its kind
     line_stage: "LineStep"  # lines after the first stage
     passing: "GasFlows"  # flows at the pressures to which the first stage leads
-    change: "Flows"  # what the step adds to the gas, by its kind
-    thermal_change: "ThermalFlows"
+    change: Any  # what the step adds to the gas, by its kind
     next_lines: "LineState"  # lines at the end of a part
     gas_error: float  # of the pressures over what is allowed
     slid: "PartSlide"  # an unconstrained vane at the end of a part without an event,
@@ -147,8 +144,7 @@ class Lane:
     remaining: float  # what is left of the step from the part's begin on [s]
 
     # What lives inside one phase.
-    second: "Flows"  # second stage of the gas
-    thermal_second: "ThermalFlows"
+    second: Any  # second stage of the gas, by its kind
     fed: "PlantState"  # the state with the gas of the step, but the vane as it was
     warmed: Any  # true masses with the gas of the step
     after: "PlantState"  # state and walk after the step

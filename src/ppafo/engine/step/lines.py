@@ -3,6 +3,7 @@
 from ppafo.engine.groups import Groups, given, handed, kept
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import supply_lines
+from ppafo.engine.step import gas
 from ppafo.engine.step.lane import Lane
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import LineState, LineStep, SupplyLines
@@ -34,8 +35,8 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     lane.flowing = supply_lines.with_lines(
         lane.plant, lane.lines, lane.state, lane.flowing, ratio, parts=parts.functions
     )
-    parts.gas.begin(parts, lane, next_angle, length)
-    first = parts.gas.first(parts, lane)
+    gas.begin(parts, lane, next_angle, length)
+    first = gas.first(parts, lane)
     lane.line_stage = supply_lines.lines_after(
         lane.plant, lane.lines, lane.line_state, length * first.supplied_1, length * first.supplied_2, 0.0, length
     )
@@ -43,7 +44,7 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
 
 def end(parts: Program, lane: Lane, length: float) -> None:
     """Set the lines at the end of the step; a part that may be refused changes the state only when accepted."""
-    change = parts.gas.changes(parts, lane)
+    change = gas.changes(parts, lane)
     rise = lane.line_stage.inlet_rise
     ended = supply_lines.lines_after(
         lane.plant, lane.lines, lane.line_state, change.supplied_1, change.supplied_2, rise, length

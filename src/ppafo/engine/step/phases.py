@@ -8,7 +8,7 @@ that have completed the step wait for the others, and all runs are independent.
 
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import motion, pneumatics
-from ppafo.engine.step import stated
+from ppafo.engine.step import gas, stated
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.model.ports import at_valve, shown_signals
 
@@ -129,7 +129,7 @@ def begin_gas(parts: Program, lane: Lane, now: Now) -> None:
         parts.leg.hold_ahead(parts, lane)
     next_angle = angle_ahead(parts, lane)
     if parts.feed is None:
-        parts.gas.begin(parts, lane, next_angle, length)
+        gas.begin(parts, lane, next_angle, length)
     else:
         parts.feed.begin(parts, lane, next_angle, length)
 
@@ -153,10 +153,8 @@ def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
         port_1, port_2 = parts.valve.connect(source, lane.shown)
     else:
         port_1, port_2 = parts.valve.connect_ahead(source, lane.shown)
-    pressure_1, pressure_2 = parts.gas.ends(parts, lane)
-    flow = parts.valve.port_flow
-    sloped = pneumatics.gas_flows(lane.plant, pressure_1, pressure_2, port_1, port_2, flow)
-    lane.passing = sloped.flows
+    flow, stage = parts.valve.port_flow, lane.gas_stage
+    lane.passing = pneumatics.gas_flows(lane.plant, stage.end_1, stage.end_2, port_1, port_2, flow).flows
     if parts.stated_at_ports:
         stated.restore(parts, lane)
 
@@ -164,18 +162,18 @@ def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
 def feed_gas(parts: Program, lane: Lane) -> None:
     """Set the second stage: gas of the step, supply lines and, for adaptive steps, the error."""
     length = length_of(parts, lane)
-    parts.gas.change(parts, lane, length)
+    gas.change(parts, lane, length)
     if parts.feed is not None:
         parts.feed.end(parts, lane, length)
     if parts.is_adaptive:
         ahead = angle_ahead(parts, lane)
-        error = parts.gas.error(parts, lane, ahead, length)
+        error = gas.error(parts, lane, ahead, length)
         if parts.feed is not None:
             # The larger of both errors, not their sum: each has its own limit.
             error = max(error, parts.feed.error(parts, lane))
         if parts.valve.shift is not None:
             shift = parts.valve.shift(lane.valve_state, lane.next_valve)
-            error = error + parts.gas.shift_error(parts, lane, shift, ahead, length)
+            error = error + gas.shift_error(parts, lane, shift, ahead, length)
         lane.gas_error = error
 
 
@@ -193,7 +191,7 @@ def torque_of_leg(parts: Program, lane: Lane, time: float, angle: float) -> floa
 def slide(parts: Program, lane: Lane, now: Now) -> None:
     """Set the end of the part for a vane that slides on or stays at rest."""
     length = length_of(parts, lane)
-    parts.gas.add(parts, lane)
+    gas.add(parts, lane)
     end = time_of(parts, lane, now) + length
     # Just before a jump that ends the part, as the next one begins just behind it.
     ending = end - motion.SAME_INSTANT if parts.shank_jumps else end
@@ -203,7 +201,7 @@ def slide(parts: Program, lane: Lane, now: Now) -> None:
 
 def depart(parts: Program, lane: Lane) -> None:
     """Set the end of the part for a vane that reverses or starts to move, which is rare."""
-    parts.gas.add(parts, lane)
+    gas.add(parts, lane)
     length = length_of(parts, lane)
     lane.moved = motion.depart_part(
         lane.plant, lane.fed, lane.begun, lane.slid, lane.moved, length, parts=parts.functions
@@ -219,9 +217,9 @@ def finish(parts: Program, lane: Lane, now: Now) -> None:
     if parts.angle is not None:
         feed_gas(parts, lane)
     # Gas before motion: the vane ends under the pressures of the new gas.
-    parts.gas.add(parts, lane)
+    gas.add(parts, lane)
     end_motion(parts, lane)
-    parts.gas.work(parts, lane)
+    gas.work(parts, lane)
     if parts.stated:
         stated.advance(parts, lane, command_of(parts, lane, now), length)
     taken, follows = True, True
@@ -259,9 +257,9 @@ def end_motion(parts: Program, lane: Lane) -> None:
         # The chambers that the next step finds are those where this one ends.
         parts.leg.end(parts, lane, length_of(parts, lane))
         assumed = parts.leg.assumed_angle(parts, lane)
-        lane.after = parts.gas.move(parts, lane, lane.after, assumed, lane.after.angle)
+        lane.after = gas.move(parts, lane, lane.after, assumed, lane.after.angle)
     elif parts.angle is None:
-        moved = parts.gas.move(parts, lane, lane.fed, lane.begun.next_angle, lane.moved.angle)
+        moved = gas.move(parts, lane, lane.fed, lane.begun.next_angle, lane.moved.angle)
         lane.after = motion.with_motion(moved, lane.moved.angle, lane.moved.rate)
     elif parts.is_locked:
         lane.after = lane.fed

@@ -2,6 +2,7 @@
 
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.pneumatics import SHORTEST
+from ppafo.engine.step import gas
 from ppafo.engine.step.lane import Lane
 from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.plant import PlantState
@@ -28,7 +29,7 @@ def moment(
 
 def begun_moment(parts: Program, lane: Lane, command: float) -> PlantSnapshot:
     """Return the input of effect laws at the start of a step, with the flows of the first stage [kg/s]."""
-    first = parts.gas.first(parts, lane)
+    first = gas.first(parts, lane)
     supplied = first.supplied_1 + first.supplied_2
     return moment(parts, lane, lane.state, supplied, supplied - first.mass_1 - first.mass_2, command)
 

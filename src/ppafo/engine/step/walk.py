@@ -5,6 +5,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.scheme import walking
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
+from ppafo.engine.step import gas
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.engine.step.phases import length_of, time_of
 from ppafo.model.gait import (
@@ -95,7 +96,7 @@ def hold_ahead(parts: Program, lane: Lane) -> None:
 
 def reach(parts: Program, lane: Lane) -> None:
     """Set the state at the end of a step in which the foot neither reverses nor starts to move."""
-    parts.gas.add(parts, lane)
+    gas.add(parts, lane)
     lane.ended, lane.carried = walking.reach_end(
         lane.plant,
         lane.leg,
@@ -113,7 +114,7 @@ def reach(parts: Program, lane: Lane) -> None:
 
 def depart(parts: Program, lane: Lane) -> None:
     """Set the end of a step in which the foot reverses or starts to move, which is rare."""
-    parts.gas.add(parts, lane)
+    gas.add(parts, lane)
     lane.ended, lane.ahead = walking.depart_in_walk(
         lane.plant, lane.fed, lane.walk_begun, lane.ended, lane.ahead, length_of(parts, lane), parts=parts.functions
     )

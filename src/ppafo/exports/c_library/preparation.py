@@ -17,6 +17,7 @@ from ppafo.engine.rows import component_row, leaf_paths, numbers, rebuilt, secti
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.scheme.pneumatics import is_slow
+from ppafo.engine.scheme.thermal_gas import masses_at_start
 from ppafo.engine.step.lane import Lane, LaneResult, LaneTiming
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.binding import made_of
@@ -302,8 +303,8 @@ def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     lane.pace = StepControl(lane.step)
     for name, of_plant in program.groups_of_plant.items():
         lane[name] = of_plant(lane.plant)
-    if program.gas.START is not None:
-        lane.masses = program.gas.START(lane.state)
+    if program.is_thermal:
+        lane.masses = masses_at_start(lane.state)
     lane.valve_state = parts.constant(program.valve.initial())
     if program.controller is not None:
         lane.controller_state = parts.constant(program.controller.initial)

@@ -16,9 +16,9 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.continuous_time import flows_at
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
-from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows
+from ppafo.engine.scheme.thermal_gas import WarmChambers, WarmGas, thermal_flows
 from ppafo.errors import ScenarioError
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, openings_of
+from ppafo.model.plant import PlantParameters, ThermalParameters, openings_of
 from ppafo.model.valves.proportional import spool_acceleration
 from ppafo.report.finding import text_of
 from ppafo.simulation.plan import plan_run
@@ -77,12 +77,10 @@ def of_the_textbook(run: Run, way: float | None, at: Mapping[str, float]) -> dic
     if isinstance(run.thermal, ThermalParameters):
         warmth = [at[f"temperature_{side}"] / run.thermal.temperature for side in (1, 2)]
         masses = [content / warm for content, warm in zip(contents, warmth, strict=True)]
-        state = PlantState(at["angle"], at["angular_velocity"], *contents, 0.0, 0.0, 0.0)
-        held = ThermalState(*masses, 0.0, 0.0, 0.0, 0.0)
         at_work = WarmChambers(*volumes, growth, -growth, 0.0, 0.0)
-        thermal = thermal_flows(run.thermal, state, held, at_work, flowing)
-        gained, entered = (thermal.content_1, thermal.content_2), (thermal.mass_1, thermal.mass_2)
-        supplied = thermal.supplied_1 + thermal.supplied_2
+        thermal = thermal_flows(run.thermal, WarmGas(*contents, *masses), at_work, flowing)
+        gained, entered = (thermal.mass_1, thermal.mass_2), (thermal.gas.mass_1, thermal.gas.mass_2)
+        supplied = thermal.gas.supplied_1 + thermal.gas.supplied_2
         vented = supplied - sum(entered)
         for side in (0, 1):
             change = gained[side] / masses[side] - contents[side] * entered[side] / masses[side] ** 2
