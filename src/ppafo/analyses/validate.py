@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import Duration, Name, Overrides, Volume, Word, checked
 from ppafo.documents.json_text import fields_of
+from ppafo.errors import DataError
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
-from ppafo.wording import count_of
+from ppafo.wording import count_of, nearest_name, one_line
 
 if TYPE_CHECKING:
     from pandas import DataFrame  # type: ignore[import-untyped]
@@ -202,12 +203,21 @@ def validate(
     from ppafo.validation.agreement import compare_recording
     from ppafo.validation.causes import causes_of
     from ppafo.validation.measured import read_all
-    from ppafo.validation.settings import replay_settings
+    from ppafo.validation.settings import LARGEST_DELAY, MOTIONS, ReplaySettings, parse_initial, parse_thresholds
 
     report = progress or report_nothing
     device = load_device(parameter_set, overrides=overrides, valve=valve)
     device.check_pressurised("a validation, which counts in parts of the gauge supply pressure,")
-    settings = replay_settings(device, motion, volume, initial, thresholds, longest_delay)
+    if longest_delay > LARGEST_DELAY:
+        raise DataError(f"longest delay = {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
+    chosen = next((known for known in MOTIONS if known == motion), None)
+    if chosen is None:
+        hint = nearest_name(motion, MOTIONS)
+        raise DataError(f"motion '{one_line(motion)}': must be one of {', '.join(MOTIONS)}{hint}")
+    if volume is not None and chosen != "free":
+        raise DataError(f"motion '{chosen}': a fixed volume has no moving vane")
+    states = parse_initial(initial, device.supply.atmospheric_pressure)
+    settings = ReplaySettings(chosen, states, longest_delay, parse_thresholds(thresholds), volume)
     read, agreements = read_all(recordings, device, columns), []
     for measured in read:
         report(Progress(f"replaying {measured.file}"))
@@ -383,28 +393,26 @@ def _panels(agreement: RecordingAgreement, across: int) -> list[Panel]:
     from ppafo.report.panels import Panel
     from ppafo.report.residuals import FittedCurve, course_panels
     from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
-    from ppafo.validation.agreement import measured_values
     from ppafo.validation.settings import COMPARED, PRESSURE_1, PRESSURE_2
 
-    measured, model, looks = agreement.measured, agreement.model, {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
+    measured, looks = agreement.measured, {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
     time, scale = (Kind("Time", "ms"), 1.0e3) if measured.duration < _SHORT else (TIME, 1.0)
     rows: list[list[Panel]] = []
     for index, channel in enumerate(agreement.channels):
         name, quantity = channel.channel, COMPARED[channel.channel]
-        samples, limit = measured_values(measured, name), channel.limit * channel.full_range
-        assert samples is not None, "a compared channel was measured"
+        limit = channel.limit * channel.full_range
         curve = FittedCurve(
             time=time,
             level=Kind(quantity.title, "", "pressure" if name in looks else quantity.quantity),
             change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", quantity.quantity),
             times=scale * measured.time,
-            samples=samples,
+            samples=channel.values,
             # The measurement is late by the delay, so the model is read that much earlier.
-            model=np.interp(measured.time - agreement.delay.correction, model.time, model[name]),
+            model=channel.shift(channel.delay),
             names=("", "") if index else (KIND_WORDS[measured.kind], "model on the recorded inputs"),
             colour=looks.get(name, ACTUAL).colour,
         )
-        is_near = float(np.abs(curve.model - samples).max()) >= _NEAR_LIMIT * limit
+        is_near = float(np.abs(channel.residuals).max()) >= _NEAR_LIMIT * limit
         upper, lower = course_panels(curve, "dots", "" if index else "figure", (-limit, limit) if is_near else ())
         if index % across:
             rows[-2].append(upper)

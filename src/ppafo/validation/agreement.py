@@ -1,7 +1,8 @@
 """Agreement of the model with a recording, replayed on the recorded inputs: errors channel by channel."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -60,94 +61,93 @@ _AT_LIMIT = 0.99
 """Fraction of the limit [-] from which a delay counts as being at the limit."""
 
 
-@dataclass(frozen=True, slots=True)
-class ComparedCurve:
-    """Measured and modelled values of a channel, each with its own times [s].
+@dataclass(frozen=True, eq=False)
+class ChannelAgreement:
+    """Measured and modelled values of one channel, and its residuals (measured - model) in its SI unit.
 
-    ``unit`` is the SI unit of an error, ``full_range`` the full range of the channel, ``usual_zero`` the usual zero
-    error of a sensor, both in this unit. ``limit`` is the error limit set by the user, if any.
+    ``times`` [s], ``values``: samples, of which the model is shifted by ``delay`` [s]. ``model_times``,
+    ``model_values``: replay. ``unit`` is the SI unit of an error, ``full_range`` the full range of the channel,
+    ``usual_zero`` the usual zero error of a sensor. ``allowed`` is the error limit set by the user, if any.
     """
 
     channel: str
     unit: str
-    times: Floats
-    values: Floats
-    model_times: Floats
-    model_values: Floats
+    times: Floats = field(repr=False)
+    values: Floats = field(repr=False)
+    model_times: Floats = field(repr=False)
+    model_values: Floats = field(repr=False)
     full_range: float
     usual_zero: float
-    limit: ErrorLimit | None = None
+    allowed: ErrorLimit | None = None
+    delay: float = 0.0
 
-    def shift(self, delay: float, times: Floats) -> Floats:
-        """Return the model delayed by ``delay`` [s] at ``times`` [s], constant outside the range of the model."""
-        return np.interp(times - delay, self.model_times, self.model_values)
+    def shift(self, delay: float) -> Floats:
+        """Return the model delayed by ``delay`` [s] at the sample times, constant outside the range of the model."""
+        return np.interp(self.times - delay, self.model_times, self.model_values)
 
+    @cached_property
+    def residuals(self) -> Floats:
+        """Residuals after correction of the common delay."""
+        return np.asarray(self.values - self.shift(self.delay))
 
-@dataclass(frozen=True, slots=True)
-class Delay:
-    """Delay of the measurement behind the model [s], below 0 if it leads, 0 if undetectable; flag of the limit."""
+    @cached_property
+    def weights(self) -> Floats:
+        """Weights of the samples, whose sum is 1: the time for which each speaks, by the trapezoidal rule."""
+        intervals = np.diff(self.times)
+        # No sample speaks for a gap.
+        intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
+        weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
+        return np.asarray(weights / weights.sum())
 
-    value: float
-    is_at_limit: bool
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of the measurement noise, white or correlated."""
+        return max(noise_in(self.values, self.full_range), correlated_noise_of(self.residuals))
+
+    @cached_property
+    def variation(self) -> float:
+        """Standard deviation of the signal without noise, which no model explains."""
+        deviation = self.values - self.weights @ self.values
+        return math.sqrt(max(float(self.weights @ deviation**2) - self.noise * self.noise, 0.0))
+
+    @cached_property
+    def rms(self) -> float:
+        """Root mean square of the residuals."""
+        return float(np.sqrt(self.weights @ self.residuals**2))
 
     @property
-    def correction(self) -> float:
-        """Delay to correct [s]; 0 at the search limit and below 0, where the best fit is no delay of a sensor."""
-        return 0.0 if self.is_at_limit else max(self.value, 0.0)
+    def rms_unaligned(self) -> float:
+        """Root mean square of the residuals without correction of the delay."""
+        return float(np.sqrt(self.weights @ (self.values - self.shift(0.0)) ** 2))
 
+    @property
+    def bias(self) -> float:
+        """Mean of the residuals."""
+        return float(self.weights @ self.residuals)
 
-def estimate_delay(curves: list[ComparedCurve], limit: float) -> Delay:
-    """Return the delay within +-``limit`` [s] with the least mean squared error over all channels."""
-    if limit <= 0.0 or not curves:
-        return Delay(0.0, is_at_limit=False)
-    # No more measured samples than the search needs.
-    steps = [-(-curve.times.size // _MAXIMUM_SAMPLES) for curve in curves]
-    thinned = [
-        replace(curve, times=curve.times[::step], values=curve.values[::step])
-        for curve, step in zip(curves, steps, strict=True)
-    ]
+    @property
+    def largest(self) -> float:
+        """Residual of largest magnitude, with its sign."""
+        return float(self.residuals[np.argmax(np.abs(self.residuals))])
 
-    def cost(delay: float) -> float:
-        """Return the mean squared error over all samples and channels, in units of full range squared [-]."""
-        errors = [(curve.shift(delay, curve.times) - curve.values) / curve.full_range for curve in thinned]
-        return sum(float(np.square(error).mean()) for error in errors) / len(errors)
+    @property
+    def largest_time(self) -> float:
+        """Time [s] of the largest residual."""
+        return float(self.times[np.argmax(np.abs(self.residuals))])
 
-    shifts = np.linspace(-limit, limit, _SHIFTS).tolist()
-    best = int(np.argmin([cost(shift) for shift in shifts]))
-    bounds = shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)]
-    value = float(minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": _ACCURACY * limit}).x)
-    # A delay counts where it explains more than noise and the accuracy of the engine could.
-    least = cost(value)
-    gain, samples = cost(0.0) - least, sum(curve.times.size for curve in thinned)
-    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * least
-    if abs(value) < _RESOLUTION * float(np.median(np.diff(curves[0].times))) or not is_significant:
-        return Delay(0.0, is_at_limit=False)
-    return Delay(value, abs(value) > _AT_LIMIT * limit)
+    @cached_property
+    def limit(self) -> float:
+        """Largest RMS error that passes, as a fraction of the full range [-].
 
-
-@dataclass(frozen=True, slots=True)
-class ChannelAgreement:
-    """Residuals (measured - model) of one channel, in its SI unit, after correction of the common delay.
-
-    ``rms`` and ``bias`` are root mean square and mean of the residual. ``largest`` is the residual of largest
-    magnitude, with its sign, at ``largest_time`` [s]. ``rms_unaligned`` is the RMS error without correction of the
-    delay. ``noise`` is the standard deviation of the measurement noise, white or correlated; ``variation`` is the
-    standard deviation of the signal without noise. ``limit`` is the largest RMS error that passes, as a fraction of
-    ``full_range`` [-]; ``usual_zero`` is the usual zero error of a sensor.
-    """
-
-    channel: str
-    unit: str
-    full_range: float
-    variation: float
-    noise: float
-    rms: float
-    rms_unaligned: float
-    bias: float
-    largest: float
-    largest_time: float
-    limit: float
-    usual_zero: float
+        Unless the user sets a limit, it is 3 % of full range or half of the signal variance, whichever is less,
+        combined with the noise and with the usual zero error of sensors (the only visible error of a constant signal).
+        """
+        if self.allowed is not None:
+            return self.allowed.fraction_of(self.full_range)
+        explained = min(ACCEPTABLE_FRACTION * self.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * self.variation)
+        # Of a low supply the usual zero is much of the range: there the limit stays a fraction of it.
+        zero = min(max(self.usual_zero, _UNMOVED * self.full_range), ACCEPTABLE_FRACTION * self.full_range)
+        return math.hypot(explained, zero, _WITHIN_NOISE * self.noise) / self.full_range
 
     @property
     def fraction(self) -> float:
@@ -163,6 +163,48 @@ class ChannelAgreement:
     def passes(self) -> bool:
         """True if the RMS error is within its limit."""
         return self.fraction <= self.limit
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """Delay of the measurement behind the model [s], below 0 if it leads, 0 if undetectable; flag of the limit."""
+
+    value: float
+    is_at_limit: bool
+
+    @property
+    def correction(self) -> float:
+        """Delay to correct [s]; 0 at the search limit and below 0, where the best fit is no delay of a sensor."""
+        return 0.0 if self.is_at_limit else max(self.value, 0.0)
+
+
+def estimate_delay(curves: list[ChannelAgreement], limit: float) -> Delay:
+    """Return the delay within +-``limit`` [s] with the least mean squared error over all channels."""
+    if limit <= 0.0 or not curves:
+        return Delay(0.0, is_at_limit=False)
+    # No more measured samples than the search needs.
+    steps = [-(-curve.times.size // _MAXIMUM_SAMPLES) for curve in curves]
+    thinned = [
+        replace(curve, times=curve.times[::step], values=curve.values[::step])
+        for curve, step in zip(curves, steps, strict=True)
+    ]
+
+    def cost(delay: float) -> float:
+        """Return the mean squared error over all samples and channels, in units of full range squared [-]."""
+        errors = [(curve.shift(delay) - curve.values) / curve.full_range for curve in thinned]
+        return sum(float(np.square(error).mean()) for error in errors) / len(errors)
+
+    shifts = np.linspace(-limit, limit, _SHIFTS).tolist()
+    best = int(np.argmin([cost(shift) for shift in shifts]))
+    bounds = shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)]
+    value = float(minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": _ACCURACY * limit}).x)
+    # A delay counts where it explains more than noise and the accuracy of the engine could.
+    least = cost(value)
+    gain, samples = cost(0.0) - least, sum(curve.times.size for curve in thinned)
+    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * least
+    if abs(value) < _RESOLUTION * float(np.median(np.diff(curves[0].times))) or not is_significant:
+        return Delay(0.0, is_at_limit=False)
+    return Delay(value, abs(value) > _AT_LIMIT * limit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,45 +231,6 @@ class RecordingAgreement:
     def passes(self) -> bool:
         """True if every channel is within its limit."""
         return all(channel.passes for channel in self.channels)
-
-
-def channel_agreement(curve: ComparedCurve, delay: float) -> ChannelAgreement:
-    """Return the errors of one channel with the model shifted by ``delay`` [s].
-
-    Unless the user sets a limit, the RMS error may reach 3 % of full range or half of the signal variance, whichever is
-    less, combined with the noise and with the usual zero error of sensors (the only visible error of a constant
-    signal).
-    """
-    # Each sample speaks for its time by the trapezoidal rule, but not for a gap.
-    intervals = np.diff(curve.times)
-    intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
-    weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
-    weights = np.asarray(weights / weights.sum())
-    error = curve.values - curve.shift(delay, curve.times)
-    unaligned = curve.values - curve.shift(0.0, curve.times)
-    worst = int(np.argmax(np.abs(error)))
-    noise = max(noise_in(curve.values, curve.full_range), correlated_noise_of(error))
-    # White noise is no part of what the signal goes through, and no model explains it.
-    deviation = curve.values - weights @ curve.values
-    variation = math.sqrt(max(float(weights @ deviation**2) - noise * noise, 0.0))
-    explained = min(ACCEPTABLE_FRACTION * curve.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
-    # Of a low supply the usual zero is much of the range: there the limit stays a fraction of it.
-    zero = min(max(curve.usual_zero, _UNMOVED * curve.full_range), ACCEPTABLE_FRACTION * curve.full_range)
-    usual = math.hypot(explained, zero, _WITHIN_NOISE * noise) / curve.full_range
-    return ChannelAgreement(
-        channel=curve.channel,
-        unit=curve.unit,
-        full_range=curve.full_range,
-        variation=variation,
-        noise=noise,
-        rms=float(np.sqrt(weights @ error**2)),
-        rms_unaligned=float(np.sqrt(weights @ unaligned**2)),
-        bias=float(weights @ error),
-        largest=float(error[worst]),
-        largest_time=float(curve.times[worst]),
-        limit=usual if curve.limit is None else curve.limit.fraction_of(curve.full_range),
-        usual_zero=curve.usual_zero,
-    )
 
 
 def noise_in(values: Floats, full_range: float) -> float:
@@ -288,47 +291,36 @@ def agreement_of(
         inputs=replayed.inputs,
         step=replayed.step,
         delay=delay,
-        channels=tuple(channel_agreement(curve, delay.correction) for curve in curves),
+        channels=tuple(replace(curve, delay=delay.correction) for curve in curves),
         remarks=tuple(remarks),
     )
 
 
-def measured_values(recording: Recording, name: str) -> Floats | None:
-    """Return the measured values of a channel, None if not recorded.
-
-    The pressure difference is computed from the pressures of both chambers if both were recorded.
-    """
-    if name == PRESSURE_DIFFERENCE and PRESSURE_1 in recording and PRESSURE_2 in recording:
-        return np.asarray(recording[PRESSURE_1] - recording[PRESSURE_2])
-    if name not in recording:
-        return None
-    return recording[name]
-
-
 def _curves(
     measured: MeasuredRecording, replayed: Replayed, device: Device, settings: ReplaySettings
-) -> list[ComparedCurve]:
+) -> list[ChannelAgreement]:
     """Return measured and modelled curves of the recorded channels, without inputs. Raises DataError if none remain."""
     gauge = supply_gauge(measured.recording, device)
     # Where the vane is locked, or where there is none, some channels carry no information.
     informative = {name for name in COMPARED if settings.motion != "locked" or name != ANGLE}
     if settings.volume is not None:
         informative = {PRESSURE_1}
-    curves, model = [], replayed.recording
+    curves, recorded, model = [], measured.recording, replayed.recording
     for name, channel in COMPARED.items():
-        values = measured_values(measured.recording, name)
-        if values is not None and name not in replayed.inputs and name in informative:
+        is_of_both = name == PRESSURE_DIFFERENCE and PRESSURE_1 in recorded and PRESSURE_2 in recorded
+        if name in informative and name not in replayed.inputs and (is_of_both or name in recorded):
+            values = recorded[PRESSURE_1] - recorded[PRESSURE_2] if is_of_both else recorded[name]
             curves.append(
-                ComparedCurve(
+                ChannelAgreement(
                     channel=name,
                     unit=channel.unit,
-                    times=measured.recording.time,
+                    times=recorded.time,
                     values=values,
                     model_times=model.time,
                     model_values=model[name],
                     full_range=channel.full_range(device, gauge),
                     usual_zero=channel.usual_zero(device),
-                    limit=settings.thresholds.get(name, settings.thresholds.get("")),
+                    allowed=settings.thresholds.get(name, settings.thresholds.get("")),
                 )
             )
     if not curves:

@@ -1,18 +1,22 @@
-"""Candidate causes of a disagreement: one table of rows (change of the model, trial magnitudes, prior, words)."""
+"""Table of the causes of a disagreement: rows of change of the model, trial magnitudes, prior and words.
+
+The generators yield the rows in the order in which they are tried: faulty samples, motion, sensors, clock, and device.
+"""
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.signals.recording import Floats
+from ppafo.report.kind import Kind
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.simulation.recorded.usual_errors import (
     ANGLE_ERRORS,
     PRESSURE_ERRORS,
@@ -21,89 +25,26 @@ from ppafo.simulation.recorded.usual_errors import (
     misread_units,
     usual_errors,
 )
-from ppafo.units.shown import shown_in, shown_unit, shown_value
-from ppafo.validation.agreement import replay_of
-from ppafo.validation.measured import MeasuredRecording
-from ppafo.validation.replay import replayed_scenario
-from ppafo.validation.settings import ANGLE, PRESSURE_1, PRESSURE_2, Motion, ReplaySettings
-
-SENSORS = (ANGLE, PRESSURE_1, PRESSURE_2)
-"""Channels with a sensor on the device; torque and pressure difference are computed from them."""
-SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
-"""Channel recorded under each name when the two chamber pressures are swapped."""
+from ppafo.units.shown import quantity_of_unit, shown_in, shown_unit, shown_value
+from ppafo.validation.record import SENSORS, UNTRIED, ModelChange, Record, ScaledResiduals, SensorModel
+from ppafo.validation.replay import Replay, replayed_scenario
+from ppafo.validation.settings import ANGLE, PRESSURE_1, PRESSURE_2, Motion
+from ppafo.wording import argument_text
 
 
-@dataclass(frozen=True, slots=True)
-class SensorModel:
-    """Sensor model: gain [-] about the value ``about``, zero offset (both in the channel's unit), delay [s]."""
-
-    gain: float = 1.0
-    zero: float = 0.0
-    about: float = 0.0
-    delay: float = 0.0
-
-    def of(self, true: Floats) -> Floats:
-        """Return the readings of true values [unit of the channel]."""
-        return self.about + self.gain * (true - self.about) + self.zero
-
-    def true(self, readings: Floats) -> Floats:
-        """Return the true values of readings [unit of the channel]."""
-        return self.about + (readings - self.zero - self.about) / self.gain
-
-
-@dataclass(frozen=True, slots=True)
-class ModelChange:
-    """Difference between the recorded device and its parameter set; by default no difference.
-
-    ``sensors``: sensor models by channel. ``numbers``: changed parameters by path [SI]. ``effects``: settings of
-    effects by the name of the effect. ``is_swapped``: pressures 1 and 2 are exchanged. ``delay``: delay [s] of all
-    sensors with respect to the command. ``clock``: true rate of the recording's clock [-]. ``motion``: motion of the
-    vane, if another. ``start``: if not None, faulty samples are ignored, and a channel whose first samples are faulty
-    starts at this fraction [-] of its range.
-    """
-
-    sensors: Mapping[str, SensorModel] = field(default_factory=dict)
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    is_swapped: bool = False
-    delay: float = 0.0
-    clock: float = 1.0
-    motion: Motion | None = None
-    start: float | None = None
-
-    @property
-    def has_delay(self) -> bool:
-        """True if all sensors lag behind the command, by a sensor delay or the delay of the valve."""
-        return self.delay != 0.0 or any(path.endswith("delay") for path in self.numbers)
-
-
-def joined(first: ModelChange, second: ModelChange) -> ModelChange:
-    """Return the combination of two changes; ``first`` has precedence for parameters and settings in both."""
-    sensors = dict(first.sensors)
-    for name, other in second.sensors.items():
-        sensor = sensors.get(name, SensorModel())
-        sensors[name] = SensorModel(
-            gain=sensor.gain * other.gain,
-            zero=sensor.zero + other.zero,
-            # A zero and a delay turn about nothing, so that the gain's point stays.
-            about=other.about if other.gain != 1.0 else sensor.about,
-            delay=sensor.delay + other.delay,
-        )
-    numbers, effects = {**second.numbers, **first.numbers}, {**second.effects, **first.effects}
-    delay, clock = first.delay + second.delay, first.clock * second.clock
-    return replace(first, sensors=sensors, numbers=numbers, effects=effects, delay=delay, clock=clock)
-
-
-@dataclass(frozen=True, slots=True)
-class CandidateCause:
-    """Candidate cause whose magnitude is still to be fitted.
+@dataclass(frozen=True, slots=True, eq=False)
+class Cause:
+    """Row of the table of causes; once tried, with its best magnitude, residuals and gain G [-] of ``causes.py``.
 
     ``words``: message with a placeholder for ``shown`` times the magnitude. ``change``: function from magnitude to
     change. ``sizes``: trial magnitudes; a single one means that there is nothing to fit. ``is_ratio``: the magnitude is
-    a ratio, fitted as its logarithm. ``usual``: largest usual sensor error (of a ratio, its logarithm). ``is_usual``:
-    the cause has no magnitude and is usual on any bench. ``is_of_samples``: faulty samples, which are visible without a
-    model. ``is_of_unit``: misread unit, reported only if it explains the recordings. ``is_off``: the model lacks the
-    number or effect, so that a ratio of 1 is a change too. ``unit``: unit of the changed parameter.
+    a ratio, fitted as its logarithm. ``usual``: largest usual error on any bench (of a ratio, its logarithm).
+    ``is_of_unit``: misread unit, reported only if it explains the recordings. ``is_off``: the model lacks the number or
+    effect, so that a ratio of 1 is a change too. ``unit``: unit of the changed parameter.
+
+    ``size``: magnitude, for ratios its logarithm. ``left``: largest RMS error of any channel divided by its noise [-]
+    under the cause. ``same``: other causes that the recordings cannot distinguish from this one; of the nearest cause,
+    the two next ones.
     """
 
     name: str
@@ -113,11 +54,14 @@ class CandidateCause:
     is_ratio: bool = False
     shown: float = 1.0
     usual: float = 0.0
-    is_usual: bool = False
-    is_of_samples: bool = False
     is_of_unit: bool = False
     is_off: bool = False
     unit: str = ""
+    size: float = math.nan
+    residuals: ScaledResiduals = UNTRIED
+    gain: float = 0.0
+    left: float = math.nan
+    same: "tuple[Cause, ...]" = ()
 
     @property
     def has_size(self) -> bool:
@@ -138,9 +82,181 @@ class CandidateCause:
         """Return the change of the model for a fitted magnitude (for ratios, its logarithm)."""
         return self.change(math.exp(size) if self.is_ratio else size)
 
-    def in_words(self, size: float) -> str:
-        """Return the message for a fitted magnitude (for ratios, its logarithm)."""
-        return self.words.format(self.shown * (math.exp(size) if self.is_ratio else size))
+    @property
+    def fitted(self) -> ModelChange:
+        """Change of the model at the best magnitude."""
+        return self.at(self.size)
+
+    @property
+    def numbers(self) -> dict[str, tuple[float, str]]:
+        """Changed parameters by path, each a value with its SI unit."""
+        return {path: (value, self.unit) for path, value in self.fitted.numbers.items() if self.unit}
+
+    @property
+    def in_words(self) -> str:
+        """Message, with values of the set in display units."""
+        said = self.words.format(self.shown * (math.exp(self.size) if self.is_ratio else self.size))
+        for value, unit in self.numbers.values():
+            # An atmosphere in gauge pressure says nothing.
+            quantity = "pressure change" if unit == "Pa_a" else quantity_of_unit(unit)
+            said += f" ({Kind('', '' if unit == '-' else unit, quantity).text(value)})"
+        return said
+
+    @property
+    def is_of_samples(self) -> bool:
+        """True for faulty samples, which are visible without a model."""
+        return self.at(self.grid[0]).start is not None
+
+    @property
+    def is_inside(self) -> bool:
+        """True if the magnitude is inside its grid; at an end, a better magnitude may lie beyond."""
+        return min(self.grid) < self.size < max(self.grid)
+
+    @property
+    def is_usual(self) -> bool:
+        """True if the magnitude is within what is usual on any bench."""
+        return self.usual > 0.0 and abs(self.size) <= self.usual
+
+    @property
+    def explains(self) -> bool:
+        """True if the residuals of every channel are noise and G is positive."""
+        return self.residuals.is_noise and self.gain > 0.0
+
+
+_STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
+"""Trial initial values of a channel whose first samples are wrong, as fractions of its range [-].
+
+The two outermost values lie outside the range, and a best fit there is rejected.
+"""
+_AT_REST = 2.0
+"""Ratio of the angle's standard deviation to its noise [-] below which the vane may be locked."""
+
+
+def of_samples(records: Sequence[Record]) -> Iterator[Cause]:
+    """Yield the faulty samples of all channels as a single cause; nothing without faulty samples."""
+    faulty = [record for record in records if record.words]
+    if not faulty:
+        return
+    has_several = len(records) > 1
+    texts = [
+        f"{words} ({record.measured.file})" if has_several else words for record in faulty for words in record.words
+    ]
+    channels = dict.fromkeys(words.split()[0] for record in faulty for words in record.words)
+    # Every channel has a sample that a sensor made among those of the start.
+    has_start = all(
+        bool(record.good[:, : samples_at_rest(record.measured.recording)].any(axis=1).all()) for record in faulty
+    )
+    yield Cause(
+        f"samples of {' and '.join(channels)}",
+        # No size is shown, and a file's name may have a brace.
+        "; ".join(texts).replace("{", "{{").replace("}", "}}"),
+        lambda share: ModelChange(start=share),
+        (0.0,) if has_start else _STARTS,
+        usual=math.inf if all(record.has_few for record in faulty) else 0.0,
+    )
+
+
+def of_motion(records: Sequence[Record], motion: Motion) -> Iterator[Cause]:
+    """Yield another motion than the given one: a locked vane for a recorded angle at rest, else a leg if it is free."""
+    angles = [record.values[record.channels.index(ANGLE)] for record in records if ANGLE in record.channels]
+    is_at_rest = all(float(np.std(angle)) < _AT_REST for angle in angles)
+    if angles and (motion == "free" or (motion == "leg" and is_at_rest)):
+        other: Motion = "locked" if is_at_rest else "leg"
+        seems = "be locked, because its recorded angle is constant" if is_at_rest else "be coupled to a leg"
+        words = f"the vane seems to {seems} ({argument_text('motion', other)})"
+        yield Cause("motion", words, lambda _: ModelChange(motion=other))
+
+
+def _both_ways(*sizes: float) -> tuple[float, ...]:
+    return (*(-size for size in reversed(sizes)), *sizes)
+
+
+# Grids are so fine that two Gauss-Newton steps reach the least squares, and no likely fault lies at one of their ends.
+_ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
+"""Trial zero offsets of angle [rad], command [full openings] and pressures [gauge supply pressures]."""
+_GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
+"""Trial gains of a sensor [-]."""
+_DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
+"""Trial delays of a sensor relative to the other sensors [s]."""
+_LONG_DELAYS = (0.015, 0.03, 0.05, 0.08, 0.12)
+"""Trial delays [s] of all sensors with respect to the command, beyond the common delay that is removed."""
+_SHIFTS = (0.0005, 0.001, 0.003, 0.008, 0.015, 0.03, 0.05, 0.08, 0.12)
+"""Trial times [s] by which all sensors lead the command, of which none is removed, and delays of a valve with none."""
+_RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
+"""Trial rates [-] of the clock of a recording."""
+_EXACT = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
+"""Usual sensor errors of a command: none, because a command is not read by a sensor."""
+
+
+def of_sensors(device: Device, names: Collection[str], units: Mapping[str, AbstractSet[str]]) -> Iterator[Cause]:
+    """Yield errors of sensors and clock: zero, gain, unit, sign and delay, swapped channels, rate of the clock.
+
+    ``units`` has, for each channel that moves, the units declared in the files, empty for none. Units are not tried for
+    a chamber that stays at atmospheric pressure, which shows no factor, nor against a unit that the file declares.
+    """
+    atmosphere = device.supply.atmospheric_pressure
+    gauge = max(device.supply.pressure, device.supply.dorsiflexion_pressure) - atmosphere
+    unit, per_pascal = _unit_of_pressure(device)
+    # Sensors of one kind: their SI unit, the point [SI] about which a gain turns, the size of a zero of 1 [SI], or 0
+    # where none is tried, its unit and how many of that are 1 in SI, and the errors of any bench.
+    sensed = [
+        *((group, "Pa", atmosphere, gauge, unit, per_pascal, PRESSURE_ERRORS) for group in _groups(names)),
+        (((ANGLE,), ANGLE, "seems"), "rad", 0.0, 1.0, "deg", math.degrees(1.0), ANGLE_ERRORS),
+        (((COMMAND,), COMMAND, "seems"), "", 0.0, 1.0, "of full opening", 1.0, _EXACT),
+        (((EXTERNAL_TORQUE,), EXTERNAL_TORQUE, "seems"), "N m", 0.0, 0.0, "", 1.0, _EXACT),
+    ]
+    for (channels, group, verb), si_unit, about, size, unit, shown, usual in sensed:
+        if not {*channels} <= {*names, COMMAND}:
+            continue
+        if size:
+            words = f"the zero of {group} seems to be off by {{:+.3g}} {unit}"
+            zeros, change = tuple(size * part for part in _ZEROS), partial(_sensed, channels, "zero", 0.0)
+            yield Cause(f"zero of {group}", words, change, zeros, shown=shown, usual=usual.zero)
+            words, change = (
+                f"{group} {verb} to read {{:.4g}} times the true value",
+                partial(_sensed, channels, "gain", about),
+            )
+            yield Cause(f"gain of {group}", words, change, _GAINS, is_ratio=True, usual=usual.gain)
+        read_as = ("gauge read as absolute", -about), ("absolute read as gauge", about)
+        for kind, zero in read_as if si_unit == "Pa" else ():
+            words = f"{group} {verb} to be {kind}"
+            yield Cause(words, words, partial(_sensed, channels, "zero", 0.0), (zero,), is_of_unit=True)
+        stated = set[str]().union(*(units.get(name, ()) for name in channels))
+        for mistake, factor in misread_units(si_unit, stated) if si_unit and units.keys() & {*channels} else ():
+            name = f"{group} {verb} to be {mistake}"
+            words = f"{name}: the unit is probably wrong, by a factor of {max(factor, 1.0 / factor):.4g}"
+            yield Cause(name, words, partial(_sensed, channels, "gain", about), (factor,), is_of_unit=True)
+    sensors = tuple(name for name in SENSORS if name in names)
+    # Of one sensor alone the delay is the one of all, which is taken out.
+    for name in sensors if len(sensors) > 1 else ():
+        words, change = (
+            f"{name} seems to lag the other channels by {{:.3g}} ms",
+            partial(_sensed, (name,), "delay", 0.0),
+        )
+        yield Cause(f"delay of {name}", words, change, _DELAYS, shown=1.0e3, usual=usual_errors(name).delay)
+    leads = tuple(-lead for lead in _SHIFTS)
+    for noun, verb, delays, shown in (("delay", "lag", _LONG_DELAYS, 1.0e3), ("lead", "lead", leads, -1.0e3)):
+        words = f"all sensors seem to {verb} the command by {{:.3g}} ms"
+        yield Cause(f"{noun} of all sensors", words, lambda delay: ModelChange(delay=delay), delays, shown=shown)
+    words = "the clock of the recording seems to run {:.4g} times as fast"
+    yield Cause("rate of the clock", words, lambda rate: ModelChange(clock=rate), _RATES, is_ratio=True)
+    has_both = PRESSURE_1 in names and PRESSURE_2 in names
+    swapped = ModelChange(is_swapped=True)
+    if has_both:
+        yield Cause("swap", "pressure_1 and pressure_2 seem to be swapped", lambda _: swapped)
+    for name in (COMMAND, EXTERNAL_TORQUE):
+        if name in names:
+            words = f"{name} seems to have the wrong sign"
+            yield Cause(f"sign of {name}", words, partial(_sensed, [name], "gain", 0.0), (-1.0,))
+    if has_both:
+        # A symmetric device mirrors both by an angle from the other end, and no recording tells these apart.
+        words = "command seems to have the wrong sign, and pressure_1 and pressure_2 to be swapped"
+        mirrored = replace(swapped, sensors={COMMAND: SensorModel(gain=-1.0)})
+        yield Cause("sign of command and swap", words, lambda _: mirrored)
+    if ANGLE in names:
+        middle = 0.5 * (device.actuator.angle_min + device.actuator.angle_max)
+        words = "the angle seems to be counted from the other end"
+        yield Cause("end of angle", words, partial(_sensed, [ANGLE], "gain", middle), (-1.0,))
 
 
 def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> ModelChange:
@@ -161,127 +277,6 @@ def _groups(names: Collection[str]) -> Iterator[tuple[tuple[str, ...], str, str]
         has_several = len(channels) > 1
         words = "all pressures" if has_several and len(channels) == len(pressures) else " and ".join(channels)
         yield channels, words, "seem" if has_several else "seems"
-
-
-def exchanges(
-    device: Device, names: Collection[str], units: Mapping[str, AbstractSet[str]]
-) -> Iterator[CandidateCause]:
-    """Yield causes without a magnitude: wrong unit, gauge read as absolute or reverse, swapped channels, wrong signs.
-
-    ``units`` has, for each channel that moves, the units declared in the files, empty for none. Units are not tried for
-    a chamber that stays at atmospheric pressure, which shows no factor, nor against a unit that the file declares.
-    """
-    atmosphere = device.supply.atmospheric_pressure
-    quantities = (ANGLE, "rad"), (EXTERNAL_TORQUE, "N m")
-    measured: list[tuple[tuple[str, ...], str, str, float]] = [
-        ((name,), f"{name} seems", unit, 0.0) for name, unit in quantities if name in names
-    ]
-    for channels, group, verb in _groups(names):
-        measured.append((channels, f"{group} {verb}", "Pa", atmosphere))
-        for kind, zero in (("gauge read as absolute", -atmosphere), ("absolute read as gauge", atmosphere)):
-            words = f"{group} {verb} to be {kind}"
-            yield CandidateCause(words, words, partial(_sensed, channels, "zero", 0.0), (zero,), is_of_unit=True)
-    for channels, seems, si_unit, true_zero in measured:
-        stated = set[str]().union(*(units.get(name, ()) for name in channels))
-        for mistake, factor in misread_units(si_unit, stated) if units.keys() & {*channels} else ():
-            name = f"{seems} to be {mistake}"
-            words = f"{name}: the unit is probably wrong, by a factor of {max(factor, 1.0 / factor):.4g}"
-            change = partial(_sensed, channels, "gain", true_zero)
-            yield CandidateCause(name, words, change, (factor,), is_of_unit=True)
-    has_both = PRESSURE_1 in names and PRESSURE_2 in names
-    if has_both:
-        yield CandidateCause(
-            "swap", "pressure_1 and pressure_2 seem to be swapped", lambda _: ModelChange(is_swapped=True)
-        )
-    for name in (COMMAND, EXTERNAL_TORQUE):
-        if name in names:
-            words = f"{name} seems to have the wrong sign"
-            yield CandidateCause(f"sign of {name}", words, partial(_sensed, [name], "gain", 0.0), (-1.0,))
-    if has_both:
-        # A symmetric device mirrors both by an angle from the other end, and no recording tells these apart.
-        words = "command seems to have the wrong sign, and pressure_1 and pressure_2 to be swapped"
-        mirrored = ModelChange({COMMAND: SensorModel(gain=-1.0)}, is_swapped=True)
-        yield CandidateCause("sign of command and swap", words, lambda _: mirrored)
-    if ANGLE in names:
-        middle = 0.5 * (device.actuator.angle_min + device.actuator.angle_max)
-        words = "the angle seems to be counted from the other end"
-        yield CandidateCause("end of angle", words, partial(_sensed, [ANGLE], "gain", middle), (-1.0,))
-
-
-def _both_ways(*sizes: float) -> tuple[float, ...]:
-    return (*(-size for size in reversed(sizes)), *sizes)
-
-
-# Grids are so fine that two Gauss-Newton steps reach the least squares, and no likely fault lies at one of their ends.
-_ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
-"""Trial zero offsets of angle [rad], command [full openings] and pressures [gauge supply pressures]."""
-_GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
-"""Trial gains of a sensor [-]."""
-_DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
-"""Trial delays of a sensor relative to the other sensors [s]."""
-_LONG_DELAYS = (0.015, 0.03, 0.05, 0.08, 0.12)
-"""Trial delays [s] of all sensors with respect to the command, beyond the common delay that is removed."""
-_SHIFTS = (0.0005, 0.001, 0.003, 0.008, 0.015, 0.03, 0.05, 0.08, 0.12)
-"""Trial times [s] by which all sensors lead the command, of which none is removed, and delays of a valve with none."""
-_RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
-"""Trial rates [-] of the clock of a recording."""
-
-_EXACT = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
-"""Usual sensor errors of a command: none, because a command is not read by a sensor."""
-
-
-def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
-    """Yield causes with a magnitude: gain and zero of pressures, angle and command; delays; clock rate."""
-    atmosphere = device.supply.atmospheric_pressure
-    gauge = max(device.supply.pressure, device.supply.dorsiflexion_pressure) - atmosphere
-    unit, per_pascal = _unit_of_pressure(device)
-    # Sensors of one kind: the point [SI] about which a gain turns, the size of a zero of 1 [SI], its unit and how many
-    # of that are 1 in SI, and the errors of any bench.
-    sensed = [(group, atmosphere, gauge, unit, per_pascal, PRESSURE_ERRORS) for group in _groups(names)]
-    if ANGLE in names:
-        sensed.append((((ANGLE,), ANGLE, "seems"), 0.0, 1.0, "deg", math.degrees(1.0), ANGLE_ERRORS))
-    sensed.append((((COMMAND,), COMMAND, "seems"), 0.0, 1.0, "of full opening", 1.0, _EXACT))
-    for (channels, words, verb), about, size, unit, shown, usual in sensed:
-        yield CandidateCause(
-            f"zero of {words}",
-            f"the zero of {words} seems to be off by {{:+.3g}} {unit}",
-            partial(_sensed, channels, "zero", 0.0),
-            tuple(size * part for part in _ZEROS),
-            shown=shown,
-            usual=usual.zero,
-        )
-        yield CandidateCause(
-            f"gain of {words}",
-            f"{words} {verb} to read {{:.4g}} times the true value",
-            partial(_sensed, channels, "gain", about),
-            _GAINS,
-            is_ratio=True,
-            usual=usual.gain,
-        )
-    sensors = tuple(name for name in SENSORS if name in names)
-    # Of one sensor alone the delay is the one of all, which is taken out.
-    for name in sensors if len(sensors) > 1 else ():
-        yield CandidateCause(
-            f"delay of {name}",
-            f"{name} seems to lag the other channels by {{:.3g}} ms",
-            partial(_sensed, (name,), "delay", 0.0),
-            _DELAYS,
-            shown=1.0e3,
-            usual=usual_errors(name).delay,
-        )
-    leads = tuple(-lead for lead in _SHIFTS)
-    for noun, verb, delays, shown in (("delay", "lag", _LONG_DELAYS, 1.0e3), ("lead", "lead", leads, -1.0e3)):
-        words = f"all sensors seem to {verb} the command by {{:.3g}} ms"
-        yield CandidateCause(
-            f"{noun} of all sensors", words, lambda delay: ModelChange(delay=delay), delays, shown=shown
-        )
-    yield CandidateCause(
-        "rate of the clock",
-        "the clock of the recording seems to run {:.4g} times as fast",
-        lambda rate: ModelChange(clock=rate),
-        _RATES,
-        is_ratio=True,
-    )
 
 
 _FACTORS: tuple[float, ...] = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
@@ -308,6 +303,8 @@ _OF_GASES = {
     "gas.temperature": (250.0, 340.0),
 }
 """Ends of what gases in use and rooms have [SI]; other values are no cause."""
+_OF_A_GAS = 5
+"""Number of trial values of a property of the gas, in geometric progression."""
 _ATMOSPHERES = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
 """Trial atmospheric pressures divided by the pressure in the set [-]: from a high mountain to a deep mine."""
 _SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas", "effects")
@@ -317,19 +314,17 @@ _NOT_TRIED = "actuator.restitution"
 _OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
 
 
-def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Iterator[CandidateCause]:
+def of_numbers(request: Replay) -> Iterator[Cause]:
     """Yield every number of the set, 0 or not, with trial values, and a wrong atmosphere under gauge sensors."""
-    request = replay_of(measured, device, settings)
-    scenario = replace(replayed_scenario(request), device=request.device)
+    device, recording = request.device, request.measured.recording
+    scenario = replace(replayed_scenario(request), device=device)
     # Supply pressures that a replay follows in the recording, whatever the set has.
-    followed = {path for path, channel in _OF_SUPPLY.items() if channel in measured.recording}
-    if SUPPLY in measured.recording and request.device.supply.has_one_pressure:
+    followed = {path for path, channel in _OF_SUPPLY.items() if channel in recording}
+    if SUPPLY in recording and device.supply.has_one_pressure:
         followed = set(_OF_SUPPLY)
     declared = declared_numbers(scenario)
-    other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(request.device, part)}
-    off = {
-        path for path in declared if path.startswith("effects.") and path.split(".")[1] not in request.device.effects
-    }
+    other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(device, part)}
+    off = {path for path in declared if path.startswith("effects.") and path.split(".")[1] not in device.effects}
     left_out = {_NOT_TRIED, *other_forms, *followed, *off}
     by_section = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
     for path in (path for path in by_section if path not in left_out):
@@ -343,10 +338,10 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
         trials = tuple(size for size in trials if quantity.minimum <= size * base <= quantity.maximum)
         if len(trials) > 2:
             is_ratio = min(trials) > 0.0
-            yield CandidateCause(
+            yield Cause(
                 path,
                 words,
-                partial(_scaled, path, base),
+                partial(_scaled, "", {}, {path: base}),
                 trials,
                 is_ratio=is_ratio,
                 usual=math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0,
@@ -354,7 +349,7 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
                 unit=quantity.unit or "-",
             )
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
-    atmosphere = request.device.supply.atmospheric_pressure
+    atmosphere = device.supply.atmospheric_pressure
 
     def under_atmosphere(factor: float) -> ModelChange:
         higher = (factor - 1.0) * atmosphere
@@ -362,11 +357,9 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
         moved = {path: pressure + higher for path, pressure in pressures.items()}
         return ModelChange(sensors, {ATMOSPHERE_PATH: atmosphere + higher, **moved})
 
-    unit, per_pascal = _unit_of_pressure(request.device)
+    unit, per_pascal = _unit_of_pressure(device)
     words = f"the atmosphere under gauge pressures seems to be {{:.4g}} {unit}"
-    yield CandidateCause(
-        "atmosphere", words, under_atmosphere, _ATMOSPHERES, is_ratio=True, shown=per_pascal * atmosphere
-    )
+    yield Cause("atmosphere", words, under_atmosphere, _ATMOSPHERES, is_ratio=True, shown=per_pascal * atmosphere)
 
 
 def _unit_of_pressure(device: Device) -> tuple[str, float]:
@@ -375,8 +368,58 @@ def _unit_of_pressure(device: Device) -> tuple[str, float]:
         return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
-def _scaled(path: str, value: float, factor: float) -> ModelChange:
-    return ModelChange(numbers={path: factor * value})
+def _scaled(effect: str, others: Mapping[str, float], scales: Mapping[str, float], size: float) -> ModelChange:
+    """Return a change of an effect, or of numbers of the set, to multiples of the magnitude and ``others``."""
+    values = {**others, **{name: size * scale for name, scale in scales.items()}}
+    return ModelChange(effects={effect: values}) if effect else ModelChange(numbers=values)
+
+
+_EFFECTS: tuple[tuple[str, tuple[str, ...], dict[str, float], str, float, str], ...] = (
+    (
+        *("stribeck", ("velocity",), {"share": 0.9}, "rad/s", 1.0),
+        "friction seems to be higher up to {:.2g} rad/s (Stribeck)",
+    ),
+    (
+        *("seal_friction", ("static_per_pressure", "dynamic_per_pressure"), {}, "N m/Pa", 1.0),
+        "friction seems to grow with pressure by {:.2g} N m/Pa",
+    ),
+    (
+        *("joint_load.stiffness", ("stiffness",), {}, "N m/rad", 1.0),
+        "a spring of {:.2g} N m/rad seems to act at the joint",
+    ),
+    (
+        *("joint_load.drag", ("drag",), {}, "N m s^2/rad^2", 1.0),
+        "a drag of {:.2g} N m s^2/rad^2 seems to act at the joint",
+    ),
+    (
+        *("laminar_leak.coefficient", ("coefficient",), {}, "kg/(s Pa^2)", 1.0),
+        "a laminar leak of {:.2g} kg/(s Pa^2) seems to pass the seal",
+    ),
+    (
+        *("line_resistance.area", ("area",), {}, "m^2", 1e6),
+        "lines seem to throttle as an orifice of {:.2g} mm^2 does",
+    ),
+)
+"""Effects that a device may have: settings equal to the magnitude, other settings, unit, shown units in 1 SI, words."""
+_CURVED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+"""Commands at which a curved opening is a table [-]."""
+_POWERS = (0.4, 0.7, 1.4, 2.0, 3.0)
+"""Trial powers of the command to which an opening is proportional [-]."""
+
+
+def of_effects(device: Device) -> Iterator[Cause]:
+    """Yield other openings of the valve, and every effect that is off in the model of the device."""
+    if "opening" in device.effects:
+        straight = ModelChange(effects={"opening": {}})
+        yield Cause("opening", "the valve seems to open by a straight line, not by its table", lambda _: straight)
+    elif device.valve.kind == "proportional":
+        words = "the valve seems to open by the power {:.2g} of its command"
+        yield Cause("opening", words, _opening_to_the_power, _POWERS, is_ratio=True)
+    for name, settings, others, unit, shown, words in _EFFECTS:
+        effect = name.partition(".")[0]
+        if effect not in device.effects:
+            change = partial(_scaled, effect, others, dict.fromkeys(settings, 1.0))
+            yield Cause(name, words, change, _OFF[unit], is_ratio=True, shown=shown, is_off=True)
 
 
 def _opening_to_the_power(power: float) -> ModelChange:
@@ -384,54 +427,3 @@ def _opening_to_the_power(power: float) -> ModelChange:
     for number, command in enumerate(_CURVED, 1):
         nodes |= {f"command_{number:02}": command, f"opening_{number:02}": command**power}
     return ModelChange(effects={"opening": nodes})
-
-
-_EFFECTS = (
-    ("stribeck", ("velocity",), "rad/s", 1.0, "friction seems to be higher up to {:.2g} rad/s (Stribeck)"),
-    (
-        *("seal_friction", ("static_per_pressure", "dynamic_per_pressure"), "N m/Pa", 1.0),
-        "friction seems to grow with pressure by {:.2g} N m/Pa",
-    ),
-    ("joint_load", ("stiffness",), "N m/rad", 1.0, "a spring of {:.2g} N m/rad seems to act at the joint"),
-    ("joint_load", ("drag",), "N m s^2/rad^2", 1.0, "a drag of {:.2g} N m s^2/rad^2 seems to act at the joint"),
-    (
-        *("laminar_leak", ("coefficient",), "kg/(s Pa^2)", 1.0),
-        "a laminar leak of {:.2g} kg/(s Pa^2) seems to pass the seal",
-    ),
-    ("line_resistance", ("area",), "m^2", 1e6, "lines seem to throttle as an orifice of {:.2g} mm^2 does"),
-)
-"""Effects that may be present in the device: settings equal to the magnitude, its unit, shown units in 1 SI, words."""
-_CONSTANT = {"stribeck": {"share": 0.9}}
-"""Constant settings of an effect."""
-_CURVED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-"""Commands at which a curved opening is a table [-]."""
-_POWERS = (0.4, 0.7, 1.4, 2.0, 3.0)
-"""Trial powers of the command to which an opening is proportional [-]."""
-_OF_A_GAS = 5
-"""Number of trial values of a property of the gas, in geometric progression."""
-
-
-def effects(device: Device) -> Iterator[CandidateCause]:
-    """Yield every effect that is off in the model of the device, with trial magnitudes, and other openings."""
-    if "opening" in device.effects:
-        straight = ModelChange(effects={"opening": {}})
-        yield CandidateCause(
-            "opening", "the valve seems to open by a straight line, not by its table", lambda _: straight
-        )
-    elif device.valve.kind == "proportional":
-        words = "the valve seems to open by the power {:.2g} of its command"
-        yield CandidateCause("opening", words, _opening_to_the_power, _POWERS, is_ratio=True)
-    for effect, settings, unit, shown, words in _EFFECTS:
-        if effect not in device.effects:
-            constant = _CONSTANT.get(effect, {})
-
-            def change(
-                size: float,
-                effect: str = effect,
-                settings: tuple[str, ...] = settings,
-                constant: dict[str, float] = constant,
-            ) -> ModelChange:
-                return ModelChange(effects={effect: {**constant, **dict.fromkeys(settings, size)}})
-
-            name = effect if len(settings) > 1 or constant else f"{effect}.{settings[0]}"
-            yield CandidateCause(name, words, change, _OFF[unit], is_ratio=True, shown=shown, is_off=True)

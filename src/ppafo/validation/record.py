@@ -5,8 +5,8 @@ samples, are fitted anew for every change.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,14 +20,12 @@ from ppafo.validation.agreement import (
     ENGINE_ERROR,
     ChannelAgreement,
     RecordingAgreement,
-    measured_values,
     noise_in,
     replay_of,
 )
-from ppafo.validation.candidates import SENSORS, SWAPPED, ModelChange, SensorModel
 from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import Replay, Replayed, replay_together
-from ppafo.validation.settings import ANGLE, ReplaySettings
+from ppafo.validation.settings import ANGLE, PRESSURE_1, PRESSURE_2, Motion, ReplaySettings
 from ppafo.wording import argument_text
 
 Flags = NDArray[np.bool_]
@@ -40,6 +38,72 @@ _BY_CHANCE = 1.0e-3
 """Probability [-] below which a run of equal extreme samples counts as clipping."""
 _FEW_OUTLIERS = 0.01
 """Largest usual fraction of isolated outliers in a channel [-]."""
+
+SENSORS = (ANGLE, PRESSURE_1, PRESSURE_2)
+"""Channels with a sensor on the device; torque and pressure difference are computed from them."""
+SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
+"""Channel recorded under each name when the two chamber pressures are swapped."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorModel:
+    """Sensor model: gain [-] about the value ``about``, zero offset (both in the channel's unit), delay [s]."""
+
+    gain: float = 1.0
+    zero: float = 0.0
+    about: float = 0.0
+    delay: float = 0.0
+
+    def of(self, true: Floats) -> Floats:
+        """Return the readings of true values [unit of the channel]."""
+        return self.about + self.gain * (true - self.about) + self.zero
+
+    def true(self, readings: Floats) -> Floats:
+        """Return the true values of readings [unit of the channel]."""
+        return self.about + (readings - self.zero - self.about) / self.gain
+
+
+@dataclass(frozen=True, slots=True)
+class ModelChange:
+    """Difference between the recorded device and its parameter set; by default no difference.
+
+    ``sensors``: sensor models by channel. ``numbers``: changed parameters by path [SI]. ``effects``: settings of
+    effects by the name of the effect. ``is_swapped``: pressures 1 and 2 are exchanged. ``delay``: delay [s] of all
+    sensors with respect to the command. ``clock``: true rate of the recording's clock [-]. ``motion``: motion of the
+    vane, if another. ``start``: if not None, faulty samples are ignored, and a channel whose first samples are faulty
+    starts at this fraction [-] of its range.
+    """
+
+    sensors: Mapping[str, SensorModel] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    is_swapped: bool = False
+    delay: float = 0.0
+    clock: float = 1.0
+    motion: Motion | None = None
+    start: float | None = None
+
+    @property
+    def has_delay(self) -> bool:
+        """True if all sensors lag behind the command, by a sensor delay or the delay of the valve."""
+        return self.delay != 0.0 or any(path.endswith("delay") for path in self.numbers)
+
+
+def joined(first: ModelChange, second: ModelChange) -> ModelChange:
+    """Return the combination of two changes; ``first`` has precedence for parameters and settings in both."""
+    sensors = dict(first.sensors)
+    for name, other in second.sensors.items():
+        sensor = sensors.get(name, SensorModel())
+        sensors[name] = SensorModel(
+            gain=sensor.gain * other.gain,
+            zero=sensor.zero + other.zero,
+            # A zero and a delay turn about nothing, so that the gain's point stays.
+            about=other.about if other.gain != 1.0 else sensor.about,
+            delay=sensor.delay + other.delay,
+        )
+    numbers, effects = {**second.numbers, **first.numbers}, {**second.effects, **first.effects}
+    delay, clock = first.delay + second.delay, first.clock * second.clock
+    return replace(first, sensors=sensors, numbers=numbers, effects=effects, delay=delay, clock=clock)
 
 
 class Record(NamedTuple):
@@ -75,25 +139,37 @@ class ScaledResiduals(NamedTuple):
         return float(self.squares.max()) < ONLY_NOISE
 
 
+UNTRIED = ScaledResiduals(np.zeros(0), np.zeros(0))
+"""Residuals of a change that was not tried yet."""
+
+
 def record_of(
     measured: MeasuredRecording, agreement: RecordingAgreement, device: Device, settings: ReplaySettings
 ) -> Record:
     """Prepare a recording: faulty samples marked, sensitivity of the readings to each initial value."""
     compared = [channel for channel in agreement.channels if channel.channel in SENSORS] or agreement.channels[:1]
-    values, noises, faults = zip(*(_samples_of(channel, agreement) for channel in compared), strict=True)
-    noise, full_ranges = np.array(noises), np.array([channel.full_range for channel in compared])
-    wrong = [(channel.channel, fault) for channel, fault in zip(compared, faults, strict=True) if fault is not None]
-    good = [
-        np.ones(len(series)) if fault is None else 1.0 - fault.samples
-        for series, fault in zip(values, faults, strict=True)
-    ]
+    noise, full_ranges = (
+        np.array([getattr(channel, name) for channel in compared]) for name in ("noise", "full_range")
+    )
+    good, wrong = np.ones((len(compared), len(measured.recording))), list[tuple[str, _Wrong]]()
+    for row, channel in enumerate(compared):
+        values, residuals = channel.values, channel.residuals
+        # Samples in a channel that the model explains are right, however they look; so are those of one that stands
+        # still with the model, but for its zero.
+        stands_still = np.ptp(values) == 0.0 and np.ptp(residuals) < channel.usual_zero
+        is_right = stands_still or channel.in_noise**2 < ONLY_NOISE
+        if not is_right and (fault := _wrong_samples(channel)) is not None:
+            wrong.append((channel.channel, fault))
+            good[row] -= fault.samples
+            is_good = np.logical_not(fault.samples)
+            noise[row] = max(noise_in(values[is_good], channel.full_range), correlated_noise_of(residuals[is_good]))
     record = Record(
         measured=measured,
         channels=tuple(channel.channel for channel in compared),
-        values=np.stack(values) / noise[:, None],
+        values=np.stack([channel.values for channel in compared]) / noise[:, None],
         noise=noise,
         engine=ENGINE_ERROR * full_ranges / noise,
-        good=np.stack(good),
+        good=good,
         words=tuple(f"{name} {fault.words}" for name, fault in wrong),
         has_few=all(fault.is_isolated and float(fault.samples.mean()) < _FEW_OUTLIERS for _, fault in wrong),
         delay=agreement.delay.correction,
@@ -115,24 +191,6 @@ def record_of(
     )
 
 
-def _samples_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> "tuple[Floats, float, _Wrong | None]":
-    """Return values [SI], noise without faulty samples [SI], and faulty samples (or None) of a channel."""
-    recording, model = agreement.measured, agreement.model
-    values = measured_values(recording, channel.channel)
-    assert values is not None
-    residuals = values - np.interp(recording.time - agreement.delay.correction, model.time, model[channel.channel])
-    # Samples in a channel that the model explains are right, however they look; so are those of one that stands still
-    # with the model, but for its zero.
-    stands_still = np.ptp(values) == 0.0 and np.ptp(residuals) < channel.usual_zero
-    is_right = stands_still or channel.in_noise**2 < ONLY_NOISE
-    wrong = None if is_right else _wrong_samples(values, residuals, channel, recording.time)
-    if wrong is None:
-        return values, channel.noise, None
-    is_good = np.logical_not(wrong.samples)
-    noise = max(noise_in(values[is_good], channel.full_range), correlated_noise_of(residuals[is_good]))
-    return values, noise, wrong
-
-
 class _Wrong(NamedTuple):
     """Faulty samples of a channel: description, flag by sample, and flag for isolated outliers."""
 
@@ -141,8 +199,9 @@ class _Wrong(NamedTuple):
     is_isolated: bool = False
 
 
-def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement, time: Floats) -> _Wrong | None:
+def _wrong_samples(channel: ChannelAgreement) -> _Wrong | None:
     """Return the faulty samples of a channel: constant signal, clipping, or outliers of samples or residuals."""
+    values = channel.values
     if np.ptp(values) == 0.0:
         locked = argument_text("motion", "locked")
         other_cause = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
@@ -150,13 +209,13 @@ def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement,
         return _Wrong(words, np.ones(len(values), dtype=bool))
     if (clipped := _clipped_samples(values)) is not None:
         return clipped
-    is_out, is_out_on_flank = isolated_samples(values, channel.noise), isolated_samples(residuals, channel.noise)
+    is_out, is_out_on_flank = (isolated_samples(one, channel.noise) for one in (values, channel.residuals))
     # On a flank an outlier shows only beside a model that follows it; at the ends a delay makes one of a step.
     is_out[1:-1] |= is_out_on_flank[1:-1]
     count = int(is_out.sum())
     if not count:
         return None
-    first = f"{float(time[int(np.argmax(is_out))]):.6g} s"
+    first = f"{float(channel.times[int(np.argmax(is_out))]):.6g} s"
     words = f"has {count} isolated outlier{'s' * (count > 1)}, the first at {first}"
     return _Wrong(words, is_out, is_isolated=True)
 

@@ -9,7 +9,7 @@ from ppafo.parameters.device import Device
 from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS
 from ppafo.simulation.scenario import Leg
 from ppafo.units import parse_quantity, split_quantity
-from ppafo.wording import known_names, nearest_name, one_line
+from ppafo.wording import known_names, one_line
 
 ANGLE, PRESSURE_1, PRESSURE_2 = "angle", "pressure_1", "pressure_2"
 PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
@@ -128,29 +128,6 @@ class ReplaySettings:
     thresholds: Mapping[str, ErrorLimit] = field(default_factory=dict)
     volume: float | None = None
     leg: Leg | None = None
-
-
-def replay_settings(
-    device: Device,
-    motion: str,
-    volume: float | None,
-    initial: Sequence[str],
-    thresholds: Sequence[str],
-    longest_delay: float,
-) -> ReplaySettings:
-    """Check the arguments of a validation and return its settings. Raises DataError for contradictions."""
-    if volume is not None and not volume > 0.0:
-        raise DataError(f"volume = {volume:g} m^3: must be above 0")
-    if not 0.0 <= longest_delay <= LARGEST_DELAY:
-        raise DataError(f"longest delay = {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
-    chosen = next((known for known in MOTIONS if known == motion), None)
-    if chosen is None:
-        hint = nearest_name(motion, MOTIONS)
-        raise DataError(f"motion '{one_line(motion)}': must be one of {', '.join(MOTIONS)}{hint}")
-    if volume is not None and chosen != "free":
-        raise DataError(f"motion '{chosen}': a fixed volume has no moving vane")
-    states = parse_initial(initial, device.supply.atmospheric_pressure)
-    return ReplaySettings(chosen, states, longest_delay, parse_thresholds(thresholds), volume)
 
 
 def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:

@@ -18,10 +18,10 @@ from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.validation.agreement import compare_recording
-from ppafo.validation.candidates import CandidateCause, ModelChange, sizes
-from ppafo.validation.causes import CauseSearch, Diagnosis, ResidualCause, _unexplained, causes_of
+from ppafo.validation.candidates import Cause, of_sensors
+from ppafo.validation.causes import CauseSearch, Diagnosis, causes_of
 from ppafo.validation.measured import check_recording
-from ppafo.validation.record import Record, ScaledResiduals, record_of
+from ppafo.validation.record import ModelChange, Record, record_of
 from ppafo.validation.settings import COMPARED, ReplaySettings
 from scripts.known_faults import FAULTS, LOOPS, Fault, declared_faults, judged, moved, recorded, validated
 
@@ -432,7 +432,7 @@ def test_a_chamber_that_rises_by_more_than_a_usual_zero_does_not_agree(filling: 
 
 def test_what_is_usual_on_a_bench_is_the_same_for_limits_causes_and_the_fit() -> None:
     usual, device = Tolerances.model_construct(), load_device("ppafo2011", overrides=SUPPLY)
-    by_name = {candidate.name: candidate.usual for candidate in sizes(device, ["angle", "pressure_1", "pressure_2"])}
+    by_name = {cause.name: cause.usual for cause in of_sensors(device, ["angle", "pressure_1", "pressure_2"], {})}
     for channel in ("angle", "pressure_1"):
         assert by_name[f"zero of {channel}"] == usual.zero_of(channel) == COMPARED[channel].usual_zero(device)
     # A fit takes an angle sensor as exact where nothing is stated.
@@ -491,19 +491,14 @@ def test_at_most_three_causes_that_leave_about_the_same_are_named(
         "foot_plate.inertia": 6.97,
         "friction.viscous_damping": 6.68,
     }
-    monkeypatch.setattr(CauseSearch, "left_by", lambda _, causes: [left[cause.candidate.name] for cause in causes])
+    monkeypatch.setattr(CauseSearch, "left_by", lambda _, causes: [left[cause.name] for cause in causes])
     tried = [
-        ResidualCause(
-            CandidateCause(name, f"{name} seems to be off", lambda _: ModelChange(), (0.0, 2.0)),
-            1.0,
-            ScaledResiduals(np.ones(3), np.zeros(3)),
-            2000.0,
-        )
+        Cause(name, f"{name} seems to be off", lambda _: ModelChange(), (0.0, 2.0), size=1.0, gain=2000.0)
         for name in left
     ]
     # What the search gains nothing by is no hint.
     tried.append(replace(tried[-1], gain=-4.0))
-    found = _unexplained(search, tried, "")
+    found = search.unexplained(tried, "")
     other = load_device("ppafo2011", overrides=[*SUPPLY, "valve.area=60 mm^2"])
     agreement = compare_recording(check_recording(bench, other, "r.csv"), other, settings)
     assert max(channel.in_noise for channel in agreement.channels) > 14.0
