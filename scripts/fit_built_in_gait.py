@@ -18,7 +18,7 @@ from scipy.io import loadmat
 
 from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import HARMONICS, KNEE, FitError, Gait, GaitCurve, fit_curve
-from ppafo.gait.recorded.knee import knee_position
+from ppafo.gait.recorded.signal import knee_position
 
 DIGITS = 5
 BODY_MASS = 62.0

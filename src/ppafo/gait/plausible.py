@@ -1,19 +1,40 @@
 """Plausibility of a stride: limits wide enough for impaired walking that exclude impossible values.
 
 Each error names file, curve, number and limits. A sign is rejected only if the opposite sign fits clearly better,
-because impaired walking often breaks the rules of healthy walking slightly.
+because impaired walking often breaks the rules of healthy walking slightly. The angles are checked by the standing foot
+in mid-stance, the knee by its rotation about the standing ankle.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from ppafo.errors import DataError, check_all
-from ppafo.gait.gait import HARMONICS, Gait, fit_curve
-from ppafo.gait.plausible_angles import CLEARLY_BETTER, MeanStride, check_ankle, check_ankle_range, check_shank
-from ppafo.gait.plausible_knee import check_knee, check_knee_means
+from ppafo.constants import STANDARD_GRAVITY
+from ppafo.errors import DataError, PpafoError, check_all, noted_in, raise_noted
+from ppafo.gait.gait import HARMONICS, KNEE, Gait, fit_curve
 from ppafo.signals.recording import Floats
 from ppafo.wording import without_exponent
+
+
+@dataclass(frozen=True, slots=True)
+class MeanStride:
+    """Mean stride: files and curves (101 samples, SI) by curve name, stance fraction [-] and stride time [s].
+
+    ``is_knee_one_marker`` is True if both coordinates of the knee are from one marker, whose scales cannot differ.
+    """
+
+    file: Mapping[str, str]
+    curves: Mapping[str, Floats]
+    stance_share: float
+    stride_time: float
+    is_knee_one_marker: bool = False
+
+    def where(self, name: str) -> str:
+        """Return file and name of a curve, at the start of a refusal."""
+        return f"{self.file[name]}: {name}"
+
 
 STANCE_FRACTION = (0.45, 0.85)
 STRIDE_TIME = (0.5, 3.0)
@@ -82,7 +103,7 @@ def check_side(walk: MeanStride, usual: Gait) -> None:
     apart = abs((ankle - shank + 0.5) % 1.0 - 0.5)
     if apart > _OTHER_FOOT and in_place > _ALIKE_SHANK and best > _ALIKE and own < _UNLIKE:
         raise DataError(
-            f"{walk.file['ankle_angle']}: ankle_angle is shifted by {100.0 * apart:.0f} % of the stride against "
+            f"{walk.where('ankle_angle')} is shifted by {100.0 * apart:.0f} % of the stride against "
             "shank_angle, so it belongs to the other foot"
         )
 
@@ -98,6 +119,164 @@ def _lag(walk: MeanStride, usual: Gait, name: str) -> tuple[float, float, float]
     scale = float(np.sqrt(np.sum(lags**2) * np.sum(expected**2)))
     alike = np.fft.irfft(spectrum, _FINE.size) / scale
     return float(_FINE[np.argmax(alike)]), float(np.max(alike)), float(alike[0])
+
+
+SHANK_RANGE = (25.0, 120.0)
+ANKLE_RANGE = (5.0, 80.0)
+ANKLE_LIMITS = (40.0, 150.0)
+MIDSTANCE = slice(15, 41)
+"""Mid-stance samples [percent of the stride], in which the foot stands and the ankle rotates with the shank."""
+_TURNS = 2.0
+"""Least rotation of a standing foot [deg, RMS] that shows a wrong sign; recorded feet rotate by 0.5 to 1.5 deg."""
+_TURNED_BACK = 0.1
+"""Backward rotation of the shank over the standing foot, relative to its range [-], that shows a reversed sign.
+
+Recorded shanks rotate forward by 0.15 to 0.25 of the range.
+"""
+REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
+"""Limits of the mean tilt of the standing foot in mid-stance [deg] for a remark, and for an error.
+
+Recorded feet on level ground have 0.5 to 4.6 deg, from the sole of the shoe and the placement of markers. A standing
+foot is not tilted by more than 20 deg: this is a heel of 6 cm on a foot of 17 cm from heel to ball, walking on the
+toes, or a ramp of 1 in 3. A larger tilt shows a wrong zero.
+"""
+CLEARLY_BETTER = 2.0
+"""Factor by which the opposite sign of a curve must fit better, or give a larger value, to reject the given sign."""
+
+
+def check_shank(walk: MeanStride) -> None:
+    """Raise DataError for a shank angle that no leg can have."""
+    phi = np.degrees(walk.curves["shank_angle"])
+    where = walk.where("shank_angle")
+    # The range is free of the zero, so that a wrong unit shows before a wrong zero.
+    travel = float(np.ptp(phi))
+    check_angle_range(where, travel, SHANK_RANGE)
+    # Means of five samples at both ends: a single one may lie on a tremor.
+    growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
+    if growth > _TURNED_BACK * travel:
+        raise DataError(
+            f"{where} increases by {growth:.2g} deg in mid-stance, so the shank would rotate backwards over the foot: "
+            "its sign is reversed, or a vertical force is of the other foot"
+        )
+    if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
+        raise DataError(
+            f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average (plausible: above -10 "
+            "deg at heel strike, and -50 to 10 deg on average; 0 is vertical, positive with the ankle in front of the "
+            "knee)"
+        )
+
+
+def check_angle_range(where: str, travel: float, limits: tuple[float, float], is_whole: bool = False) -> None:
+    """Raise DataError for an angle with an implausible range [deg]; a whole record has no upper limit."""
+    low, high = limits
+    if low <= travel and (is_whole or travel <= high):
+        return
+    likely = [
+        unit
+        for unit, number in (("radians", np.degrees(travel)), ("degrees", np.radians(travel)))
+        if low <= number <= high
+    ]
+    hint = "".join(f"; the numbers look like {unit}" for unit in likely)
+    raise DataError(f"{where} has a range of {travel:.3g} deg (plausible in a stride: {low:g} to {high:g} deg){hint}")
+
+
+def check_ankle_range(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle with an implausible range."""
+    travel = float(np.ptp(np.degrees(walk.curves["ankle_angle"])))
+    check_angle_range(walk.where("ankle_angle"), travel, ANKLE_RANGE)
+
+
+def check_ankle(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle that is implausible together with the shank angle."""
+    where = walk.where("ankle_angle")
+    turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
+    wrong: list[PpafoError] = []
+    is_reversed = turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS
+    if is_reversed:
+        wrong.append(
+            DataError(
+                f"{where} moves into plantarflexion while the shank rotates forward: the flat foot would rotate by "
+                f"{turned:.2g} deg (RMS), but only by {reversed_turned:.2g} deg with the opposite sign, so the sign is "
+                "reversed"
+            )
+        )
+    # A reversed sign turns the angle about 90 deg: the zero is wrong, too, where the foot is tilted even then.
+    ankle = np.pi - walk.curves["ankle_angle"] if is_reversed else walk.curves["ankle_angle"]
+    foot = standing_tilt(walk.curves["shank_angle"], ankle)
+    with noted_in(wrong):
+        _check_ankle_zero(walk, np.degrees(ankle), foot)
+    raise_noted(wrong)
+
+
+def check_ankle_alone(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle, if there is one, whose range or zero is implausible beside any shank."""
+    if "ankle_angle" in walk.curves:
+        check_ankle_range(walk)
+        _check_ankle_zero(walk, np.degrees(walk.curves["ankle_angle"]), 0.0)
+
+
+def _check_ankle_zero(walk: MeanStride, theta: Floats, foot: float) -> None:
+    """Raise DataError for an ankle angle ``theta`` [deg] out of its limits, or a standing foot with a tilt [deg]."""
+    low, high = ANKLE_LIMITS
+    if abs(foot) <= REFUSED_TILT and low <= float(theta.min()) and float(theta.max()) <= high:
+        return
+    as_read = np.degrees(walk.curves["ankle_angle"])
+    tilt = f"implies a foot tilted by {foot:.0f} deg in mid-stance (plausible: up to {REFUSED_TILT:g} deg) and "
+    raise DataError(
+        f"{walk.where('ankle_angle')} {tilt if foot else ''}ranges from {as_read.min():.0f} to "
+        f"{as_read.max():.0f} deg (neutral: 90 deg)"
+    )
+
+
+def standing_tilt(shank: Floats, ankle: Floats) -> float:
+    """Return the mean tilt [deg] of the foot from 15 to 40 % of the stride, positive with the toes down.
+
+    ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package.
+    """
+    # On level ground the ankle is 90 deg plus the shank angle while the foot is flat.
+    foot = np.degrees(ankle - shank)[MIDSTANCE] - 90.0
+    return float(np.mean(foot))
+
+
+def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
+    """Return the rotation of the foot [deg, RMS] from 15 to 40 % of the stride, as given and with the ankle reversed.
+
+    ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package. A foot flat on the ground has a
+    rotation of 0.
+    """
+    # A flat foot stands still while the shank leans: the ankle then follows the shank, with the sign as it is or
+    # reversed.
+    lean, stand = np.degrees(shank)[MIDSTANCE], np.degrees(ankle)[MIDSTANCE]
+    return float(np.std(stand - lean)), float(np.std(stand + lean))
+
+
+def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
+    """Return a remark on an ankle angle whose sign cannot be verified while the foot stands."""
+    turned, reversed_turned = standing_turns(shank, ankle)
+    if CLEARLY_BETTER * turned <= reversed_turned:
+        return []
+    return [
+        f"the sign of ankle_angle is uncertain: in mid-stance the flat foot rotates by {turned:.2g} deg (RMS), and by "
+        f"{reversed_turned:.2g} deg with the opposite sign"
+    ]
+
+
+def zero_remarks(shank: Floats, ankle: Floats) -> list[str]:
+    """Return a remark on the zero of an ankle angle if the standing foot appears tilted; curves [rad]."""
+    tilt = standing_tilt(shank, ankle)
+    if abs(tilt) <= REMARKED_TILT:
+        return []
+    way = "toes down" if tilt > 0.0 else "toes up"
+    return [
+        f"the zero of ankle_angle seems to be off: the flat foot appears tilted by {abs(tilt):.1f} deg, {way} (mean "
+        f"from 15 to 40 % of the stride, usual on level ground: up to {REMARKED_TILT:g} deg)"
+    ]
+
+
+def gait_file_remarks(gait: Gait) -> list[str]:
+    """Return a remark on the ankle zero of a finished gait."""
+    percent = np.linspace(0.0, 1.0, 101)
+    return zero_remarks(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
 
 
 MOMENT_PEAK = (0.05, 3.5)
@@ -135,7 +314,7 @@ def check_moment(walk: MeanStride) -> None:
     if "ankle_moment" not in walk.curves:
         return
     moment = walk.curves["ankle_moment"]
-    where = f"{walk.file['ankle_moment']}: ankle_moment"
+    where = walk.where("ankle_moment")
     if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > CLEARLY_BETTER * float(np.max(moment)):
         raise DataError(f"{where} peaks at {np.min(moment):.3g} N m/kg, in dorsiflexion, so its sign is reversed")
     peak, (low, high) = float(np.max(moment)), MOMENT_PEAK
@@ -165,7 +344,7 @@ def check_moment_time(walk: MeanStride) -> None:
     if "ankle_moment" not in walk.curves:
         return
     moment = walk.curves["ankle_moment"]
-    peak, column = float(np.max(moment)), f"{walk.file['ankle_moment']}: ankle_moment"
+    peak, column = float(np.max(moment)), walk.where("ankle_moment")
     fraction, phase = walk.stance_share, np.linspace(0.0, 1.0, moment.size)
     at, swing = float(phase[np.argmax(moment)]), float(np.max(moment[phase > fraction + _AFTER_TOE_OFF]))
     if at < fraction and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
@@ -182,7 +361,7 @@ def check_force(walk: MeanStride) -> None:
     if "vertical_force" not in walk.curves:
         return
     force = walk.curves["vertical_force"]
-    where = f"{walk.file['vertical_force']}: vertical_force"
+    where = walk.where("vertical_force")
     peak, mean = float(np.max(force)), float(np.mean(force))
     if not FORCE_PEAK[0] <= peak <= FORCE_PEAK[1] or not FORCE_MEAN[0] <= mean <= FORCE_MEAN[1]:
         raise DataError(
@@ -201,3 +380,136 @@ def force_remarks(force: Floats) -> list[str]:
         f"vertical_force has a mean of {mean:.3g} body weights, but each leg of a steady walk carries about 0.5 "
         f"(usual: {low:g} to {high:g})"
     ]
+
+
+FOOT_FLAT = slice(15, 43)
+"""Samples [percent of the stride] in which the foot stands flat."""
+
+SHANK_LENGTHS = (0.25, 0.6)
+"""Range of shank lengths [m] for the best fit, as a gait does not contain the length."""
+
+_FITS = 0.6
+"""Largest misfit to a rotation about the ankle [-, RMS] that counts as a fit; correct recordings have 0.3 to 0.46."""
+_LEFT_BY_ONE = 0.62
+"""Fraction of the misfit below which a correction explains it; correct knees in units of g leave 0.48 to 0.57."""
+
+_G = STANDARD_GRAVITY
+_FACTORS = {
+    **{f"multiply %s by {factor:g}": factor for factor in (_G, 1000.0)},
+    **{f"divide %s by {factor:g}": 1.0 / factor for factor in (_G, 1000.0)},
+}
+_CORRECTIONS = {
+    "exchange them": ((0.0, 1.0), (1.0, 0.0)),
+    "exchange them and reverse knee_up": ((0.0, -1.0), (1.0, 0.0)),
+    **{words % "both": ((factor, 0.0), (0.0, factor)) for words, factor in _FACTORS.items() if factor > 1.0},
+    **{words % "knee_forward": ((factor, 0.0), (0.0, 1.0)) for words, factor in _FACTORS.items()},
+    **{words % "knee_up": ((1.0, 0.0), (0.0, factor)) for words, factor in _FACTORS.items() if factor < 1.0},
+    **{words % "both": ((factor, 0.0), (0.0, factor)) for words, factor in _FACTORS.items() if factor < 1.0},
+    f"exchange them and multiply both by {_G:g}": ((0.0, _G), (_G, 0.0)),
+}
+"""Coefficients of each corrected curve (forward, up) in the given ones; the first that fits is reported.
+
+A knee_up too small by a factor and a wrong sign alone are not recognised here. One that is divided by a factor fits
+almost as well as the given curves.
+"""
+
+
+def _check_turning(walk: MeanStride) -> None:
+    """Raise DataError for a knee that turns about the resting ankle only after a correction."""
+    expected = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
+    # Over a stride that repeats the mean is 0; gravity in it is refused elsewhere and must not hide a unit here.
+    forward, up = (walk.curves[name] - np.mean(walk.curves[name][:-1]) for name in KNEE)
+    turned = np.stack([forward, up])[:, FOOT_FLAT]
+    missed = _misfit(turned, expected)
+    for remedy, factors in _CORRECTIONS.items():
+        is_of_one_alone = factors[0][1] == factors[1][0] == 0.0 and factors[0][0] != factors[1][1]
+        left = _misfit(np.array(factors) @ turned, expected)
+        if left < min(_FITS, _LEFT_BY_ONE * missed) and not (walk.is_knee_one_marker and is_of_one_alone):
+            raise DataError(
+                f"{walk.where('knee_forward')} and knee_up differ by {100.0 * missed:.0f} % "
+                f"({100.0 * left:.0f} % if corrected) from a rotation of the knee about the resting ankle while the "
+                f"foot is flat; {remedy}"
+            )
+
+
+def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
+    """Return the acceleration (2 x samples: forward, up) of a knee above a resting ankle, per shank length [1/s^2].
+
+    ``shank`` is phi [rad] at 101 phases; relative to the knee the ankle is at (L sin phi, -L cos phi).
+    """
+    curve, _ = fit_curve(shank, HARMONICS["shank_angle"])
+    percent = np.linspace(0.0, 1.0, shank.size)[FOOT_FLAT]
+    rates = curve.derivative(stride_time)
+    phi, rate, acceleration = (series.values_at(percent) for series in (curve, rates, rates.derivative(stride_time)))
+    sine, cosine = np.sin(phi), np.cos(phi)
+    forward = sine * rate**2 - cosine * acceleration
+    # Centripetal and tangential acceleration of a point that turns about the ankle.
+    up = -cosine * rate**2 - sine * acceleration
+    return np.stack([forward, up])
+
+
+def _misfit(measured: Floats, expected: Floats) -> float:
+    """Return the relative misfit to the expected acceleration at the best shank length [-]; infinite at rest."""
+    square = float(np.sum(expected**2))
+    if square == 0.0:
+        return float("inf")
+    # Least squares for the one unknown, the length of the shank.
+    length = float(np.clip(np.sum(measured * expected) / square, *SHANK_LENGTHS))
+    return float(np.sqrt(np.sum((measured - length * expected) ** 2) / square)) / length
+
+
+KNEE_TRAVEL = (0.5, 80.0)
+"""Plausible range of the knee acceleration over a stride [m/s^2]."""
+KNEE_MEAN = 1.5
+"""Largest mean of the knee acceleration over a stride [m/s^2]; it is 0 for a periodic motion."""
+_HELD_BACK = 0.2
+"""Fraction of its range by which a knee must decelerate in the phase of usual acceleration to reject its sign [-].
+
+A measured knee accelerates by 0.8 to 0.9 of its range.
+"""
+
+_PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.4, 0.7))}
+"""Intervals about toe-off [fractions of the swing] of acceleration (forward, up) and of deceleration."""
+
+
+def check_knee(walk: MeanStride) -> None:
+    """Raise DataError for knee accelerations that no leg can have; a stride without accelerations passes."""
+    there = [name for name in KNEE if name in walk.curves]
+    if len(there) == 1:
+        (missing,) = set(KNEE) - set(there)
+        raise DataError(f"{walk.where(there[0])} needs {missing}; give both or neither")
+    if there:
+        _check_turning(walk)
+    check_knee_means(walk)
+    check_all([partial(_check_knee_curve, walk, name)] for name in there)
+
+
+def check_knee_means(walk: MeanStride) -> None:
+    """Raise DataError for knee accelerations whose mean over a stride is not 0; skipped without accelerations."""
+    # Without the last sample, which is the first phase again.
+    means = {name: float(np.mean(walk.curves[name][:-1])) for name in KNEE if name in walk.curves}
+    raise_noted(
+        [
+            DataError(
+                f"{walk.where(name)} has a mean of {mean:.3g} m/s^2, but must average to 0 over a stride "
+                f"(allowed: up to {KNEE_MEAN:g} m/s^2; gravity is not part of it)"
+            )
+            for name, mean in means.items()
+            if abs(mean) > KNEE_MEAN
+        ]
+    )
+
+
+def _check_knee_curve(walk: MeanStride, name: str) -> None:
+    values, where = walk.curves[name], walk.where(name)
+    travel, (low, high) = float(np.ptp(values)), KNEE_TRAVEL
+    if not low <= travel <= high:
+        raise DataError(f"{where} has a range of {travel:.3g} m/s^2 per stride (plausible: {low:g} to {high:g} m/s^2)")
+    # Gait phase of the swing, below 0 before toe-off.
+    swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
+    driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
+    if held - driven > _HELD_BACK * travel:
+        raise DataError(
+            f"{where} is {driven:.3g} m/s^2 around toe-off and {held:.3g} m/s^2 in mid-swing, while walking has the "
+            "opposite pattern: the sign is reversed, or the data are of the other knee"
+        )

@@ -1,6 +1,5 @@
 """Reading of recordings from files of all supported formats, result folders and data frames."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -74,20 +73,14 @@ def read_parquet(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> R
     with refused_as(DataError, str(path), DataError):
         try:
             table = pq.read_table(pa.BufferReader(content))
+            frame = table.to_pandas()
         except (pa.ArrowException, OSError, ValueError) as error:
             raise DataError(f"is not a readable Parquet file: {one_line(error)}") from error
         units = {
             field.name: (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace") for field in table.schema
         }
-        # What pandas keeps of a frame's attributes, as text.
-        attributes = json.loads((table.schema.metadata or {}).get(b"PANDAS_ATTRS", b"{}"))
-        units |= attributes.get("units", {})
-        names = [name for name in table.column_names if name != "__index_level_0__"]
-        if not any(map(_is_time, names)):
-            raise DataError(f"has no column '{TIME} [{TIME_UNIT}]'; available: {', '.join(map(one_line, names))}")
-        values = [table[name].to_numpy() for name in names]
-        kind = str(attributes.get("kind", "measured"))
-        return _recording(names, values, units, one_line(Path(path).stem), kind, atmosphere)
+        frame.attrs |= {"units": units | frame.attrs.get("units", {}), "title": one_line(Path(path).stem)}
+        return recording_of_frame(frame, atmosphere)
 
 
 def _is_time(name: str) -> bool:

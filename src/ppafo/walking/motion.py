@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ppafo.gait import Gait
-from ppafo.gait.plausible_angles import gait_file_remarks
+from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declared import quantities_in

@@ -18,7 +18,7 @@ from ppafo.gait import Gait, at_speed, list_gaits, load_gait, speed_range, walk_
 from ppafo.gait.document import gait_toml, json_schema, parse_gait
 from ppafo.gait.finding import gait_finding
 from ppafo.gait.gait import KNEE, GaitCurve
-from ppafo.gait.plausible_angles import gait_file_remarks
+from ppafo.gait.plausible import gait_file_remarks
 from ppafo.gait.recorded import ImportedGait, ImportSettings, import_gait
 from ppafo.storage import write_csv
 

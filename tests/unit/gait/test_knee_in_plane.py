@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ppafo.gait import Gait
-from ppafo.gait.plausible_knee import FOOT_FLAT, turning_about_ankle
-from ppafo.gait.recorded.curves import acceleration_of
-from ppafo.gait.recorded.knee import knee_position
+from ppafo.gait.plausible import FOOT_FLAT, turning_about_ankle
+from ppafo.gait.recorded.signal import knee_position
+from ppafo.gait.recorded.strides import acceleration_of
 from ppafo.signals.recording import Floats
 
 HIP = np.array([-0.06828, -0.06384, 0.08233])

@@ -13,10 +13,9 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.plausible_angles import SHANK_RANGE, check_angle_range
-from ppafo.gait.recorded.columns import LOADS, CurveColumns
+from ppafo.gait.plausible import SHANK_RANGE, check_angle_range
 from ppafo.gait.recorded.mapping import Side
-from ppafo.gait.recorded.signal import Signal, low_pass, with_absence
+from ppafo.gait.recorded.signal import LOADS, CurveColumns, Signal, low_pass, with_absence
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.wording import count_of
 

@@ -10,10 +10,15 @@ import numpy as np
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
-from ppafo.gait.plausible import check_plausible, check_side, force_remarks, moment_remarks
-from ppafo.gait.plausible_angles import MeanStride, sign_remarks, zero_remarks
-from ppafo.gait.recorded.columns import LOADS
-from ppafo.gait.recorded.curves import CurveStatistics, check_scatter, over_strides, scatter_remarks, statistics
+from ppafo.gait.plausible import (
+    MeanStride,
+    check_plausible,
+    check_side,
+    force_remarks,
+    moment_remarks,
+    sign_remarks,
+    zero_remarks,
+)
 from ppafo.gait.recorded.footfalls import (
     FORCE,
     SHANK,
@@ -23,14 +28,18 @@ from ppafo.gait.recorded.footfalls import (
     strides_of_curve,
     strides_within,
 )
-from ppafo.gait.recorded.knee import check_direction, knee_remarks
 from ppafo.gait.recorded.mapping import ImportSettings, check_settings
-from ppafo.gait.recorded.signal import Signal, low_pass
+from ppafo.gait.recorded.signal import LOADS, Signal, check_direction, knee_remarks, low_pass
 from ppafo.gait.recorded.source import GaitSource, read_source
 from ppafo.gait.recorded.strides import (
+    CurveStatistics,
     StrideSelection,
     check_enough,
+    check_scatter,
+    over_strides,
+    scatter_remarks,
     select_strides,
+    statistics,
     without_drop_outs,
     without_odd_shapes,
 )
@@ -74,7 +83,18 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     except PpafoError as error:
         raise_noted([*wrong, error])
     curves, strides, unmeasured = _curves_over_strides(source, footfalls, wrong)
-    mean_stride = _mean_stride(source, curves, strides)
+    # Both coordinates of the knee may be from one marker, whose scale is one.
+    knee, is_one_marker = source.columns.knee, False
+    if knee is not None and knee.thigh is None and len(knee.forward) == len(knee.up) == 1:
+        forward, up = (terms[0].removeprefix("-").rpartition(".")[0] for terms in (knee.forward, knee.up))
+        is_one_marker = forward == up != ""
+    mean_stride = MeanStride(
+        file={name: source.walk[name].file for name in curves},
+        curves={name: curve.mean for name, curve in curves.items()},
+        stance_share=float(np.mean([stride.stance_share for stride in strides.taken])),
+        stride_time=float(np.mean([stride.time for stride in strides.taken])),
+        is_knee_one_marker=is_one_marker,
+    )
     fitted = {name: fit_curve(curve.mean, HARMONICS[name], curve.spread) for name, curve in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     walk = {name: footfalls.walk[name] for name in curves}
@@ -146,22 +166,6 @@ def _curves_over_strides(
         raise_noted(wrong)
     remarks = [f"{name} is left out: not measured throughout the stance of any stride" for name in unmeasured]
     return remaining, strides, remarks
-
-
-def _mean_stride(source: GaitSource, curves: Mapping[str, CurveStatistics], strides: StrideSelection) -> MeanStride:
-    """Return the mean curves with stance fraction and stride time, as the plausibility checks need them."""
-    # Both coordinates of the knee may be from one marker, whose scale is one.
-    knee, is_one_marker = source.columns.knee, False
-    if knee is not None and knee.thigh is None and len(knee.forward) == len(knee.up) == 1:
-        forward, up = (terms[0].removeprefix("-").rpartition(".")[0] for terms in (knee.forward, knee.up))
-        is_one_marker = forward == up != ""
-    return MeanStride(
-        file={name: source.walk[name].file for name in curves},
-        curves={name: curve.mean for name, curve in curves.items()},
-        stance_share=float(np.mean([stride.stance_share for stride in strides.taken])),
-        stride_time=float(np.mean([stride.time for stride in strides.taken])),
-        is_knee_one_marker=is_one_marker,
-    )
 
 
 def _remarks(

@@ -1,12 +1,20 @@
-"""Signals over time from one file: gaps in motions, loads that were not measured, and low-pass filter."""
+"""Signals of the curves over time: sums of columns in SI units, gaps, low-pass filter, and the knee from its hip."""
 
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from textwrap import shorten
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
+from ppafo.gait.gait import HARMONICS
+from ppafo.gait.recorded.mapping import KneeMap, setting_text
+from ppafo.gait.recorded.table import COORDINATES, MotionTable, marker_of
 from ppafo.signals.recording import Floats
+from ppafo.units import parse_quantity, to_si
+from ppafo.wording import nearest_name, one_line
 
 _MINIMUM_SAMPLES = 20
 """Least number of samples for the low pass."""
@@ -76,3 +84,214 @@ def low_pass(signal: Signal, cut_off: float) -> Signal:
     sections = butter(_ORDER, relative, output="sos")
     values = sosfiltfilt(sections, np.interp(even, signal.time, signal.values))
     return replace(signal, time=even, values=np.asarray(values, dtype=np.float64))
+
+
+LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
+"""Curves that are undefined while the foot is off a force plate, which does not count as a gap."""
+_RATE = "rad/s"
+_NOT_INTEGRATED = "; integrate it over each stride, less its mean over the stride, and set the zero while standing"
+_MOST_NAMES, _LONGEST_TEXT = 12, 160
+"""Limits of an error message: number of column names, and characters of the names and of a remark."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CurveColumns:
+    """Columns of a curve: unit key in a gait map, table, and terms as pairs of sign and column name."""
+
+    unit_key: str
+    table: MotionTable
+    terms: tuple[tuple[float, str], ...]
+    may_be_absent: bool = False
+
+    def in_unit(self, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
+        """Return the sum of the terms in the first SI unit that fits, and this unit; raises DataError if none fits."""
+        total = np.zeros(self.table.time.size)
+        chosen = si_units[0]
+        wrong: list[PpafoError] = []
+        for sign, name in self.terms:
+            if not self.may_be_absent:
+                with noted_in(wrong):
+                    check_recorded(self.table.columns[name], f"{self.table.file}: column {name!r}")
+            with noted_in(wrong):
+                values, chosen = self._column(name, stated, si_units)
+                total += sign * values
+        raise_noted(wrong)
+        return total, chosen
+
+    def _column(self, name: str, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
+        """Return a column in the first SI unit that fits, and this unit; raises DataError if none fits."""
+        where = f"{self.table.file}: column {name!r}"
+        unit = stated or self.table.units[name]
+        values = self.table.columns[name]
+        if not unit:
+            raise DataError(f"{where} has no unit, in the file or as {self.unit_key} of a gait map")
+        parsed_unit = "" if unit == "-" else unit
+        problem = ""
+        for si_unit in (*si_units, _RATE):
+            try:
+                # Units are affine: two conversions give scale and zero for a whole column.
+                zero, one = (to_si(number, parsed_unit, si_unit) for number in (0.0, 1.0))
+            except UnitError as error:
+                problem = problem or str(error)
+                continue
+            if si_unit == _RATE:
+                problem += _NOT_INTEGRATED
+                break
+            return zero + (one - zero) * values, si_unit
+        raise DataError(f"{where} [{unit}]: {problem}")
+
+
+def check_recorded(values: Floats, where: str) -> None:
+    """Raise DataError for a column without any number; ``where`` is its name in the message."""
+    if not np.isfinite(values).any():
+        raise DataError(f"{where} contains no numbers")
+
+
+def find_columns(
+    curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool
+) -> CurveColumns | None:
+    """Return the columns of a curve from the one table that has all of them; None for an optional curve without any."""
+    unsigned = [name.removeprefix("-") for name in names]
+    # One table must have all terms: files need not share a clock to the sample.
+    holders = [table for table in tables if all(name in table.columns for name in unsigned)]
+    if len(holders) > 1:
+        files = " and ".join(table.file for table in holders)
+        raise DataError(f"{curve}: {files} both have the column {unsigned[0]!r}")
+    if holders:
+        signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
+        terms = tuple(zip(signs, unsigned, strict=True))
+        return CurveColumns(f"{curve}.unit", holders[0], terms, curve in LOADS)
+    if optional and not any(name in table.columns for name in unsigned for table in tables):
+        return None
+    raise DataError(missing_column({curve: unsigned}, tables))
+
+
+def missing_column(names: Mapping[str, Sequence[str]], tables: Sequence[MotionTable]) -> str:
+    """Return a message on the missing columns of curves; ``names`` are the unsigned columns of each curve.
+
+    The message has the nearest name for each missing column, and the columns and remarks of the files, shortened.
+    Raises DataError for a column name that a file has more than once.
+    """
+    known, reasons = [name for table in tables for name in table.columns], []
+    files = ", ".join(table.file for table in tables)
+    for curve, wanted in names.items():
+        missing = next((name for name in wanted if name not in known), wanted[0])
+        twins = [name for name in known if re.fullmatch(re.escape(marker_of(missing)) + r"#\d+(\.[xyz])?", name)]
+        if twins:
+            either = " or ".join(repr(marker_of(name)) for name in twins if name[-2:] not in COORDINATES[1:])
+            raise DataError(
+                f"{curve}: {files} has several different columns {marker_of(missing)!r}; choose {either} in a gait "
+                f"map ({setting_text('columns')})"
+            )
+        reason = f"there is no column {missing!r}{nearest_name(missing, known)}"
+        reasons.append(f"{curve}: {'no file has all columns of this curve' if missing in known else reason}")
+    # A marker counts once, not by its coordinates.
+    markers = list(dict.fromkeys(one_line(marker_of(name)) for name in known))
+    first_names = ", ".join(markers[:_MOST_NAMES]) + (", ..." if len(markers) > _MOST_NAMES else "")
+    texts = [first_names, *(one_line(remark) for table in tables for remark in table.remarks)]
+    listed = "; ".join(shorten(text, _LONGEST_TEXT, placeholder=" ...") for text in texts)
+    return f"{'; '.join(reasons)} ({files}: {listed}); a gait map ({setting_text('columns')}) names other columns"
+
+
+THIGH_FRACTION = 0.245
+"""Thigh length as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement,
+4th ed. 2009."""
+_LENGTHS = (0.2, 0.7)
+"""Plausible lengths of a thigh [m]."""
+_HIP_HEIGHT = 0.3
+"""Depth of the hip below the origin [m] above which the sign is wrong; laboratories have no origin above the hip."""
+_FASTEST_BACK = 0.2
+"""Largest backward speed [m/s] on a treadmill, averaged over the recording."""
+
+
+def knee_signals(
+    mapped: KneeMap, tables: Sequence[MotionTable], stature: float | None, is_default: bool
+) -> dict[str, Signal]:
+    """Return ``knee_forward`` and ``knee_up``, each a position [m] or an acceleration [m/s^2].
+
+    With a thigh, they are the position of the knee, computed in the sagittal plane from the hip position in the columns
+    of the map and the lean of the thigh. Raises DataError if a column, unit or length is missing or inconsistent.
+    """
+    if mapped.thigh is not None and mapped.thigh_length is None and stature is None:
+        if is_default:
+            return {}
+        raise DataError("knee.thigh needs knee.thigh_length, or the stature")
+    thigh = mapped.thigh or ()
+    found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, is_default)
+    if found is None:
+        return {}
+    ends = len(mapped.forward), len(mapped.forward) + len(mapped.up)
+    forward, unit = replace(found, terms=found.terms[: ends[0]]).in_unit(mapped.unit, ("m/s^2", "m"))
+    up, other = replace(found, terms=found.terms[slice(*ends)]).in_unit(mapped.unit, ("m/s^2", "m"))
+    if mapped.thigh is not None:
+        if "m/s^2" in (unit, other):
+            raise DataError(f"{found.table.file}: knee.thigh needs hip positions in m, not accelerations in m/s^2")
+        leaning = replace(found, terms=found.terms[ends[1] :], unit_key="knee.thigh_unit")
+        lean, _ = leaning.in_unit(mapped.thigh_unit, ("rad",))
+        for values, terms in ((forward, mapped.forward), (up, mapped.up)):
+            if np.ptp(values) == 0.0:
+                raise DataError(f"{found.table.file}: the hip does not move ({', '.join(terms)} is constant)")
+        height = float(np.mean(up[np.isfinite(up)]))
+        if -height > _HIP_HEIGHT:
+            raise DataError(
+                f"{found.table.file}: the hip is {height:.2f} m high ({', '.join(mapped.up)}): the sign of knee.up is "
+                "reversed"
+            )
+        # The file has the hip: the knee follows by the lean of the thigh.
+        forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))
+    file, time = found.table.file, found.table.time
+    columns = tuple(dict.fromkeys(name for _, name in found.terms))
+    return {
+        "knee_forward": Signal(file, time, forward, unit == "m", columns),
+        "knee_up": Signal(file, time, up, other == "m", columns),
+    }
+
+
+def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: float | None) -> list[str]:
+    """Return remarks on the source of the knee's acceleration, or the reason for its absence; ``stature`` in [m].
+
+    Raises DataError for an implausible length of the thigh.
+    """
+    if mapped is None or "knee_forward" not in walk:
+        lacks_length = mapped is not None and mapped.thigh is not None
+        why = f"the thigh length is unknown without {setting_text('stature')}" if lacks_length else "it has no columns"
+        return [f"no acceleration of the knee: {why}"]
+    remarks = []
+    if mapped.thigh is not None and mapped.thigh_length is None:
+        remarks.append(
+            f"thigh length is {_thigh_length(mapped, stature):.3f} m, {THIGH_FRACTION:g} of the stature (Winter 2009)"
+        )
+    if walk["knee_forward"].is_position:
+        remarks.append(
+            f"acceleration of the knee from a Fourier series of its position, {HARMONICS['knee_forward']} harmonics"
+        )
+    return remarks
+
+
+def check_direction(walk: Mapping[str, Signal]) -> None:
+    """Raise DataError for a knee that moves backwards; on a treadmill, the knee stays in about the same place."""
+    knee = walk.get("knee_forward")
+    if knee is None or not knee.is_position:
+        return
+    speed = float((knee.values[-1] - knee.values[0]) / (knee.time[-1] - knee.time[0]))
+    if speed < -_FASTEST_BACK:
+        raise DataError(
+            f"{knee.file}: the knee moves backwards at {-speed:.2g} m/s, so knee.forward points against the "
+            "walking direction"
+        )
+
+
+def knee_position(hip_forward: Floats, hip_up: Floats, lean: Floats, thigh_length: float) -> tuple[Floats, Floats]:
+    """Return the knee position, forward and up [m]; ``lean`` of the thigh [rad], positive with the knee in front."""
+    return hip_forward + thigh_length * np.sin(lean), hip_up - thigh_length * np.cos(lean)
+
+
+def _thigh_length(mapped: KneeMap, stature: float | None) -> float:
+    if mapped.thigh_length is None:
+        return THIGH_FRACTION * (stature or 0.0)
+    where, (low, high) = f"knee.thigh_length = {mapped.thigh_length!r}", _LENGTHS
+    with refused_as(DataError, where, UnitError):
+        length = parse_quantity(mapped.thigh_length, "m")
+    if not low <= length <= high:
+        raise DataError(f"{where}: must be from {low:g} to {high:g} m")
+    return length

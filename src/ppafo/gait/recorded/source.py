@@ -15,13 +15,10 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.plausible import check_force_scale, check_moment
-from ppafo.gait.plausible_angles import SHANK_RANGE, MeanStride, check_ankle_alone
-from ppafo.gait.recorded.columns import LOADS, CurveColumns, check_recorded, find_columns, missing_column
+from ppafo.gait.plausible import SHANK_RANGE, MeanStride, check_ankle_alone, check_force_scale, check_moment
 from ppafo.gait.recorded.footfalls import FORCE, force_of_plates
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.markers import convention_of_map
-from ppafo.gait.recorded.knee import knee_signals
 from ppafo.gait.recorded.mapping import (
     CURVES,
     AngleMap,
@@ -35,7 +32,17 @@ from ppafo.gait.recorded.mapping import (
     column_names,
     setting_text,
 )
-from ppafo.gait.recorded.signal import Signal, with_absence, without_ends
+from ppafo.gait.recorded.signal import (
+    LOADS,
+    CurveColumns,
+    Signal,
+    check_recorded,
+    find_columns,
+    knee_signals,
+    missing_column,
+    with_absence,
+    without_ends,
+)
 from ppafo.gait.recorded.table import (
     MotionTable,
     counted_table,
