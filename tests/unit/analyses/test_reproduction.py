@@ -8,7 +8,7 @@ import pytest
 from ppafo.analyses.reproduce import solve as study
 from ppafo.analyses.reproduce.claim import Claim, count_sentence, verdict_counts
 from ppafo.analyses.reproduce.question import reproduce
-from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED, ReportedSet, arithmetic_claims, load_reported
+from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED, arithmetic_claims, load_reported
 from ppafo.analyses.reproduce.solve import Reproduction, SyntheticEvidence, reproduce_paper
 from ppafo.analyses.reproduce.torque_task import phased_runs, readings_of_u
 from ppafo.errors import SimulationError
@@ -16,7 +16,7 @@ from ppafo.parameters.audit.evidence import Evidence
 from ppafo.simulation.simulate import Result, Status
 
 
-def printed_with(**values: float) -> ReportedSet:
+def printed_with(**values: float) -> Evidence:
     """The printed set with some numbers exchanged, each in its printed unit; ``__`` stands for a dot."""
     printed = load_reported()
     numbers = dict(printed.parameter_set.numbers)
@@ -24,7 +24,7 @@ def printed_with(**values: float) -> ReportedSet:
         path = name.replace("__", ".")
         numbers[path] = replace(numbers[path], value=value)
     changed = dataclasses.replace(printed.parameter_set, numbers=numbers)
-    return ReportedSet(changed, Evidence(changed, changed.declarations()))
+    return Evidence(changed, changed.declarations())
 
 
 def arithmetic(**values: float) -> dict[str, Claim]:

@@ -6,6 +6,7 @@ import re
 import pytest
 
 from ppafo.analyses.reproduce.answer import (
+    IDENTIFICATION_FIGURE,
     STEP_FIGURE,
     TORQUE_FIGURE,
     reproduction_page,
@@ -17,7 +18,7 @@ from ppafo.report.style import drawn_at
 from ppafo.report.writing import typeset
 from tests.unit.report.test_width_of_figures import texts_of
 
-DRAWN = {STEP_FIGURE: b"<svg>seven</svg>", TORQUE_FIGURE: b"<svg>eight</svg>"}
+DRAWN = {IDENTIFICATION_FIGURE: b"<svg/>", STEP_FIGURE: b"<svg>seven</svg>", TORQUE_FIGURE: b"<svg>eight</svg>"}
 
 
 @pytest.fixture(scope="module")
@@ -81,8 +82,8 @@ def test_the_page_states_every_claim_with_both_numbers_and_the_verdict(reproduct
     assert "the dissertations of K. A. Shorter (2011) and Y. Li (2013)" in text
 
 
-def test_the_page_holds_its_three_figures_and_fetches_nothing(page: str) -> None:
-    assert page.count("data:image/svg+xml;base64,") == 3
+def test_the_page_holds_its_figures_and_fetches_nothing(page: str) -> None:
+    assert page.count("data:image/svg+xml;base64,") == 4
     assert "http" not in page
     assert "<script" not in page
     assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []

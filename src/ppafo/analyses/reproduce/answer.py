@@ -4,12 +4,12 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ppafo.analyses.reproduce.claim import MEANINGS, VERDICTS, Claim, Verdict, count_sentence, verdict_counts
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.publication import SEED, Studies
-from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED, load_reported
+from ppafo.analyses.reproduce.reported_numbers import INERTIA, NOT_PUBLISHED, known, load_reported
 from ppafo.analyses.reproduce.solve import (
     BENCH_PRESET,
     EXPERIMENTS,
@@ -22,9 +22,9 @@ from ppafo.analyses.reproduce.solve import (
     SyntheticEvidence,
 )
 from ppafo.analyses.reproduce.torque_task import WITHIN_REACH, holding_torque, reading_rows, result_on_u
-from ppafo.documents.json_text import fields_of
 from ppafo.identification.bench.law import figure_3
 from ppafo.parameters import load_parameter_set
+from ppafo.parameters.audit import findings_of
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report.finding import Cell, Finding, Section, columns_of
 from ppafo.report.kind import metric_level
@@ -51,10 +51,6 @@ DEVICE = files("ppafo.analyses.reproduce") / "templates" / "device.svg"
 IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
-NOT_READ = (
-    "Sources not consulted that are likely to settle the open points: the dissertations of K. A. Shorter (2011) and "
-    "Y. Li (2013), the journal article of 2012 in Mechatronics, the volume table of the vane's manufacturer."
-)
 _EXPERIMENTS = dict(
     zip(EXPERIMENTS, ("step response", "torque task, solenoid", "torque task, proportional"), strict=True)
 )
@@ -209,28 +205,34 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
     ``drawn`` are the figures as SVG by file name; they become part of the page.
     """
     changed = [word for override in reproduction.overrides for word in ("--set", override)]
-    solenoid, proportional = reproduction.solenoid, reproduction.proportional
-    runs = (solenoid, proportional, reproduction.step)
-    steps = sorted({1e3 * float(run.engine["step"]) for run in runs})
-    counts, readings = verdict_counts(reproduction.claims).items(), reproduction.readings_of_u
+    solenoid, proportional, evidence = reproduction.solenoid, reproduction.proportional, reproduction.synthetic
+    steps = sorted({1e3 * float(run.engine["step"]) for run in (solenoid, proportional, reproduction.step)})
+    reported, readings = load_reported(), reproduction.readings_of_u
+    completed = load_parameter_set(reproduction.step.scenario.origin.parameter_set)
+    found = findings_of(reported.parameter_set)
+    counts, slope = verdict_counts(reproduction.claims).items(), 0.0
+    if isinstance(evidence, SyntheticEvidence):
+        slope = -evidence.decay["friction.viscous_damping"].value / known(reported.number(INERTIA))
     values = {
-        "paper": load_parameter_set(reproduction.printed_set).citation,
+        "reproduction": reproduction,
+        "paper": reported.parameter_set.citation,
+        "statements": paper_entries(),
+        "not_published": NOT_PUBLISHED,
         "nothing_confirmed": NOTHING_CONFIRMED,
-        **fields_of(reproduction, "overrides", "claims", "step_observations", "torque_observations"),
         "count_sentence": count_sentence(reproduction.claims),
         "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
         "words": VERDICTS,
         "symbols": _SYMBOLS,
-        "not_published": [(paper_entries()[name].statement, paper_entries()[name].where) for name in NOT_PUBLISHED],
-        "not_read": NOT_READ,
-        **fields_of(reproduction, "printed_set", "completed_set"),
+        "printed_set": reported.parameter_set.name,
+        "completed_set": completed.name,
         **{
-            name: [finding for finding in reproduction.printed_findings if finding.severity == severity]
+            name: [finding for finding in found if finding.severity == severity]
             for severity, name in (("error", "contradictions"), ("warning", "remarks"), ("note", "notes"))
         },
-        "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
+        "kept": [finding for finding in findings_of(completed) if finding.severity != "note"],
         "assumed_groups": _assumed_groups(reproduction.assumed),
-        **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
+        "bench": {"preset": BENCH_PRESET, "task_preset": TASK_PRESET, "seed": RIG_SEED, "slope": f"{slope:.1f}"},
+        "is_measured": isinstance(evidence, SyntheticEvidence),
         "readings_of_u": reading_rows(readings),
         "result_on_u": result_on_u(readings) if readings else (),
         "within_reach": f"{WITHIN_REACH:g}",
@@ -248,9 +250,8 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "ceiling": f"{holding_torque(solenoid):.1f}",
         "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
         "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
-        "device_figure": inline_figure(DEVICE.read_bytes()),
-        "step_figure": inline_figure(drawn[STEP_FIGURE]),
-        "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
+        "device": inline_figure(DEVICE.read_bytes()),
+        "figures": {name: inline_figure(content) for name, content in drawn.items()},
         "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
     }
     return render_page(TEMPLATE, values, "ppafo.analyses.reproduce").encode()
@@ -266,22 +267,3 @@ def _assumed_groups(assumed: Sequence[AssumedValue]) -> list[tuple[str, list[Ass
         (own.get(users) or sentence(" and ".join(_EXPERIMENTS[name] for name in users)).rstrip("."), values)
         for users, values in sorted(groups.items(), key=lambda group: -len(group[0]))
     ]
-
-
-def _synthetic(evidence: SyntheticEvidence | str, figure: bytes | None) -> dict[str, Any]:
-    """Return template values on the synthetic measurements, or the reason why there are none."""
-    if isinstance(evidence, str):
-        return {"synthetic": None, "no_synthetic": evidence}
-    reported = load_reported()
-    slope = -evidence.decay["friction.viscous_damping"].value / reported.in_si("foot_plate.inertia")
-    return {
-        "no_synthetic": "",
-        "synthetic": {
-            "figure": None if figure is None else inline_figure(figure),
-            "preset": BENCH_PRESET,
-            "task_preset": TASK_PRESET,
-            "seed": RIG_SEED,
-            "slope": f"{slope:.1f}",
-            "reported_slope": f"{reported.entry('reported.velocity_over_acceleration').value:g}",
-        },
-    }

@@ -102,18 +102,15 @@ class Observation:
     difference: str = ""
 
 
-def claim_on_text(
-    identifier: str, statement: str, observations: Sequence[Observation], assumptions: tuple[str, ...]
-) -> Claim:
+def claim_on_text(identifier: str, observations: Sequence[Observation], assumptions: tuple[str, ...]) -> Claim:
     """Return a claim that summarises the paper's statements on a recording, one observation for each."""
     missing = [observation.entry.id for observation in observations if not observation.holds]
     reserved = [observation for observation in observations if observation.holds and observation.difference]
     plain = len(observations) - len(missing) - len(reserved)
     notes = [f"Not shown: {', '.join(missing)}."] if missing else []
     notes += [f"With a reservation: {observation.entry.id}, {observation.difference}." for observation in reserved]
-    where = "; ".join(dict.fromkeys(observation.entry.where for observation in observations))
     return Claim(
-        ClaimEntry(id=identifier, statement=statement, where=where, words=f"{len(observations)} statements"),
+        paper_entries()[identifier],
         "undetermined" if missing else "met_by_fitted_settings",
         float(plain),
         " ".join((*notes, "Each statement with its numbers is listed below.")),

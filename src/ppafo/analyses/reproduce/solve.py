@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from ppafo.analyses.reproduce.claim import Claim, Observation, claim_on_text, verdict_counts
-from ppafo.analyses.reproduce.reported_numbers import NOT_PUBLISHED_CLAIM, arithmetic_claims, load_reported
+from ppafo.analyses.reproduce.reported_numbers import arithmetic_claims, load_reported
 from ppafo.analyses.reproduce.step_response import StepEvents, step_events, step_observations
 from ppafo.analyses.reproduce.torque_task import (
     InterpretationOfU,
@@ -25,11 +25,11 @@ from ppafo.identification.procedures import LAWS
 from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import Tolerances
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import AuditFinding, findings_of
 from ppafo.parameters.declared import value_at
 from ppafo.parameters.overrides import Override, override_set, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
 from ppafo.parameters.parameter_set import entry_text, with_followers
+from ppafo.parameters.publications.publication import paper_entries
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.rig import record
 from ppafo.signals import Recording
@@ -88,7 +88,7 @@ class SyntheticEvidence:
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """Result of a reproduction: claims in the paper's order, observations, runs, assumptions and audit findings.
+    """Result of a reproduction: claims in the paper's order, observations, runs and assumptions.
 
     ``synthetic`` is the synthetic recordings, or a sentence with the reason if there are none.
     """
@@ -103,10 +103,6 @@ class Reproduction:
     proportional: Result
     synthetic: SyntheticEvidence | str
     assumed: tuple[AssumedValue, ...]
-    printed_set: str
-    printed_findings: tuple[AuditFinding, ...]
-    completed_set: str
-    completed_findings: tuple[AuditFinding, ...]
     overrides: tuple[str, ...]
 
     @property
@@ -145,32 +141,21 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     tasks = {"solenoid": changes[SOLENOID], "proportional": changes[PROPORTIONAL]}
     synthetic = synthetic_evidence(tasks, changes[STEP])
     report(Progress("checking the paper's own numbers"))
-    reported = load_reported()
-    completed = load_parameter_set(step.scenario.origin.parameter_set)
     assumed = assumed_values(scenarios)
     events, supply = step_events(step.recording), step.scenario.device.supply
     step_observed = tuple(step_observations(step.recording, supply, events))
     torque_observed = tuple(torque_task_observations(solenoid, proportional))
     report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
     (pair_errors, pair_gas), task_assumptions = phased_runs(solenoid), _used_by(assumed, SOLENOID, PROPORTIONAL)
+    unpublished = paper_entries()["not_published"]
     # In the order of the report: decided by reported numbers, simulated, and remaining.
     claims = (
-        *arithmetic_claims(reported),
-        claim_on_text(
-            "figure_7_words",
-            "Statements of the text on pressures and angle of the step response.",
-            step_observed,
-            _used_by(assumed, STEP),
-        ),
+        *arithmetic_claims(load_reported()),
+        claim_on_text("figure_7_words", step_observed, _used_by(assumed, STEP)),
         *torque_task_claims(pair_errors, pair_gas, proportional, task_assumptions),
-        claim_on_text(
-            "oscillation_words",
-            "Statements of the text on the oscillation with both valves.",
-            torque_observed,
-            task_assumptions,
-        ),
+        claim_on_text("oscillation_words", torque_observed, task_assumptions),
         *control_claims(solenoid, proportional, pair_errors),
-        NOT_PUBLISHED_CLAIM,
+        Claim(unpublished, note=unpublished.not_testable),
     )
     return Reproduction(
         claims=claims,
@@ -183,10 +168,6 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
         proportional=proportional,
         synthetic=synthetic,
         assumed=assumed,
-        printed_set=reported.parameter_set.name,
-        printed_findings=tuple(findings_of(reported.parameter_set)),
-        completed_set=completed.name,
-        completed_findings=tuple(findings_of(completed)),
         overrides=tuple(overrides),
     )
 

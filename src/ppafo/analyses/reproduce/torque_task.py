@@ -176,55 +176,31 @@ def _median_and_range(values: Floats, decimals: int, words: str) -> tuple[float,
 
 def torque_task_observations(solenoid: Result, proportional: Result) -> list[Observation]:
     """Return the paper's statements on the torque task, each with our numbers."""
-    pair_on_ramp, pair_on_hold = _reversals(solenoid, "ramp"), _reversals(solenoid, "hold")
-    spool_on_ramp, spool_on_hold = _reversals(proportional, "ramp"), _reversals(proportional, "hold")
+    (pair_ramp, on_pair_ramp), (pair_hold, on_pair_hold) = (_reversals(solenoid, phase) for phase in ("ramp", "hold"))
+    (ramp, on_ramp), (hold, on_hold) = (_reversals(proportional, phase) for phase in ("ramp", "hold"))
+    oscillates = pair_ramp is not None and pair_ramp >= FEWEST_REVERSALS
+    swings = f"{on_pair_ramp} that swing over 5 % of the largest reference"
+    errors = [[run.metrics.get(f"rms_error_{phase}") for run in (solenoid, proportional)] for phase in ("ramp", "hold")]
+    tracks_better, evidence = False, "this reference has no ramp and hold"
+    if len(known := [metric.value for pair in errors for metric in pair if metric]) == 4:
+        # The proportional valve has the lower error on the ramp, by more than on the hold.
+        tracks_better = known[0] - known[1] > max(0.0, known[2] - known[3])
+        evidence = f"RMS error on the ramp {known[1]:.2f} against {known[0]:.2f} N m, "
+        evidence += f"on the hold {known[3]:.2f} against {known[2]:.2f} N m"
     return [
-        observation(
-            "solenoid_oscillates_on_ramp",
-            pair_on_ramp is not None and pair_on_ramp >= FEWEST_REVERSALS,
-            f"{_reversals_text(pair_on_ramp, 'ramp')} that swing over 5 % of the largest reference",
-        ),
-        observation("solenoid_quiet_on_hold", pair_on_hold == 0, _reversals_text(pair_on_hold, "hold")),
-        observation(
-            "proportional_does_not_oscillate",
-            spool_on_ramp == 0 and spool_on_hold == 0,
-            f"{_reversals_text(spool_on_ramp, 'ramp')}, {_reversals_text(spool_on_hold, 'hold')}",
-        ),
-        _tracks_better_on_ramp(solenoid, proportional),
+        observation("solenoid_oscillates_on_ramp", oscillates, swings),
+        observation("solenoid_quiet_on_hold", pair_hold == 0, on_pair_hold),
+        observation("proportional_does_not_oscillate", ramp == 0 and hold == 0, f"{on_ramp}, {on_hold}"),
+        observation("proportional_tracks_better_on_ramp", tracks_better, evidence),
     ]
 
 
-def _reversals(result: Result, phase: str) -> int | None:
-    """Return the number of torque reversals on the ramp or the hold; None if the reference has no such part."""
+def _reversals(result: Result, phase: str) -> tuple[int | None, str]:
+    """Return the number of torque reversals on the ramp or the hold, None without such a part, and it in words."""
     metric = result.metrics.get(f"oscillations_{phase}")
-    return None if metric is None else round(metric.value)
-
-
-def _reversals_text(reversals: int | None, phase: str) -> str:
-    if reversals is None:
-        return f"this reference has no {phase}"
-    return f"{count_of(reversals, 'torque reversal')} on the {phase}"
-
-
-def _tracks_better_on_ramp(solenoid: Result, proportional: Result) -> Observation:
-    """Return the observation on the tracking advantage of the proportional valve on the ramp.
-
-    The statement holds if its RMS error on the ramp is lower, by more than on the hold.
-    """
-    (pair_ramp, pair_hold), (spool_ramp, spool_hold) = (
-        (run.metrics.get("rms_error_ramp"), run.metrics.get("rms_error_hold")) for run in (solenoid, proportional)
-    )
-    identifier = "proportional_tracks_better_on_ramp"
-    if not (pair_ramp and pair_hold and spool_ramp and spool_hold):
-        return observation(identifier, False, "this reference has no ramp and hold")
-    lower_on_ramp = pair_ramp.value - spool_ramp.value
-    lower_on_hold = pair_hold.value - spool_hold.value
-    return observation(
-        identifier,
-        lower_on_ramp > 0.0 and lower_on_ramp > lower_on_hold,
-        f"RMS error on the ramp {spool_ramp.value:.2f} against {pair_ramp.value:.2f} N m, "
-        f"on the hold {spool_hold.value:.2f} against {pair_hold.value:.2f} N m",
-    )
+    if metric is None:
+        return None, f"this reference has no {phase}"
+    return round(metric.value), f"{count_of(round(metric.value), 'torque reversal')} on the {phase}"
 
 
 # Statements of the paper on switching rate, gains, dead zone and improved control, against runs with such settings.
@@ -235,42 +211,32 @@ def control_claims(solenoid: Result, proportional: Result, pair_errors: Floats) 
 
     ``pair_errors`` are the RMS errors [N m] of the solenoid pair over the unknown phase of its decisions.
     """
-    limited, beyond = paper_entries()["limited_by_switching"], paper_entries()["beyond_improved_control"]
-    faster_error = _error_with(solenoid, FASTER)
-    if isinstance(faster_error, str):
-        faster = Claim(limited, "undetermined", note=f"{limited.note} {faster_error}.")
-    else:
-        less = 100.0 * (1.0 - faster_error / pair_errors)
-        median, ends, found = _median_and_range(less, 0, "% less error at 100 Hz")
-        faster = Claim(limited, "undetermined", median, limited.note, _RESTS_ON, found, ends)
-    return [
-        faster,
-        _undetermined("gains_minimise_error", proportional, TUNED),
-        _undetermined("dead_zone_amplifies_delay", solenoid, DEAD_ZONE),
-        Claim(beyond, "undetermined", note=beyond.not_testable),
-    ]
-
-
-def _error_with(run: Result, overrides: tuple[str, ...]) -> float | str:
-    """Return the RMS torque error [N m] of a run's task with overrides, or the error message if the run fails."""
-    # Another law takes nothing that was set for this one.
-    remaining = [override for override in run.scenario.origin.overrides if not override.startswith("controller.")]
-    try:
-        return simulate(load_scenario(run.scenario.name, [*remaining, *overrides])).metrics["rms_error"].value
-    except (ParameterError, ScenarioError, SimulationError) as error:
-        return str(error)
-
-
-def _undetermined(identifier: str, run: Result, overrides: tuple[str, ...]) -> Claim:
-    """Return a claim that depends on unreported settings, with the error of the task under other settings."""
-    entry, error = paper_entries()[identifier], run.metrics["rms_error"].value
-    changed_error = _error_with(run, overrides)
-    if isinstance(changed_error, str):
-        return Claim(entry, "undetermined", note=f"{entry.note} {changed_error}.")
-    change = 100.0 * (changed_error / error - 1.0)
-    sentence = f"{abs(change):.0f} % {'more' if change > 0.0 else 'less'} error"
-    note = f"{entry.note} In this task {changed_error:.3f} instead of {error:.3f} N m."
-    return Claim(entry, "undetermined", change, note, _RESTS_ON, sentence)
+    claims = []
+    for identifier, run, overrides in (
+        ("limited_by_switching", solenoid, FASTER),
+        ("gains_minimise_error", proportional, TUNED),
+        ("dead_zone_amplifies_delay", solenoid, DEAD_ZONE),
+    ):
+        entry, own = paper_entries()[identifier], run.scenario.origin.overrides
+        # Another law takes nothing that was set for this one.
+        remaining = [override for override in own if not override.startswith("controller.")]
+        try:
+            changed = simulate(load_scenario(run.scenario.name, [*remaining, *overrides])).metrics["rms_error"].value
+        except (ParameterError, ScenarioError, SimulationError) as failure:
+            claims.append(Claim(entry, "undetermined", note=f"{entry.note} {failure}."))
+            continue
+        if overrides is FASTER:
+            less = 100.0 * (1.0 - changed / pair_errors)
+            value, ends, found = _median_and_range(less, 0, "% less error at 100 Hz")
+            claims.append(Claim(entry, "undetermined", value, entry.note, _RESTS_ON, found, ends))
+            continue
+        error = run.metrics["rms_error"].value
+        value = 100.0 * (changed / error - 1.0)
+        found = f"{abs(value):.0f} % {'more' if value > 0.0 else 'less'} error"
+        note = f"{entry.note} In this task {changed:.3f} instead of {error:.3f} N m."
+        claims.append(Claim(entry, "undetermined", value, note, _RESTS_ON, found))
+    beyond = paper_entries()["beyond_improved_control"]
+    return [*claims, Claim(beyond, "undetermined", note=beyond.not_testable)]
 
 
 # Interpretations of U in equation (13), the command of the proportional valve, and their effect on the task.
