@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ppafo.analyses.linearise.model import PID_LAWS, LinearModel, open_loop
+from ppafo.control.controllers.switching import CONSTANT
 from ppafo.engine.lanes import Floats
-from ppafo.engine.replay import StepInputs, replay
-from ppafo.engine.run import batch_of, state_row_numbers
-from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
 from ppafo.simulation.numbers import changes_in
-from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, with_control
+from ppafo.simulation.scenario import Control, with_control
+from ppafo.simulation.simulate import simulate_many
 from ppafo.units.shown import in_units, quantity_of_unit
 from ppafo.wording import count_of
 
@@ -289,31 +287,21 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> StepResp
 
     command = model.values["command"]
     times: Floats = INTERVAL * np.arange(round(DURATION / INTERVAL) + 1, dtype=np.float64)
-    still, *runs = (_torque(model, command * (1.0 + share)) for share in (0.0, *shares))
+    start = {state.name: state.value for state in model.states if state.name.startswith("pressure")}
+    held = replace(
+        model.scenario,
+        run=replace(model.scenario.run, duration=DURATION, step=INTERVAL, output_interval=INTERVAL),
+        initial=replace(model.scenario.initial, **start),
+    )
+    laws = (Control(CONSTANT.name, {"command": command * (1.0 + share)}, INTERVAL) for share in (0.0, *shares))
+    results = simulate_many([with_control(held, law) for law in laws])
+    still, *runs = (result.recording["torque"] for result in results)
     amplitudes: Floats = command * np.array(shares, dtype=np.float64)
     # The command is the first input, the torque the first output.
     linear = amplitudes[:, None] * step(StateSpace(model.a, model.b[:, :1], model.c[:1], model.d[:1, :1]), T=times)[1]
     changes = np.array(runs) - still
     errors, sizes = (np.max(np.abs(difference), axis=1) for difference in (changes - linear, changes))
     return StepResponses(amplitudes, times, changes, linear, errors, sizes)
-
-
-def _torque(model: LinearModel, command: float) -> Floats:
-    """Torque [N m] (times,) of a run from the steady state under another constant command [-]."""
-    start = {state.name: state.value for state in model.states if state.name.startswith("pressure")}
-    scenario = replace(
-        with_control(model.scenario, Control(PYTHON_CONTROLLER, {}, INTERVAL)),
-        run=replace(model.scenario.run, duration=DURATION, step=INTERVAL, output_interval=INTERVAL),
-        initial=replace(model.scenario.initial, **start),
-    )
-    run = plan_run(scenario)
-    record = replay(batch_of(run), StepInputs(np.full(run.step_count, command), {})).record[:, :, 0]
-    rows = state_row_numbers(run)
-    angle, *masses = (record[:, rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
-    actuator = run.program.actuator
-    pressures = pressures_of(actuator, run.plant, angle, *masses)
-    # The record has every step of the engine, of which a sample may take several.
-    return np.asarray(torque_of(actuator, run.plant, angle, *pressures))[:: max(1, run.steps_per_sample)]
 
 
 def steps_panels(model: LinearModel) -> list[Panel]:

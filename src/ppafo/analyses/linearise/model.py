@@ -25,7 +25,6 @@ from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity, error_functions
-from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import Openings, ThermalParameters
 from ppafo.model.ports import at_valve, friction_at_rest, sent_command
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
@@ -273,7 +272,14 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
             f"{scenario.name}: valve '{scenario.device.valve_name}' regulates pressures, of which there is no linear "
             "model; set device.valve to a proportional valve"
         )
-    if not _opens_in_proportion(run):
+    # A small change of the command changes the openings or their rates somewhere.
+    still = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True))
+    plant = plant_of(_without_slew_limit(run), None, still | {"command": 0.0})
+    first, second = (
+        [plant.valve(still | {"command": command + change})[1:] for command in _TRIED_COMMANDS]
+        for change in (1.0e-4, 2.0e-4)
+    )
+    if first == second:
         raise ScenarioError(
             f"{scenario.name}: valve '{scenario.device.valve_name}' switches on and off, so its flow has no "
             "derivative with respect to the command; set device.valve to a proportional valve"
@@ -372,17 +378,6 @@ def valve_states(program: Program) -> dict[str, str]:
 def _without_slew_limit(run: Run) -> Run:
     is_limited = hasattr(run.valve, "slew_limit")
     return replace(run, valve=run.valve._replace(slew_limit=NO_SLEW_LIMIT)) if is_limited else run
-
-
-def _opens_in_proportion(run: Run) -> bool:
-    """Return whether a small change of the command changes the openings or their rates."""
-    still = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True)) | {"command": 0.0}
-    plant = plant_of(_without_slew_limit(run), None, still)
-    first, second = (
-        [plant.valve(still | {"command": command + change})[1:] for command in _TRIED_COMMANDS]
-        for change in (1.0e-4, 2.0e-4)
-    )
-    return first != second
 
 
 # Slopes by differences, towards one side of a point, where the model may have a kink.
@@ -586,13 +581,6 @@ def _steady(
     return None
 
 
-def _slopes(
-    function: Callable[[Mapping[str, float]], Floats], name: str, values: Mapping[str, float], side: float
-) -> tuple[Floats, Floats]:
-    """Slopes of a function of named values by one of them towards a side, and estimates of their errors (rows,)."""
-    return one_sided_slopes(lambda value: function({**values, name: value}), values[name], side, size_of(name))
-
-
 # The model at a point.
 
 
@@ -601,15 +589,18 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     values, plant = point.values, plant_of(run, point.direction, point.values, point.time or 0.0)
     rates_here, outputs_here = plant.at(values)
 
-    def rates_and_outputs(values: Mapping[str, float]) -> Floats:
-        rates, outputs = plant.at(values)
-        return np.array([*rates.values(), *outputs.values()])
+    def slopes(name: str, side: float) -> tuple[Floats, Floats]:
+        def rates_and_outputs(value: float) -> Floats:
+            rates, outputs = plant.at({**values, name: value})
+            return np.array([*rates.values(), *outputs.values()])
+
+        return one_sided_slopes(rates_and_outputs, values[name], side, size_of(name))
 
     columns = [*rates_here, *plant.inputs]
     sides = {name: side_of(name, values, point.direction) for name in columns}
     # Slopes of rates and outputs on the side of ``side_of`` and on the other side, and estimates of their errors.
-    near, near_errors = np.stack([_slopes(rates_and_outputs, name, values, sides[name]) for name in columns], axis=-1)
-    far, far_errors = np.stack([_slopes(rates_and_outputs, name, values, -sides[name]) for name in columns], axis=-1)
+    near, near_errors = np.stack([slopes(name, sides[name]) for name in columns], axis=-1)
+    far, far_errors = np.stack([slopes(name, -sides[name]) for name in columns], axis=-1)
     # What the valve takes from its command at once is no state: nothing but the output that shows it asks for it.
     rows = [*(f"rate of {state}" for state in rates_here), *outputs_here]
     # A second chamber that the actuator lacks stays at the atmosphere, without any slope.
@@ -658,17 +649,20 @@ def limits_of(scenario: Scenario, linearised: LinearisedPlant, point: Point) -> 
     at, run, joint, plant = point.values, linearised.run, scenario.device.joint, linearised.run.plant
     openings = linearised.valve(at)[1]
     atmosphere, pressure_1, pressure_2 = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
-    paths = {
-        "source to chamber 1": (at["supply_pressure"], pressure_1, openings.source_1),
-        "chamber 1 to atmosphere": (pressure_1, atmosphere, openings.vent_1),
-        "source to chamber 2": (at["dorsiflexion_pressure"], pressure_2, openings.source_2),
-        "chamber 2 to atmosphere": (pressure_2, atmosphere, openings.vent_2),
-    }
-    regimes = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
-    if run.program.has_one_chamber:
-        regimes = {name: regime for name, regime in regimes.items() if "chamber 2" not in name}
-    else:
-        regimes["leak from chamber to chamber"] = _regime(plant.leak_curve, pressure_1, pressure_2, 1.0)
+    paths = [
+        ("source to chamber 1", plant.valve_curve, at["supply_pressure"], pressure_1, openings.source_1),
+        ("chamber 1 to atmosphere", plant.valve_curve, pressure_1, atmosphere, openings.vent_1),
+        ("source to chamber 2", plant.valve_curve, at["dorsiflexion_pressure"], pressure_2, openings.source_2),
+        ("chamber 2 to atmosphere", plant.valve_curve, pressure_2, atmosphere, openings.vent_2),
+        ("leak from chamber to chamber", plant.leak_curve, pressure_1, pressure_2, 1.0),
+    ]
+    regimes = {}
+    for name, curve, pressure_a, pressure_b, opening in paths[: 2 if run.program.has_one_chamber else None]:
+        ratio = min(pressure_a, pressure_b) / max(pressure_a, pressure_b)
+        near = ", on the straight line near equal pressures" if ratio > curve.linear_ratio else ""
+        flows = f"below choking, pressure ratio {ratio:.4f}{near}"
+        flows = f"choked, pressure ratio {ratio:.3f}" if ratio <= curve.critical_ratio else flows
+        regimes[name] = flows if opening else "closed"
     vane = "locked" if scenario.motion.locked_angle is not None else "prescribed"
     if point.direction == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
@@ -690,17 +684,6 @@ def sent_per_opening(run: Run, command: float) -> float:
     opening, sent = (in_program(port, run.program, run.effects) for port in (at_valve, sent_command))
     slopes, _ = one_sided_slopes(lambda wanted: np.array([sent({}, wanted)]), opening({}, command), 1.0, 1.0)
     return float(slopes[0])
-
-
-def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:
-    """Flow regime between two pressures [Pa] at an opening [-], in words."""
-    if opening == 0.0:
-        return "closed"
-    ratio = min(pressure_a, pressure_b) / max(pressure_a, pressure_b)
-    if ratio <= curve.critical_ratio:
-        return f"choked, pressure ratio {ratio:.3f}"
-    near = ", on the straight line near equal pressures" if ratio > curve.linear_ratio else ""
-    return f"below choking, pressure ratio {ratio:.4f}{near}"
 
 
 # Control loop with the scenario's own PID.
