@@ -1,7 +1,7 @@
 """Report of a walk of one wearer with and without the device: text, tables and figures."""
 
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -16,7 +16,7 @@ from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import changes_in
-from ppafo.simulation.scenario import UNITS, Scenario
+from ppafo.simulation.scenario import UNITS
 from ppafo.simulation.tracking import Tracking
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
@@ -110,11 +110,41 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
     title = f" ({motion.gait.title})" if motion.gait.title else ""
     set_up = (scenario.description, f"device '{scenario.device.name}', gait '{motion.gait.name}'{title}", law.summary)
     mended = usage_text(reloaded(scenario, verdict.mended)) if verdict.mended else ""
-    supply = worn.supply
-    lasts = (
-        f"bottle {supply.supply.bottle.label}: {supply.ending.message}" if supply and worn.status.is_completed else ""
-    )
-    remarks = (*person_remarks(scenario), lasts, *_pressure_remarks(worn))
+    supply, bottle, pictures = worn.supply, list[Section](), list[Section]()
+    remarks = [*person_remarks(scenario)]
+    if supply and worn.status.is_completed:
+        remarks.append(f"bottle {supply.supply.bottle.label}: {supply.ending.message}")
+    pressures = scenario.device.supply.pressure, scenario.device.supply.dorsiflexion_pressure
+    for number, pressure in enumerate(pressures, 1):
+        channel = f"pressure_{number}"
+        largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
+        # The foot compresses the chamber.
+        if largest > _FAR_ABOVE * pressure:
+            reached, supplied = map(_PRESSURE.text, (largest, pressure))
+            remarks.append(
+                f"the pressure in chamber {number} reaches {reached}, at a supply pressure of {supplied}: "
+                f"actuator, valves and tubing must withstand {reached}"
+            )
+    if supply:
+        bottle = [
+            Section("On the bottle", facts(_bottle_facts(worn, supply))),
+            Section(
+                "The bottle over the walk",
+                name="bottle",
+                caption=_BOTTLE,
+                draw=partial(bottle_figure, worn),
+                is_detail=True,
+            ),
+            Section("How to read the bottle", said=_BOTTLE_EXPLAINED, is_detail=True),
+        ]
+    # Without a whole stride there is no mean of them.
+    if worn.averages and comparison.without_device.averages:
+        legs = partial(frames_figure, comparison)
+        mean = partial(walk_figure, {"with the device": worn, "without": comparison.without_device})
+        pictures = [
+            Section("The leg", name="legs", caption=_LEGS, draw=legs, is_detail=True),
+            Section("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True),
+        ]
     assumed = [(assumption.path, assumption.note) for assumption in scenario.assumptions]
     return Finding(
         name="walk",
@@ -124,10 +154,10 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
         parts=(
             Section(said=[sentence for sentence in set_up if sentence], is_detail=True),
             Section(columns=comparison_table(comparison), remarks=[remark for remark in remarks if remark]),
-            *_bottle_parts(worn),
+            *bottle,
             Section("Command with the remedy" if mended else "", code=mended),
             Section("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
-            *_pictures(comparison),
+            *pictures,
             Section("Assumptions" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
         found=_walk_data(comparison, verdict),
@@ -140,9 +170,24 @@ def finding_of(comparison: WalkComparison) -> Finding[dict[str, Any]]:
 def _walk_data(comparison: WalkComparison, verdict: Tracking) -> dict[str, Any]:
     """Return ``walk.json``: metrics (with the device, without it, healthy) and events as plain data in SI units.
 
-    ``verdict`` is on the torque that the controller requests.
+    ``verdict`` is on the torque that the controller requests. A bottle is described by its values, without the gas
+    property tables; at its end, and at their lowest, are its series.
     """
-    worn, bare = comparison.with_device, comparison.without_device
+    worn, bare, scenario = comparison.with_device, comparison.without_device, comparison.with_device.scenario
+    motion, control, origin, supply = walk_of(scenario), scenario.controller, scenario.origin, worn.supply
+    of_supply = (
+        {}
+        if supply is None
+        else {
+            "supply": {
+                **supply.supply.to_dict(),
+                "ending": supply.ending._asdict(),
+                "balance": supply.balance._asdict(),
+                "at_end": {name: float(values[-1]) for name, values in supply.values.items()},
+                "lowest": {name: float(np.min(values)) for name, values in supply.values.items()},
+            }
+        }
+    )
     return {
         "format": WALK_FORMAT,
         "schema_version": SCHEMA_VERSION,
@@ -152,53 +197,30 @@ def _walk_data(comparison: WalkComparison, verdict: Tracking) -> dict[str, Any]:
         "metrics": plain(dict(worn.metrics)),
         "metrics_off": plain(dict(bare.metrics)),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        "configuration": _scenario_data(worn.scenario),
-        "shown": dict(worn.scenario.device.shown),
+        "configuration": {
+            **fields_of(scenario, "name", "description"),
+            "device": plain(scenario.device),
+            "gait": plain(motion.gait),
+            "wearer": plain(motion.wearer),
+            "wearer_origin": motion.wearer_origin,
+            "controller": control.kind,
+            "settings": plain(control.settings),
+            "period": control.period,
+            "step": scenario.run.step,
+            "sensors": {"numbers": plain(sensor_numbers(scenario)), "seed": scenario.sensors.seed},
+            "supply_line": plain(scenario.supply_line),
+            "gas_model": plain(scenario.gas_model),
+            "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
+            "assumed": {assumption.path: assumption.note for assumption in scenario.assumptions},
+            **fields_of(origin, "file", "content"),
+            "overrides": list(origin.overrides),
+        },
+        "shown": dict(scenario.device.shown),
         "tracking": {**plain(verdict), "sentence": verdict.sentence},
-        "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
+        "gains": plain(gains_of(scenario, law_of(scenario))),
         "minutes": float(worn.recording.time[-1]) / 60.0,
-        **_supply_data(worn),
+        **of_supply,
         "healthy": plain(dict(comparison.healthy)),
-    }
-
-
-def _scenario_data(scenario: Scenario) -> dict[str, Any]:
-    """Return a walk as data in SI units; a bottle is described by its values, without the gas property tables."""
-    motion, control, origin = walk_of(scenario), scenario.controller, scenario.origin
-    seed = scenario.sensors.seed
-    return {
-        **fields_of(scenario, "name", "description"),
-        "device": plain(scenario.device),
-        "gait": plain(motion.gait),
-        "wearer": plain(motion.wearer),
-        "wearer_origin": motion.wearer_origin,
-        "controller": control.kind,
-        "settings": plain(control.settings),
-        "period": control.period,
-        "step": scenario.run.step,
-        "sensors": {"numbers": plain(sensor_numbers(scenario)), "seed": seed},
-        "supply_line": plain(scenario.supply_line),
-        "gas_model": plain(scenario.gas_model),
-        "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
-        "assumed": {assumption.path: assumption.note for assumption in scenario.assumptions},
-        **fields_of(origin, "file", "content"),
-        "overrides": list(origin.overrides),
-    }
-
-
-def _supply_data(worn: WalkResult) -> dict[str, Any]:
-    """Return the supply as data in SI units: end, balances, final and lowest values; {} without a bottle."""
-    supply = worn.supply
-    if supply is None:
-        return {}
-    return {
-        "supply": {
-            **supply.supply.to_dict(),
-            "ending": supply.ending._asdict(),
-            "balance": supply.balance._asdict(),
-            "at_end": {name: float(values[-1]) for name, values in supply.values.items()},
-            "lowest": {name: float(np.min(values)) for name, values in supply.values.items()},
-        }
     }
 
 
@@ -213,38 +235,6 @@ def _files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
     if worn.supply is not None:
         files["bottle.csv"] = partial(marked_csv_bytes, worn.supply.recording)
     return files
-
-
-def _pressure_remarks(worn: WalkResult) -> Iterator[str]:
-    """Yield a remark on each chamber that the foot compresses far above its supply pressure."""
-    supply = worn.scenario.device.supply
-    for number, supply_pressure in ((1, supply.pressure), (2, supply.dorsiflexion_pressure)):
-        channel = f"pressure_{number}"
-        largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
-        if largest > _FAR_ABOVE * supply_pressure:
-            reached, supplied = map(_PRESSURE.text, (largest, supply_pressure))
-            yield (
-                f"the pressure in chamber {number} reaches {reached}, at a supply pressure of {supplied}: "
-                f"actuator, valves and tubing must withstand {reached}"
-            )
-
-
-def _bottle_parts(worn: WalkResult) -> tuple[Section, ...]:
-    """Return the facts of the bottle of a walk, its figure and an explanation; () for a walk without a bottle."""
-    supply = worn.supply
-    if supply is None:
-        return ()
-    return (
-        Section("On the bottle", facts(_bottle_facts(worn, supply))),
-        Section(
-            "The bottle over the walk",
-            name="bottle",
-            caption=_BOTTLE,
-            draw=partial(bottle_figure, worn),
-            is_detail=True,
-        ),
-        Section("How to read the bottle", said=_BOTTLE_EXPLAINED, is_detail=True),
-    )
 
 
 def _bottle_facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
@@ -278,19 +268,6 @@ def _bottle_facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str
     return rows
 
 
-def _pictures(comparison: WalkComparison) -> Sequence[Section]:
-    """Return the figures of a walk, () without a mean stride."""
-    worn, bare = comparison.with_device, comparison.without_device
-    if not (worn.averages and bare.averages):
-        return ()
-    legs, walks = partial(frames_figure, comparison), {"with the device": worn, "without": bare}
-    mean = partial(walk_figure, walks)
-    return (
-        Section("The leg", name="legs", caption=_LEGS, draw=legs, is_detail=True),
-        Section("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True),
-    )
-
-
 def comparison_table(comparison: WalkComparison) -> list[Column]:
     """Return the table of metrics by row, with columns for the device, without it, and a healthy ankle."""
     worn, bare = comparison.with_device, comparison.without_device
@@ -314,17 +291,10 @@ def comparison_table(comparison: WalkComparison) -> list[Column]:
         numbers = [values.get(name) for _, values in columns]
         if any(number is not None for number in numbers):
             kind = Kind(title, quantity=quantity)
-            rows.append((kind.title, *(_cell(number, kind, digits) for number in numbers)))
+            # A number rounded to zero has no sign.
+            texts = [f"{kind.shown(each):z.{digits}f}" if isinstance(each, float) else each for each in numbers]
+            rows.append((kind.title, *texts))
     return columns_of(["", *(head for head, _ in columns)], rows)
-
-
-def _cell(number: float | str | None, kind: Kind, digits: int) -> str | None:
-    """Return a number [SI] as text in the unit in which a quantity is shown; texts and None are returned unchanged."""
-    if number is None or isinstance(number, str):
-        return number
-    text = f"{kind.shown(number):.{digits}f}"
-    # Without the sign of what is rounded to zero.
-    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def strides_csv(result: WalkResult) -> bytes:
