@@ -88,32 +88,27 @@ def _remedied(worn: WalkResult, drags: bool) -> list[str]:
     """
     if walk_of(worn.scenario).bottle is not None:
         return []
-    cause, remedies, advice = _trials(worn, drags)
-    minutes = worn.scenario.run.duration / 60.0
+    (cause, remedies, advice), whole = _trials(worn, drags), worn.scenario.run.duration
     for overrides in remedies:
-        if gain := _gain_with(worn, overrides, drags):
+        gain = ""
+        # Toes may sink from stride to stride: the whole walk decides.
+        for seconds in (_FIRST_TRIAL, whole) if whole > _FIRST_TRIAL else (whole,):
+            gain = _gain(worn, overrides, seconds, drags)
+            if not gain:
+                break
+        if gain:
             changes = " and ".join(f"`{text.replace('=', ' = ', 1)}`" for text in overrides)
-            return [f"{cause}: for example with {changes}, {gain}, simulated in another walk of {minutes:.3g} min"]
+            minutes = f"{whole / 60.0:.3g} min"
+            return [f"{cause}: for example with {changes}, {gain}, simulated in another walk of {minutes}"]
     return [f"{cause}, and {advice}"] if advice else []
 
 
-def _gain_with(worn: WalkResult, overrides: Sequence[str], drags: bool) -> str:
-    """Return the gain of a remedy as text, from another walk of the same duration; "" if it does not suffice."""
-    gain, whole = "", worn.scenario.run.duration
-    # Toes may sink from stride to stride: the whole walk decides.
-    for seconds in (_FIRST_TRIAL, whole) if whole > _FIRST_TRIAL else (whole,):
-        try:
-            again = walk(with_duration(reloaded(worn.scenario, overrides), seconds))
-        except PpafoError:
-            return ""
-        gain = _gain(again, drags)
-        if not gain:
-            break
-    return gain
-
-
-def _gain(again: WalkResult, drags: bool) -> str:
-    """Return height of the toes and work as text; "" if not enough."""
+def _gain(worn: WalkResult, overrides: Sequence[str], seconds: float, drags: bool) -> str:
+    """Return height of the toes and work of a walk with a remedy as text; "" if not enough."""
+    try:
+        again = walk(with_duration(reloaded(worn.scenario, overrides), seconds))
+    except PpafoError:
+        return ""
     if not again.status.is_completed:
         return ""
     toes, work = (again.metrics[name].value for name in ("lowest_toes", "net_push_off_work"))
@@ -126,7 +121,14 @@ def _trials(worn: WalkResult, drags: bool) -> RemedyTrials:
     scenario = worn.scenario
     if scenario.controller.kind == "off":
         return "its controller is off", _LAWS, "another controller alone does not help"
-    requested, available = _lifting_torques(worn) if drags else (0.0, 0.0)
+    requested, available = 0.0, 0.0
+    if drags and "reference" in worn.averages:
+        # Dorsiflexion torques at the lowest toes: requested, and of the actuator.
+        timing = gait_timing(walk_of(scenario).gait)
+        first, last = PHASES.searchsorted([timing.clearance_from, timing.clearance_to])
+        lowest = first + int(worn.averages["toe_height"].mean[first:last].argmin())
+        request, angle = (float(worn.averages[name].mean[lowest]) for name in ("reference", "angle"))
+        requested, available = -request, -torque_reach(scenario.device, angle)[0]
     if requested < _NEARLY * available and "hold_stiffness" in scenario.controller.settings:
         return _stiffer_holds(scenario, requested, available)
     other = "an actuator with more torque" if drags else "another timing of push-off"
@@ -169,14 +171,3 @@ def _raised_pressures(scenario: Scenario) -> list[dict[str, float]]:
         for factor in _PRESSURES
         if factor * (supply.pressure - STANDARD_ATMOSPHERE) <= _HIGHEST_PRESSURE
     ]
-
-
-def _lifting_torques(worn: WalkResult) -> tuple[float, float]:
-    """Return the dorsiflexion torques [N m] at the lowest toes: requested, and of the actuator; 0 without a request."""
-    if "reference" not in worn.averages:
-        return 0.0, 0.0
-    timing = gait_timing(walk_of(worn.scenario).gait)
-    first, last = PHASES.searchsorted([timing.clearance_from, timing.clearance_to])
-    lowest = first + int(worn.averages["toe_height"].mean[first:last].argmin())
-    request, angle = (float(worn.averages[name].mean[lowest]) for name in ("reference", "angle"))
-    return -request, -torque_reach(worn.scenario.device, angle)[0]

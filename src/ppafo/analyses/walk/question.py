@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import Gait, Minutes, Overrides, Word, checked
-from ppafo.progress import Progress, Report, report_nothing
+from ppafo.progress import Progress, Report
 
 if TYPE_CHECKING:
     from ppafo.report.finding import Finding
@@ -56,17 +55,16 @@ def walk_with_and_without(
     if not isinstance(chosen, Scenario):
         check_duration_once(overrides, minutes)
         chosen = load_walk(chosen, overrides, gait=gait, bottle=bottle)
-    comparison = compare_walks(chosen, minutes=minutes, progress=partial(_report_walk, progress or report_nothing))
+
+    def report_minutes(done: float, total: float) -> None:
+        if progress is not None and total > _LONG_WALK:
+            progress(Progress("walking", round(done), round(total), noun="min"))
+
+    comparison = compare_walks(chosen, minutes=minutes, progress=report_minutes)
     finding = finding_of(comparison)
     tracking = finding.found["tracking"]
     follows = tracking["follows"] or tracking["reason"] in NOTHING_TO_FOLLOW
     return replace(finding, passed=finding.passed and follows) if check else finding
-
-
-def _report_walk(report: Report, done: float, total: float) -> None:
-    """Report the progress of a long walk [min]."""
-    if total > _LONG_WALK:
-        report(Progress("walking", round(done), round(total), noun="min"))
 
 
 def default_folder(values: Mapping[str, Any]) -> Path:
