@@ -10,10 +10,10 @@ since the formulas need complete blocks; the indices then hold for values at whi
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,8 @@ _ENDS = (0.05, 0.95)
 """Quantiles of a varied value between which the change of a metric is computed."""
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
 """Default number of blocks by method: tens of thousands of runs for a few values."""
+_FEWEST, _MOST = 64, 2**17
+"""Limits of the number of blocks."""
 _FEWEST_WHOLE = 4
 """Smallest number of complete blocks for an estimate."""
 _SIZES = 6
@@ -88,45 +90,22 @@ class Indices:
         return next(iter(self.values.values()))
 
 
-@dataclass(frozen=True, slots=True)
-class EvaluatedBlocks:
-    """Complete blocks of a design with the values of a metric.
-
-    ``inputs`` (rows, paths): values of the inputs [SI]
-    ``values`` (rows,): values of the metric [SI]
-    ``blocks``: numbers of the blocks
-    ``ends`` (2, paths): 5 and 95 % quantile of each input [SI], nan for noise
-    ``seed``: random seed of the design
-    """
-
-    inputs: Floats
-    values: Floats
-    blocks: NDArray[np.intp]
-    ends: Floats
-    seed: int
-
-
-@dataclass(frozen=True, slots=True)
-class Method:
+class Method(NamedTuple):
     """Method of sensitivity analysis: design and evaluation.
 
-    ``takes_dependent``: True if the indices are meaningful for correlated values
-    ``fewest``, ``most``: limits of the number of blocks
     ``noun``: name of the blocks
     ``block_rows``: number of runs of a block for a number of values
     ``design``: function of uncertainty, number of blocks and seed; returns fractions in (0, 1), shape (blocks *
         block_rows, paths), block after block
-    ``indices``: function of complete blocks and confidence; returns the indices with bands
+    ``indices``: function of values (blocks, block_rows) [SI] of complete blocks, their numbers (blocks,), number of
+        paths, seed of the design and confidence; returns indices and half widths of their bands by name, each (paths,)
     """
 
     name: str
-    takes_dependent: bool
-    fewest: int
-    most: int
     noun: str
     block_rows: Callable[[int], int]
     design: Callable[[Uncertainty, int, int], Floats]
-    indices: Callable[[EvaluatedBlocks, float], Indices]
+    indices: Callable[[Floats, NDArray[np.intp], int, int, float], tuple[dict[str, Floats], dict[str, Floats]]]
 
 
 def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
@@ -149,48 +128,36 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     return np.clip(design.reshape(-1, dimensions), _SMALLEST, 1.0 - _SMALLEST)
 
 
-def _sobol_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
-    """Return the indices ``first`` and ``total`` with bands."""
-    # Points of one scramble depend on each other, scrambles do not: those are left out in turn.
-    table = evaluated.values.reshape(evaluated.blocks.size, -1)
-    scramble = evaluated.blocks % SCRAMBLES
-    parts = [scramble != number for number in np.unique(scramble)]
-    left_out = np.array([_sobol_total_and_first(table[members]) for members in parts])
-    reach = jackknife_reach(left_out, confidence)
-    total, first = _sobol_total_and_first(table)
-    return Indices({"total": total, "first": first}, {"total": reach[0], "first": reach[1]})
+def _sobol_indices(
+    table: Floats, blocks: NDArray[np.intp], _paths: int, _seed: int, confidence: float
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Return the indices ``first`` and ``total`` with bands.
 
-
-def _sobol_total_and_first(table: Floats) -> Floats:
-    """Return total and first-order Sobol indices (2, paths) from values (blocks, paths + 2).
-
-    The columns are f(A), then f(AB_i) with value i from B for each path, then f(B). With V the variance of f(A) and
-    f(B): total_i = mean (f(A) - f(AB_i))^2 / 2 V (Jansen, 1999), first_i = mean f(B) (f(AB_i) - f(A)) / V (Saltelli et
-    al., 2010).
+    The columns of the table are f(A), then f(AB_i) with value i from B for each path, then f(B). With V the variance of
+    f(A) and f(B): total_i = mean (f(A) - f(AB_i))^2 / 2 V (Jansen, 1999), first_i = mean f(B) (f(AB_i) - f(A)) / V
+    (Saltelli et al., 2010).
     """
-    # Centred: the estimate of the first order is a mean of products, whose error grows with the mean of the metric.
-    table = table - np.mean(table[:, [0, -1]])
-    first, copies, second = table[:, :1], table[:, 1:-1], table[:, -1:]
-    variance = float(np.mean(table[:, [0, -1]] ** 2))
-    total = 0.5 * np.mean((first - copies) ** 2, axis=0)
-    return np.stack([total, np.mean(second * (copies - first), axis=0)]) / (variance or math.nan)
+
+    def total_and_first(table: Floats) -> Floats:
+        # Centred: the estimate of the first order is a mean of products, whose error grows with the mean of the metric.
+        table = table - np.mean(table[:, [0, -1]])
+        first, copies, second = table[:, :1], table[:, 1:-1], table[:, -1:]
+        variance = float(np.mean(table[:, [0, -1]] ** 2))
+        total = 0.5 * np.mean((first - copies) ** 2, axis=0)
+        return np.stack([total, np.mean(second * (copies - first), axis=0)]) / (variance or math.nan)
+
+    # Points of one scramble depend on each other, scrambles do not: those are left out in turn.
+    scramble = blocks % SCRAMBLES
+    left_out = np.array([total_and_first(table[scramble != number]) for number in np.unique(scramble)])
+    values, reach = total_and_first(table), jackknife_reach(left_out, confidence)
+    return {"total": values[0], "first": values[1]}, {"total": reach[0], "first": reach[1]}
 
 
-SOBOL = Method(
-    name="sobol",
-    takes_dependent=False,
-    fewest=64,
-    most=2**17,
-    noun="base points",
-    block_rows=lambda dimensions: dimensions + 2,
-    design=_sobol_design,
-    indices=_sobol_indices,
-)
+SOBOL = Method("sobol", "base points", lambda dimensions: dimensions + 2, _sobol_design, _sobol_indices)
 """Sobol indices, fractions of the variance: first-order (a value alone) and total (with all interactions).
 
-Saltelli's design on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
-(2010) and Jansen (1999). The bands come from the spread between the scrambles, because the points of one sequence
-are not independent and resampling them gives bands that are several times too wide.
+Saltelli's design on independent scrambles of the Sobol sequence. The bands come from the spread between the scrambles,
+because the points of one sequence are not independent and resampling them gives bands that are several times too wide.
 """
 
 
@@ -224,23 +191,23 @@ def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     return np.asarray(np.clip(uniform, _SMALLEST, 1.0 - _SMALLEST))
 
 
-def _shapley_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
+def _shapley_indices(
+    table: Floats, blocks: NDArray[np.intp], paths: int, seed: int, confidence: float
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Return the index ``shapley`` with bands by the delta method over the orders."""
     from scipy.special import stdtrit
 
-    blocks, count = evaluated.blocks.size, evaluated.inputs.shape[1]
-    table = evaluated.values.reshape(blocks, count - 1, _INNER)
+    count, table = blocks.size, table.reshape(blocks.size, paths - 1, _INNER)
     variances = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
     conditional = np.var(table, axis=2, ddof=1)
-    ends = np.zeros((blocks, 1)), variances[:, None]
-    gains = np.diff(np.concatenate([ends[0], conditional, ends[1]], axis=1), axis=1)
-    orders = _orders(count, int(evaluated.blocks.max()) + 1, evaluated.seed)[evaluated.blocks]
+    gains = np.diff(np.concatenate([np.zeros((count, 1)), conditional, variances[:, None]], axis=1), axis=1)
+    orders = _orders(paths, int(blocks.max()) + 1, seed)[blocks]
     effects = np.take_along_axis(gains, np.argsort(orders, axis=1), axis=1)
     variance = float(np.mean(variances))
     fractions = np.mean(effects, axis=0) / variance
     deviations = (effects - fractions * variances[:, None]) / variance
-    reach = float(stdtrit(blocks - 1, 0.5 + 0.5 * confidence)) * np.std(deviations, axis=0, ddof=1) / math.sqrt(blocks)
-    return Indices({"shapley": fractions}, {"shapley": reach})
+    reach = float(stdtrit(count - 1, 0.5 + 0.5 * confidence)) * np.std(deviations, axis=0, ddof=1) / math.sqrt(count)
+    return {"shapley": fractions}, {"shapley": reach}
 
 
 def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:
@@ -249,16 +216,7 @@ def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:
     return np.argsort(ranks, axis=1)
 
 
-SHAPLEY = Method(
-    name="shapley",
-    takes_dependent=True,
-    fewest=64,
-    most=2**17,
-    noun="orders",
-    block_rows=lambda dimensions: _INNER * (dimensions - 1),
-    design=_shapley_design,
-    indices=_shapley_indices,
-)
+SHAPLEY = Method("shapley", "orders", lambda paths: _INNER * (paths - 1), _shapley_design, _shapley_indices)
 """Shapley effects: fractions of the variance that add up to 1, for independent and for correlated values.
 
 Variance that two values explain together, by interaction or by correlation, is divided between them (Owen, 2014).
@@ -269,33 +227,28 @@ METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
 """Methods of sensitivity analysis by name; a new method needs a design, indices, and an entry here."""
 
 
-def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floats]:
-    """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and its half band.
+def _change(
+    values: Floats, inputs: Floats, ends: Floats, part: NDArray[np.intp], confidence: float
+) -> tuple[float, float]:
+    """Return the change of a metric from the 5 to the 95 % quantile of a value, and its half band; nan for noise.
 
-    The change has the unit of the metric and is positive if the metric grows with the value; it is nan for noise. It is
-    the difference between two conditional means of the metric, with the value at either quantile and all other values
-    as drawn, so that correlated values change too. Each mean is the value of a parabola fitted to the nearest runs
-    (Cleveland, 1979, without weights). The bands add two errors: the spread between parts of the blocks, one part for
+    The change has the unit of the metric and is positive if the metric grows with the value. It is the difference
+    between two conditional means of the metric, with the value at either quantile (``ends``) and all other values as
+    drawn, so that correlated values change too. Each mean is the value of a parabola fitted to the nearest runs
+    (Cleveland, 1979, without weights). The band adds two errors: the spread between parts of the blocks, one part for
     each scramble, and twice the difference from the change with the nearer half of these runs, as the error of the
-    parabola.
+    parabola. ``values``, ``inputs`` and ``part`` are of runs (runs,), the values about their mean.
     """
-    part_of_block = np.unique(evaluated.blocks % SCRAMBLES, return_inverse=True)[1]
-    part = np.repeat(part_of_block, evaluated.values.size // evaluated.blocks.size)
-    # About the mean, because the sums of the lines below cancel.
-    values = evaluated.values - np.mean(evaluated.values)
+    if np.isnan(ends).any():
+        return math.nan, math.nan
     whole, nearer = (
-        np.array(
-            [
-                np.subtract(*(_levels(values, inputs, end, part, nearest) for end in ends[::-1]))
-                for inputs, ends in zip(evaluated.inputs.T, evaluated.ends.T, strict=True)
-            ]
-        )
+        np.subtract(*(_levels(values, inputs, float(end), part, nearest) for end in ends[::-1]))
         for nearest in (_NEAREST, 0.5 * _NEAREST)
     )
-    spread, bend_spread = jackknife_reach(whole[:, 1:].T, confidence), jackknife_reach((whole - nearer)[:, 1:].T, _ONE)
+    spread, bend_spread = jackknife_reach(whole[1:], confidence), jackknife_reach((whole - nearer)[1:], _ONE)
     # Of the square of the difference, what is chance on average is no bend.
-    bend = np.sqrt(np.maximum((whole - nearer)[:, 0] ** 2 - bend_spread**2, 0.0))
-    return whole[:, 0], spread + 2.0 * bend
+    bend = math.sqrt(max(float((whole - nearer)[0] ** 2 - bend_spread**2), 0.0))
+    return float(whole[0]), float(spread) + 2.0 * bend
 
 
 def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], nearest: float) -> Floats:
@@ -303,10 +256,7 @@ def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], 
 
     ``nearest`` is the fraction of the runs, nearest to the end, to which the parabola is fitted.
     """
-    count = int(part.max()) + 1
-    if math.isnan(end):
-        return np.full(count + 1, math.nan)
-    distance = np.abs(inputs - end)
+    distance, count = np.abs(inputs - end), int(part.max()) + 1
     rank = int(nearest * distance.size)
     near = distance <= np.partition(distance, rank)[rank]
     scaled = (inputs[near] - end) / (np.max(distance[near]) or 1.0)
@@ -405,18 +355,17 @@ def analyse(
     ``scenario`` is the scenario of the runs, None for a model; ``metrics`` are the metrics to analyse, () for all.
     Raises StudyError for invalid settings, dependent values or too many failures.
     """
-    if uncertainty.scores is not None and not method.takes_dependent:
+    if uncertainty.scores is not None and method is SOBOL:
         raise StudyError(
             f"sensitivity: {method.name} assumes independent values, but the study has [[correlations]]; use "
             f"{argument_text('method', 'shapley')}, or ignore the correlations with {argument_text('independent')}"
         )
     if len(uncertainty.drawn) < 2:
         raise StudyError("sensitivity: the study has only one uncertain value; vary two or more")
-    if not method.fewest <= samples <= method.most:
-        raise StudyError(f"samples = {samples}: {method.name} needs {method.fewest} to {method.most:,} {method.noun}")
+    if not _FEWEST <= samples <= _MOST:
+        raise StudyError(f"samples = {samples}: {method.name} needs {_FEWEST} to {_MOST:,} {method.noun}")
     # Checked before anything runs: a design takes thousands of runs.
-    design = method.design(uncertainty, samples, seed)
-    columns = uncertainty.columns(design)
+    columns = uncertainty.columns(method.design(uncertainty, samples, seed))
     rows = runs.run(columns)
     requested = tuple(metrics) or runs.metrics
     runs.check(rows, maximum_failed, "sensitivity", requested)
@@ -425,13 +374,11 @@ def analyse(
     if len(constant) == len(values):
         said = ", ".join(f"'{name}' is {number:g}" for name, number in constant.items())
         raise StudyError(f"sensitivity: {said} in every run, so no value influences it; choose another metric")
-    ends = np.array([number.distribution.values(np.array(_ENDS)) for number in uncertainty.drawn]).T
-    # A seed has no order: from its 5 to its 95 % quantile nothing changes.
-    ends[:, [path == NOISE_SEED for path in uncertainty.paths]] = np.nan
-    inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
-    blocks = np.repeat(np.arange(samples), design.shape[0] // samples)
-    # The design of all metrics, without the values of one.
-    evaluated = EvaluatedBlocks(inputs=inputs, values=np.empty(0), blocks=blocks, ends=ends, seed=seed)
+    inputs = []
+    for number in uncertainty.drawn:
+        # A seed has no order: from its 5 to its 95 % quantile nothing changes.
+        ends = number.distribution.values(np.array(_ENDS)) * (np.nan if number.path == NOISE_SEED else 1.0)
+        inputs.append((columns[number.path].reshape(samples, -1), ends))
     off = 0 if scenario is None else np.count_nonzero(tracking_violation(rows, scenario, columns, uncertainty.gauge))
     return Influences(
         study=study,
@@ -446,7 +393,7 @@ def analyse(
         failed=runs.failures,
         not_following=int(off),
         metrics=[
-            _metric_sensitivity(name, each, evaluated, method, samples, confidence)
+            _metric_sensitivity(name, each.reshape(samples, -1), inputs, method, seed, confidence)
             for name, each in values.items()
             if name not in constant
         ],
@@ -458,47 +405,46 @@ def analyse(
 
 
 def _metric_sensitivity(
-    name: str, values: Floats, design: EvaluatedBlocks, method: Method, samples: int, confidence: float
+    name: str,
+    table: Floats,
+    inputs: Sequence[tuple[Floats, Floats]],
+    method: Method,
+    seed: int,
+    confidence: float,
 ) -> MetricSensitivity:
-    """Return the sensitivity of a metric with ``values`` (rows,), for growing parts of the sample.
+    """Return the sensitivity of a metric with values (blocks, rows of a block), for growing parts of the sample.
 
-    Raises StudyError if too few blocks are complete.
+    ``inputs`` are the values of each path, of the same shape, and its 5 and 95 % quantile. Raises StudyError if too few
+    blocks are complete.
     """
-    known = np.isfinite(values)
+    known, samples, settling = np.isfinite(table), len(table), list[Indices]()
     # The formulas need whole blocks: one run without a value takes its block with it.
-    is_whole = np.all(known.reshape(samples, -1), axis=1)
+    whole = np.flatnonzero(known.all(axis=1))
     # All blocks, and halves, and halves of halves, as far as they say something: many of the first may be left out, and
     # a metric that counts may be the same in all.
     halved = {samples >> halvings for halvings in range(_SIZES)}
-    sizes = []
-    for size in sorted({size for size in halved if size >= method.fewest} | {samples}):
-        complete = values.reshape(samples, -1)[:size][is_whole[:size]]
-        if len(complete) >= _FEWEST_WHOLE and float(np.ptp(complete)) > 0.0:
-            sizes.append(size)
-    if samples not in sizes:
+    for size in sorted({size for size in halved if size >= _FEWEST} | {samples}):
+        first = whole[whole < size]
+        if first.size >= _FEWEST_WHOLE and float(np.ptp(table[first])) > 0.0:
+            estimated = method.indices(table[first], first, len(inputs), seed, confidence)
+            settling.append(Indices(*estimated, size, first.size))
+    if not settling or settling[-1].blocks != samples:
         raise StudyError(
-            f"sensitivity: only {int(np.count_nonzero(is_whole)):,} of {is_whole.size:,} {method.noun} "
+            f"sensitivity: only {whole.size:,} of {samples:,} {method.noun} "
             f"have '{name}' in all their runs; use more samples, or correct the runs that fail"
         )
-
-    def part(members: Any) -> EvaluatedBlocks:
-        """Return some blocks of the design with the values of the metric."""
-        rows = np.isin(design.blocks, members)
-        return replace(design, inputs=design.inputs[rows], values=values[rows], blocks=members)
-
-    settling = []
-    for size in sizes:
-        complete_blocks = np.flatnonzero(is_whole[:size])
-        estimated = method.indices(part(complete_blocks), confidence)
-        settling.append(replace(estimated, blocks=size, used=complete_blocks.size))
-    change, band = changes(part(np.flatnonzero(is_whole)), confidence)
+    values = table[whole].ravel()
+    # About the mean, because the sums of the lines below cancel.
+    values, part = values - np.mean(values), np.unique(whole % SCRAMBLES, return_inverse=True)[1]
+    part = np.repeat(part, table.shape[1])
+    changes = [_change(values, column[whole].ravel(), ends, part, confidence) for column, ends in inputs]
     return MetricSensitivity(
         metric=name,
-        mean=float(np.mean(values[known])),
-        standard_deviation=float(np.std(values[known], ddof=1)),
+        mean=float(np.mean(table[known])),
+        standard_deviation=float(np.std(table[known], ddof=1)),
         runs_without_value=int(np.count_nonzero(~known)),
-        change_from_5_to_95_percent=change.tolist(),
-        band_of_change=band.tolist(),
+        change_from_5_to_95_percent=[change for change, _ in changes],
+        band_of_change=[band for _, band in changes],
         settling=settling,
     )
 
@@ -544,9 +490,15 @@ def finding_of(influences: Influences) -> Finding[Influences]:
 
 
 def _part(influences: Influences, metric: MetricSensitivity) -> Section:
-    """Return a table with a row for each uncertain value, the most influential first, with remarks."""
-    kind, indices = of_metric(metric.metric, "+.3g"), metric.indices
-    order = np.argsort(-indices.ranking)
+    """Return a table with a row for each uncertain value, the most influential first, with remarks.
+
+    The remarks are on neighbours in the ranking whose bands overlap, and on the sum of first-order indices. Values
+    surely below a hundredth of the largest index are left out as negligible. A difference of the sum from 1 within its
+    error is not attributed to interactions.
+    """
+    kind, indices, remarks = of_metric(metric.metric, "+.3g"), metric.indices, list[str]()
+    ranking, reach = indices.ranking, next(iter(indices.bands.values()))
+    order = np.argsort(-ranking)
     columns = [Column("value", [influences.paths[row] for row in order])]
     for name, values in indices.values.items():
         columns.append(Column(_TITLES[name], [f"{round(values[row], 3) + 0.0:.3f}" for row in order]))
@@ -559,90 +511,64 @@ def _part(influences: Influences, metric: MetricSensitivity) -> Section:
     heading = f"{metric.metric}: mean {mean}, sd {kind.change(metric.standard_deviation)}"
     if metric.dropped_blocks:
         heading += f"; {metric.dropped_blocks:,} of {influences.samples:,} {influences.noun} left out"
-    return Section(heading, columns, remarks=_remarks(influences, metric))
-
-
-def _remarks(influences: Influences, metric: MetricSensitivity) -> list[str]:
-    """Return remarks on neighbours in the ranking whose bands overlap, and on the sum of first-order indices.
-
-    Values surely below a hundredth of the largest index are left out as negligible. A difference of the sum from 1
-    within its error is not attributed to interactions.
-    """
-    sentences, indices = [], metric.indices
-    values, bands = indices.ranking, next(iter(indices.bands.values()))
     # In the order of the table, in which only neighbours can be mistaken for each other.
-    order = np.argsort(-values)
-    order = order[(values + bands)[order] >= _NEGLIGIBLE * np.max(values)]
+    counting = order[(ranking + reach)[order] >= _NEGLIGIBLE * np.max(ranking)]
     unsettled = [
         f"{influences.paths[first]} and {influences.paths[second]}"
-        for first, second in pairwise(order)
-        if values[first] - bands[first] < values[second] + bands[second]
+        for first, second in pairwise(counting)
+        if ranking[first] - reach[first] < ranking[second] + reach[second]
     ]
     if unsettled:
-        sentences.append(f"not converged at this sample size, confidence bands overlap: {', '.join(unsettled)}")
+        remarks.append(f"not converged at this sample size, confidence bands overlap: {', '.join(unsettled)}")
     if "first" in indices.values:
         alone, error = float(np.sum(indices.values["first"])), float(np.linalg.norm(indices.bands["first"]))
         interactions = ": interactions, if any, are within this error"
         if alone + error < 1.0:
             interactions = "; the rest comes from interactions"
-        sentences.append(f"first-order indices sum to {alone:.3f} ± {error:.2g}{interactions}")
-    return sentences
-
-
-def _colour_of(rank: int) -> str:
-    """Return the colour of a value by its rank; grey for values beyond the lines of the convergence panel."""
-    return COLOURS[rank] if rank < _MAXIMUM_LINES else GREY
+        remarks.append(f"first-order indices sum to {alone:.3f} ± {error:.2g}{interactions}")
+    return Section(heading, columns, remarks=remarks)
 
 
 # A function with a name: a lambda in a report cannot be pickled.
 def _panels(influences: Influences) -> list[Panel]:
-    return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
+    """Return two panels for each metric: its indices with their bands, and the largest for growing parts of the sample.
 
-
-def _bars(influences: Influences, metric: MetricSensitivity) -> Panel:
-    """Return a panel of the indices with their bands, a row and a colour for each value.
-
-    The second index has open markers.
+    A row and a colour are of a value, grey beyond the values of the second panel; a second index has open markers.
     """
-    indices = metric.indices
-    labels = [label_of(path) for path in influences.paths]
-    order = np.argsort(-indices.ranking)
-    places = np.arange(order.size)[::-1]
-    marks = []
-    for name, filled, shift in zip(indices.values, ("full", "none"), (0.14, -0.14), strict=False):
-        base_style = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled}
-        for rank, row in enumerate(order):
-            colour = _colour_of(rank)
-            height, style = places[rank] + shift, {**base_style, "fmt": MARKERS.get(colour, "o")}
-            # One entry of the legend for each index: the markers of the first row.
-            label = _TITLES[name] if rank == 0 and len(indices.values) > 1 else ""
-            marks.append(
-                Mark("reach", [indices.values[name][row]], [height], [indices.bands[name][row]], label, colour, style)
+    panels = list[Panel]()
+    for metric in influences.metrics:
+        indices = metric.indices
+        order = np.argsort(-indices.ranking)
+        colours = [COLOURS[rank] if rank < _MAXIMUM_LINES else GREY for rank in range(order.size)]
+        places, bars, courses = np.arange(order.size)[::-1], list[Mark](), list[Mark]()
+        for (name, values), filled, shift in zip(indices.values.items(), ("full", "none"), (0.14, -0.14), strict=False):
+            for row, colour, place in zip(order, colours, places, strict=True):
+                style = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled, "fmt": MARKERS.get(colour, "o")}
+                # One entry of the legend for each index: the markers of the first row.
+                label = _TITLES[name] if row == order[0] and len(indices.values) > 1 else ""
+                at = [values[row]], [place + shift], [indices.bands[name][row]]
+                bars.append(Mark("reach", *at, label, colour, style))
+        name, sizes = next(iter(indices.values)), [step.blocks for step in metric.settling]
+        largest = order[:_MAXIMUM_LINES]
+        for row, colour in zip(largest, colours, strict=False):
+            values, bands = (
+                np.array([of_step[name][row] for of_step in steps])
+                for steps in ([step.values for step in metric.settling], [step.bands for step in metric.settling])
             )
+            line = {"marker": MARKERS.get(colour, "o"), "markersize": 3.5, "linewidth": 1.2}
+            courses.append(Mark("line", sizes, values, colour=colour, style=line))
+            courses.append(Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
+        labels = [label_of(influences.paths[row]) for row in order]
+        named, words = partial(_name_values, places, labels), of_metric(metric.metric).words
+        panels.append(Panel(Kind("Fraction of the variance"), Kind(), bars, words, legend="figure", then=named))
+        title, axis = f"{_TITLES[name].capitalize()}, {largest.size} largest", Kind(influences.noun.capitalize())
+        panels.append(Panel(axis, Kind(), courses, title, then=partial(_set_sizes, sizes)))
+    return panels
 
-    def name_values(axes: "Axes") -> None:
-        axes.set_yticks(places, [labels[row] for row in order])
-        axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
 
-    fraction = Kind("Fraction of the variance")
-    return Panel(fraction, Kind(), marks, of_metric(metric.metric).words, legend="figure", then=name_values)
-
-
-def _course(influences: Influences, metric: MetricSensitivity) -> Panel:
-    """Return a panel of the largest indices for growing parts of the sample."""
-    name, sizes = next(iter(metric.indices.values)), [step.blocks for step in metric.settling]
-    order = np.argsort(-metric.indices.ranking)[:_MAXIMUM_LINES]
-    marks = []
-    for rank, row in enumerate(order):
-        colour = _colour_of(rank)
-        values = np.array([step.values[name][row] for step in metric.settling])
-        bands = np.array([step.bands[name][row] for step in metric.settling])
-        line = {"marker": MARKERS.get(colour, "o"), "markersize": 3.5, "linewidth": 1.2}
-        marks.append(Mark("line", sizes, values, colour=colour, style=line))
-        marks.append(Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
-    title = f"{_TITLES[name].capitalize()}, {order.size} largest"
-    axis = Kind(influences.noun.capitalize())
-    return Panel(axis, Kind(), marks, title, then=partial(_set_sizes, sizes))
+def _name_values(places: NDArray[np.intp], labels: Sequence[str], axes: "Axes") -> None:
+    axes.set_yticks(places, labels)
+    axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
 
 
 def _set_sizes(sizes: Sequence[int], axes: "Axes") -> None:
