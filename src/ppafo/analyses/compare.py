@@ -36,6 +36,8 @@ Configured = Annotated[
     "Mapping[str, Scenario | str | Path] | Sequence[Scenario | str | Path]", Word("SCENARIO", is_repeated=True)
 ]
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
+DrawnRuns = tuple["Rows", str, "Floats"]
+"""Rows of runs over draws, the reason why the first of them failed, and the verdict on each draw."""
 AS_WRITTEN = "as written"
 """Task name of scenarios that run as written, without overrides of a task."""
 DEFAULT_DRAWS = 4096
@@ -117,7 +119,7 @@ class ComparedCase:
     - ``following``: number of draws whose run does so too; None without a verdict on any
     - ``is_on_front``: True if the case follows and no other that follows beats it in both error and gas
     - ``pairs``: statistics against the baseline by metric, ``best``: probability of being the best; empty without draws
-    - ``rows``, ``renoised``: runs over the draws, and the first of them repeated with other sensor noise; None without
+    - ``rows``: runs over the draws; None without
     """
 
     configuration: str
@@ -134,7 +136,6 @@ class ComparedCase:
     reason: str = field(compare=False)
     scenario: Scenario = field(compare=False, repr=False)
     rows: Rows | None = field(compare=False, repr=False)
-    renoised: Rows | None = field(compare=False, repr=False)
 
     def value(self, metric: str) -> float:
         """Return a metric [SI] of the nominal run; nan if the run does not have the metric."""
@@ -290,8 +291,8 @@ def compare(
         tasks={},
     )
     for task, _ in named_tasks:
-        cases = [_case(name, nominal[task, name], metrics, **drawn.get((task, name), {})) for name in names]
-        found.tasks[task] = _judged_together(found, cases)
+        runs = {name: (nominal[task, name], *drawn.get((task, name), (None, "", None))) for name in names}
+        found.tasks[task] = _cases(found, runs)
     remarks = [
         *(f"outputs: '{name}' is left out: not every configuration has this metric" for name in asked if lacks[name]),
         *_remarks(found),
@@ -336,11 +337,14 @@ def _drawn_runs(
     draws: tuple[int, int, float],
     threads: int | None,
     progress: Report | None,
-) -> dict[tuple[str, str], dict[str, Any]]:
+) -> dict[tuple[str, str], DrawnRuns]:
     """Return the runs of every scenario over the same draws; StudyError if too many of them fail.
 
-    ``draws`` are their number, the seed, and the fraction that may fail.
+    ``draws`` are their number, the seed, and the fraction that may fail. With sensor noise the first draws are repeated
+    behind the others, with another noise.
     """
+    import numpy as np
+
     from ppafo.simulation.numbers import NOISE_SEED
     from ppafo.studies.sampling import with_new_noise
     from ppafo.study.runs import RunCounter, excess, scenario_runs, unvaried, with_companions
@@ -348,97 +352,81 @@ def _drawn_runs(
     if not uncertainty.drawn:
         return {}
     count, seed, maximum_failed = draws
-    columns, drawn = uncertainty.replicated_columns(count, seed), {}
-    renoised_columns = with_new_noise(columns) if uncertainty.has_noise else {}
-    counter = RunCounter((count + len(renoised_columns.get(NOISE_SEED, ()))) * len(scenarios), progress)
+    columns, drawn = uncertainty.replicated_columns(count, seed), dict[tuple[str, str], DrawnRuns]()
+    if uncertainty.has_noise:
+        again = with_new_noise(columns)
+        columns = {path: np.concatenate([column, again[path]]) for path, column in columns.items()}
+    counter = RunCounter(max(map(len, columns.values())) * len(scenarios), progress)
     for (task, name), scenario in scenarios.items():
         runs = scenario_runs(scenario, with_companions(metrics, scenario), counter, uncertainty.gauge, threads)
         # The noise is in all configurations, even if the study varies other paths in some of them only.
         paths = [path for path in columns if study is None or path == NOISE_SEED or study.varies(path, name)]
         varied = {path: columns[path] for path in paths} or unvaried(scenario, count)
         rows = runs.run(varied)
-        runs.check(rows, maximum_failed, f"configuration '{name}', task '{task}'")
-        # Read before the runs with other noise, which may overwrite it.
-        failure = runs.reason
-        renoised = runs.run({path: renoised_columns[path] for path in paths}) if renoised_columns else None
-        verdicts = excess(rows, scenario, varied, uncertainty.gauge).passes
-        drawn[task, name] = {"rows": rows, "renoised": renoised, "reason": failure, "verdicts": verdicts}
+        first = {metric: values[:count] for metric, values in rows.items()}
+        runs.check(first, maximum_failed, f"configuration '{name}', task '{task}'")
+        verdicts = excess(first, scenario, {path: column[:count] for path, column in varied.items()}, uncertainty.gauge)
+        drawn[task, name] = rows, runs.reason, verdicts.passes
     return drawn
 
 
-def _case(
-    name: str,
-    nominal: Result,
-    metrics: Mapping[str, int],
-    rows: Rows | None = None,
-    renoised: Rows | None = None,
-    reason: str = "",
-    verdicts: Floats | None = None,
-) -> ComparedCase:
-    """Return a configuration on a task by itself; the remedy of a run that does not follow its reference is tried."""
+def _cases(
+    found: ComparisonResult, runs: Mapping[str, tuple[Result, Rows | None, str, Floats | None]]
+) -> list[ComparedCase]:
+    """Return the cases of a task, from the nominal run and the drawn runs of each configuration.
+
+    The remedy of a nominal run that does not follow its reference is tried.
+    """
     import numpy as np
 
     from ppafo.remedy_trials import tried
     from ppafo.study.runs import FAILED
 
-    status = nominal.status
-    with said_of_configuration(name):
-        tracking = tried(nominal.scenario, nominal.tracking)
-    follows = status.is_completed and not tracking.is_useless
-    word: str = status.kind
-    if tracking.fails and status.is_completed:
-        word = "beyond reach" if follows else tracking.kind
-    is_known = verdicts is not None and np.isfinite(verdicts).any()
-    return ComparedCase(
-        configuration=name,
-        status=status,
-        verdict=word,
-        follows=follows,
-        tracking=tracking,
-        metrics={metric: value for metric, value in nominal.metrics.items() if metric in metrics},
-        failed=0 if rows is None else int(rows[FAILED].sum()),
-        following=int(np.count_nonzero(verdicts == 1.0)) if is_known else None,
-        is_on_front=False,
-        pairs={},
-        best={},
-        reason=reason,
-        scenario=nominal.scenario,
-        rows=rows,
-        renoised=renoised,
-    )
-
-
-def _judged_together(found: ComparisonResult, cases: list[ComparedCase]) -> list[ComparedCase]:
-    """Return the cases of a task with front, paired statistics and probabilities of being the best."""
-    import numpy as np
-
-    base = next(case for case in cases if case.configuration == found.baseline)
+    cases, draws = list[ComparedCase](), found.draws
+    for name, (nominal, rows, reason, verdicts) in runs.items():
+        status = nominal.status
+        with said_of_configuration(name):
+            tracking = tried(nominal.scenario, nominal.tracking)
+        follows = status.is_completed and not tracking.is_useless
+        word: str = status.kind
+        if tracking.fails and status.is_completed:
+            word = "beyond reach" if follows else tracking.kind
+        base, pairs = runs[found.baseline][1], dict[str, PairedMetric]()
+        for metric, better in found.metrics.items() if name != found.baseline else ():
+            if base is None or rows is None:
+                continue
+            # Without a pair of values a metric has no statistics.
+            if pair := compare_pairs(base[metric], rows[metric], better, found.confidence, draws):
+                pairs[metric] = pair
+        is_known = verdicts is not None and np.isfinite(verdicts).any()
+        case = ComparedCase(
+            configuration=name,
+            status=status,
+            verdict=word,
+            follows=follows,
+            tracking=tracking,
+            metrics={metric: value for metric, value in nominal.metrics.items() if metric in found.metrics},
+            failed=0 if rows is None else int(rows[FAILED][:draws].sum()),
+            following=int(np.count_nonzero(verdicts == 1.0)) if is_known else None,
+            is_on_front=False,
+            pairs=pairs,
+            best={},
+            reason=reason,
+            scenario=nominal.scenario,
+            rows=None if rows is None else {metric: values[:draws] for metric, values in rows.items()},
+        )
+        cases.append(case)
     # A case that does not follow its reference is not among the best.
     following = [case for case in cases if case.follows]
     points = np.array([[case.value(name) for name in (found.error, _GAS)] for case in following]).reshape(-1, 2)
     front = dict(zip([case.configuration for case in following], pareto_front(points).tolist(), strict=True))
-    best: dict[str, dict[str, ConfidenceInterval]] = {case.configuration: {} for case in cases}
     drawn = [case.rows for case in following if case.rows is not None]
-    for name, better in found.metrics.items() if drawn else ():
+    for metric, better in found.metrics.items() if drawn else ():
         # All at once: no pair says which of three is the best. Empty where no draw has a value of all.
-        shares = best_probabilities([rows[name] for rows in drawn], better, found.confidence) if better else []
+        shares = best_probabilities([rows[metric] for rows in drawn], better, found.confidence) if better else []
         for case, share in zip(following, shares, strict=False):
-            best[case.configuration][name] = share
-    judged = []
-    for case in cases:
-        pairs = {}
-        for name, better in found.metrics.items() if case is not base else ():
-            if base.rows is None or case.rows is None:
-                continue
-            noise = None
-            if base.renoised is not None and case.renoised is not None:
-                noise = base.renoised[name], case.renoised[name]
-            # Without a pair of values a metric has no statistics.
-            if pair := compare_pairs(base.rows[name], case.rows[name], better, found.confidence, noise):
-                pairs[name] = pair
-        is_on_front = front.get(case.configuration, False)
-        judged.append(replace(case, is_on_front=is_on_front, pairs=pairs, best=best[case.configuration]))
-    return judged
+            case.best[metric] = share
+    return [replace(case, is_on_front=front.get(case.configuration, False)) for case in cases]
 
 
 def pareto_front(points: Floats) -> NDArray[Any]:
@@ -458,19 +446,20 @@ def compare_pairs(
     other: Floats,
     better: int,
     confidence: float,
-    other_noise: tuple[Floats, Floats] | None = None,
+    draws: int | None = None,
 ) -> PairedMetric | None:
-    """Return the paired statistics of values (draws,) [SI], nan for a missing value; None without any pair.
+    """Return the paired statistics of values (runs,) [SI], nan for a missing value; None without any pair.
 
-    Draws are assigned to the replicates in turn. ``other_noise`` has the values of both configurations for the first
-    draws, repeated with other noise. ``better`` is -1 if a smaller value is better, 1 if a larger value is better, 0 if
-    neither. A draw with equal values counts for neither configuration.
+    Draws are assigned to the replicates in turn; behind a number of ``draws``, by default all, are the values of the
+    first draws, repeated with other noise. ``better`` is -1 if a smaller value is better, 1 if a larger value is
+    better, 0 if neither. A draw with equal values counts for neither configuration.
     """
     import numpy as np
 
     from ppafo.studies.draws import REPLICATES
     from ppafo.studies.intervals import effective_sample_size, noise_interval, replicates_interval, share_interval
 
+    all_runs, baseline, other = other - baseline, baseline[:draws], other[:draws]
     both = np.isfinite(baseline) & np.isfinite(other)
     baseline_values, other_values = baseline[both], other[both]
     if baseline_values.size == 0:
@@ -480,12 +469,9 @@ def compare_pairs(
     low, middle, high = (
         np.quantile(change, (_OUTER_QUANTILES[0], 0.5, _OUTER_QUANTILES[1])) if change.size else (np.nan,) * 3
     )
-    difference = other - baseline
-    noise = None
-    if other_noise is not None:
-        noise = noise_interval(difference, other_noise[1] - other_noise[0], confidence)
+    difference, repeated = np.split(all_runs, [baseline.size])
     # A tie is no win on either side: of equal configurations neither is better in any draw.
-    wins = np.where(both, better * (other - baseline) > 0.0, np.nan)
+    wins = np.where(both, better * difference > 0.0, np.nan)
     return PairedMetric(
         pairs=baseline_values.size,
         difference=replicates_interval(difference, REPLICATES, confidence),
@@ -495,7 +481,7 @@ def compare_pairs(
         better=share_interval(wins, REPLICATES, confidence) if better else None,
         equal=float(np.mean(baseline_values == other_values)),
         effective_size=effective_sample_size(other_values - baseline_values),
-        noise=noise,
+        noise=noise_interval(difference, repeated, confidence) if repeated.size else None,
     )
 
 
