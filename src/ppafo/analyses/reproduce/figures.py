@@ -1,9 +1,8 @@
 """Figures 7 and 8 of the paper: simulated step response and torque task, with synthetic measurements."""
 
-from collections.abc import Sequence
 from functools import partial
 from operator import methodcaller
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from ppafo.report.style import (
     PROPORTIONAL,
     REFERENCE,
     SOLENOID,
-    DrawingStyle,
     font_size,
 )
 from ppafo.signals import Recording
@@ -156,16 +154,6 @@ def _enlarge(frame: tuple[float, float, float, float], ends: tuple[float, float]
     inset.set_title(f"first {_ENLARGED:.0f} ms", fontsize=font_size(7.5), color=GREY, loc="center", pad=2.0)
 
 
-class _TaskRun(NamedTuple):
-    """Torque task with a valve: its name and style, simulated run, run on the bench if any, gas in the paper [g]."""
-
-    valve: str
-    style: DrawingStyle
-    recording: Recording
-    experiment: Recording | None
-    gas_in_paper: float
-
-
 def torque_task_figure(
     solenoid: Recording,
     proportional: Recording,
@@ -179,21 +167,42 @@ def torque_task_figure(
     the solenoid valves and for the proportional valve [g]. ``synthetic`` are recordings of the same task on the
     simulated bench with both valves.
     """
-    experiments = synthetic or (None, None)
-    runs = [
-        _TaskRun("solenoid", SOLENOID, solenoid, experiments[0], gas_in_paper[0]),
-        _TaskRun("proportional", PROPORTIONAL, proportional, experiments[1], gas_in_paper[1]),
-    ]
-    torques = [_torque_marks(run, ceiling) for run in runs]
     opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)
-    errors = [Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8})]
-    for run in runs:
-        error = run.recording["reference"] - run.recording["torque"]
-        errors.append(Mark("line", run.recording.time, error, colour=run.style.colour))
-    gas = [mark for run in runs for mark in _gas_marks(run)]
-    most_gas = GRAMS_PER_KILOGRAM * max(float(run.recording["supplied_mass"][-1]) for run in runs)
+    torques, gas, errors = (
+        list[list[Mark]](),
+        list[Mark](),
+        [Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8})],
+    )
+    for valve, look, run, experiment, in_paper in zip(
+        ("solenoid", "proportional"),
+        (SOLENOID, PROPORTIONAL),
+        (solenoid, proportional),
+        synthetic or (None, None),
+        gas_in_paper,
+        strict=True,
+    ):
+        colour, dashed = look.colour, {"linestyle": REFERENCE.line, "linewidth": 1.3}
+        marks = [
+            Mark("line", run.time, run["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
+            Mark("level", y=ceiling, label=f"maximum: {ceiling:.1f} N m", colour=GREY, style=_LEVEL),
+        ]
+        if experiment is not None:
+            # Broader than the simulated torque and darker than the grid, so that it is visible where both agree.
+            broad = {"linestyle": "-", "linewidth": 4.5, "alpha": 0.75}
+            readings = experiment.time, experiment["torque"]
+            marks.append(Mark("line", *readings, (), "synthetic", EXPERIMENT.colour, broad))
+        torques.append([*marks, Mark("line", run.time, run["torque"], label="simulated", colour=colour)])
+        errors.append(Mark("line", run.time, run["reference"] - run["torque"], colour=colour))
+        supplied = run["supplied_mass"]
+        label = f"{valve}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g, in the paper {in_paper:g} g"
+        gas.append(Mark("line", run.time, supplied, label=label, colour=colour))
+        gas.append(Mark("level", y=in_paper / GRAMS_PER_KILOGRAM, colour=colour, style=_LEVEL))
+    most_gas = GRAMS_PER_KILOGRAM * max(float(run["supplied_mass"][-1]) for run in (solenoid, proportional))
     limits = partial(methodcaller, "set", xlim=(float(solenoid.time[0]), float(solenoid.time[-1])))
-    torque_limits = limits(ylim=_torque_limits(torques))
+    # All torque panels have the same limits, 5 % beyond their marks.
+    drawn = [mark.y for marks in torques for mark in marks]
+    low, high = min(float(np.min(values)) for values in drawn), max(float(np.max(values)) for values in drawn)
+    torque_limits = limits(ylim=(low - 0.05 * (high - low), high + 0.05 * (high - low)))
     chambers = limits(ylim=(0.0, 2.0), yticks=(0.5, 1.5), yticklabels=("2", "1"))
     opening_limits = limits(ylim=(-0.08 if proportional["command"].min() >= 0.0 else -1.1, 1.08))
     gas_limits = limits(ylim=(0.0, 1.1 * max(most_gas, *gas_in_paper)))
@@ -206,42 +215,9 @@ def torque_task_figure(
         command_panel([opening], "Opening of the proportional valve", then=opening_limits),
         panel(_ERROR, errors, "Error: reference less torque, both valves", legend="", tall=1.3, then=limits()),
         panel(_GAS, gas, "CO$_2$ from the supply (dotted: the paper)", tall=1.3, then=gas_limits),
-        _gas_panel(runs, most_gas),
+        _gas_panel(solenoid, proportional, most_gas),
     ]
     return draw_panels(panels, 1, (6.3, 1.0), kind=solenoid.kind)
-
-
-def _torque_limits(panels: Sequence[Sequence[Mark]]) -> tuple[float, float]:
-    """Return the limits of the torque axis [N m] that all torque panels share, 5 % beyond their marks."""
-    drawn = [mark.y for marks in panels for mark in marks]
-    low, high = min(float(np.min(values)) for values in drawn), max(float(np.max(values)) for values in drawn)
-    margin = 0.05 * (high - low)
-    return low - margin, high + margin
-
-
-def _torque_marks(run: _TaskRun, ceiling: float) -> list[Mark]:
-    """Return marks of reference, torque and largest torque [N m], and the broad line of the synthetic experiment."""
-    recording, dashed = run.recording, {"linestyle": REFERENCE.line, "linewidth": 1.3}
-    marks = [
-        Mark("line", recording.time, recording["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
-        Mark("level", y=ceiling, label=f"maximum: {ceiling:.1f} N m", colour=GREY, style=_LEVEL),
-    ]
-    if run.experiment is not None:
-        # Broader than the simulated torque and darker than the grid, so that it is visible where both agree.
-        broad = {"linestyle": "-", "linewidth": 4.5, "alpha": 0.75}
-        readings = run.experiment.time, run.experiment["torque"]
-        marks.append(Mark("line", *readings, (), "synthetic", EXPERIMENT.colour, broad))
-    return [*marks, Mark("line", recording.time, recording["torque"], label="simulated", colour=run.style.colour)]
-
-
-def _gas_marks(run: _TaskRun) -> list[Mark]:
-    """Return the line of the supplied gas over time [kg], and the level that the paper states."""
-    supplied, colour = run.recording["supplied_mass"], run.style.colour
-    label = f"{run.valve}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g, in the paper {run.gas_in_paper:g} g"
-    return [
-        Mark("line", run.recording.time, supplied, label=label, colour=colour),
-        Mark("level", y=run.gas_in_paper / GRAMS_PER_KILOGRAM, colour=colour, style=_LEVEL),
-    ]
 
 
 def _filling_marks(recording: Recording) -> list[Mark]:
@@ -258,7 +234,7 @@ def _filling_marks(recording: Recording) -> list[Mark]:
     return marks
 
 
-def _gas_panel(runs: Sequence[_TaskRun], most: float) -> Panel:
+def _gas_panel(solenoid: Recording, proportional: Recording, most: float) -> Panel:
     """Return the panel of the supplied gas at the end [kg]: bars in the chambers and vented, and below them leaked.
 
     Gas that leaks past the vane is vented from the other chamber. ``most`` is the larger supplied gas [g].
@@ -270,11 +246,9 @@ def _gas_panel(runs: Sequence[_TaskRun], most: float) -> Panel:
         Mark("band", none, (none, none), label=label, colour=colour, style={"alpha": alpha})
         for label, colour, alpha in names
     ]
-    for run, height in zip(runs, (1.0, 0.0), strict=True):
-        supplied, vented, leaked = (
-            float(run.recording[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass")
-        )
-        inside, colour = supplied - vented, run.style.colour
+    for run, colour, height in ((solenoid, SOLENOID.colour, 1.0), (proportional, PROPORTIONAL.colour, 0.0)):
+        supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
+        inside = supplied - vented
         kept, lost = (f"{GRAMS_PER_KILOGRAM * mass:.2f}" for mass in (inside, vented))
         broad = (height - 0.25,) * 2, (height + 0.25,) * 2
         thin = (height - 0.36 - 0.05,) * 2, (height - 0.36 + 0.05,) * 2
@@ -286,6 +260,6 @@ def _gas_panel(runs: Sequence[_TaskRun], most: float) -> Panel:
             Mark("band", past_vane, thin, colour=BLACK, style={"alpha": 1.0}),
         ]
     # To the right of the longer bar there is space for the amounts.
-    valves = [run.valve for run in runs]
-    set_limits = methodcaller("set", xlim=(0.0, 1.8 * most), yticks=(1.0, 0.0), yticklabels=valves)
+    ticks = {"yticks": (1.0, 0.0), "yticklabels": ("solenoid", "proportional")}
+    set_limits = methodcaller("set", xlim=(0.0, 1.8 * most), **ticks)
     return Panel(_GAS, Kind(), marks, "Location of this gas at the end", then=set_limits, tall=0.75)

@@ -34,26 +34,6 @@ READINGS_OF_U = (("the opening, -1 to 1", 1.0), ("volts, 5 open the valve", 5.0)
 WITHIN_REACH = 4.0
 """Reference level [N m] within the reach of the supply."""
 _GAINS = ("proportional_gain", "integral_gain", "derivative_gain")
-TUNED = (
-    "controller.kind=pid",
-    "controller.rate=1 kHz",
-    "controller.proportional_gain=1.2 1/(N m)",
-    "controller.integral_gain=23 1/(N m s)",
-    "controller.derivative_gain=0.0095 s/(N m)",
-    "controller.derivative_filter=3.1 ms",
-    "controller.anti_windup=4.8 1/s",
-)
-"""PID gains found by a search for least error and gas, on an ideal valve and on a slow, delayed and noisy valve."""
-DEAD_ZONE = (
-    "controller.kind=on_off_dead_zone",
-    "controller.rate=20 Hz",
-    "controller.dead_zone=0.2 N m",
-    "controller.release=0.05 N m",
-    "controller.opening=1",
-)
-"""Overrides for an on-off law with a dead zone narrower than the torque change of the solenoid pair in one sample."""
-FASTER = ("controller.rate=100 Hz", "valve.switching_interval=10 ms")
-"""Overrides for five times the printed switching rate of 20 Hz, which limits the switching interval in the set."""
 _RESTS_ON = ("the torque task as completed here",)
 
 
@@ -211,21 +191,19 @@ def control_claims(solenoid: Result, proportional: Result, pair_errors: Floats) 
 
     ``pair_errors`` are the RMS errors [N m] of the solenoid pair over the unknown phase of its decisions.
     """
-    claims = []
-    for identifier, run, overrides in (
-        ("limited_by_switching", solenoid, FASTER),
-        ("gains_minimise_error", proportional, TUNED),
-        ("dead_zone_amplifies_delay", solenoid, DEAD_ZONE),
-    ):
+    claims, faster = [], "limited_by_switching"
+    runs = {faster: solenoid, "gains_minimise_error": proportional, "dead_zone_amplifies_delay": solenoid}
+    for identifier, run in runs.items():
         entry, own = paper_entries()[identifier], run.scenario.origin.overrides
         # Another law takes nothing that was set for this one.
-        remaining = [override for override in own if not override.startswith("controller.")]
+        overrides = [override for override in own if not override.startswith("controller.")]
+        overrides += [f"{path}={value}" for path, value in entry.arguments.items()]
         try:
-            changed = simulate(load_scenario(run.scenario.name, [*remaining, *overrides])).metrics["rms_error"].value
+            changed = simulate(load_scenario(run.scenario.name, overrides)).metrics["rms_error"].value
         except (ParameterError, ScenarioError, SimulationError) as failure:
             claims.append(Claim(entry, "undetermined", note=f"{entry.note} {failure}."))
             continue
-        if overrides is FASTER:
+        if identifier == faster:
             less = 100.0 * (1.0 - changed / pair_errors)
             value, ends, found = _median_and_range(less, 0, "% less error at 100 Hz")
             claims.append(Claim(entry, "undetermined", value, entry.note, _RESTS_ON, found, ends))

@@ -41,7 +41,9 @@ class ClaimEntry(StrictTable):
     where: Text = Field(description="page, section or figure of the source")
     source: str = Field("", description="publication, if other than the one of the file")
     computation: str = Field("", description="name of a computation of 'ppafo reproduce'")
-    arguments: dict[str, str] = Field(default_factory=dict, description="arguments of the computation, with units")
+    arguments: dict[str, str] = Field(
+        default_factory=dict, description="arguments of the computation, or settings of its run, with units"
+    )
     at_least: float | None = Field(None, allow_inf_nan=False, description="lowest value that agrees, in 'unit'")
     at_most: float | None = Field(None, allow_inf_nan=False, description="highest value that agrees, in 'unit'")
     assumed: Texts = Field((), description="assumptions of our number beyond the publication")
