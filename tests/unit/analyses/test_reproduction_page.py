@@ -82,7 +82,7 @@ def test_the_page_states_every_claim_with_both_numbers_and_the_verdict(reproduct
     assert "the dissertations of K. A. Shorter (2011) and Y. Li (2013)" in text
 
 
-def test_the_page_holds_its_figures_and_fetches_nothing(page: str) -> None:
+def test_the_page_holds_its_three_figures_and_fetches_nothing(page: str) -> None:
     assert page.count("data:image/svg+xml;base64,") == 4
     assert "http" not in page
     assert "<script" not in page
