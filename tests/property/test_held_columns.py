@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ppafo.gait.recorded.strides import LONGEST_HELD, constant_stretches
+from ppafo.gait.recorded.importing import LONGEST_HELD, constant_stretches
 
 RATE = 200.0
 TIME = np.arange(0.0, 8.0, 1.0 / RATE)

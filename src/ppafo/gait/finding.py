@@ -11,8 +11,7 @@ import numpy as np
 from ppafo.documents.json_text import fields_of
 from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
-from ppafo.gait.recorded.importing import ImportedGait
-from ppafo.gait.recorded.strides import PHASES
+from ppafo.gait.recorded.importing import PHASES, ImportedGait
 from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel

@@ -7,8 +7,8 @@ import pytest
 
 from ppafo.gait import Gait
 from ppafo.gait.plausible import FOOT_FLAT, turning_about_ankle
+from ppafo.gait.recorded.importing import acceleration_of
 from ppafo.gait.recorded.signal import knee_position
-from ppafo.gait.recorded.strides import acceleration_of
 from ppafo.signals.recording import Floats
 
 HIP = np.array([-0.06828, -0.06384, 0.08233])
