@@ -180,8 +180,8 @@ def declared_faults(valve: str) -> tuple[Fault, ...]:
         if section in SECTIONS and path not in absent and (section != "effects" or path in switches):
             value = number_at(scenario, path)
             other = OF_OTHERS.get(path, OTHER * value if value else LACKED[quantity.unit])
-            # A weight at the joint is a torque of gravity towards the other end.
-            twins = {"joint_load.weight": "foot_plate.gravity_torque"}
+            # A weight at the joint is a torque of gravity towards the other end; below its first node a valve is shut.
+            twins = {"joint_load.weight": "foot_plate.gravity_torque", "opening.command_01": "valve.dead_band"}
             named = (f"{path} ", path, rest, rest.partition(".")[0], twins.get(rest, path))
             faults.append(Fault(f"{valve}, {path} {other:.4g}", named, device=(f"{path}={other!r} SI",), valve=valve))
     return tuple(faults)

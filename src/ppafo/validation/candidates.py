@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.report.kind import Kind
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
@@ -311,7 +311,7 @@ _SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas", "ef
 """Sections of the parameter set whose parameters are tried, in this order; effects that the set names alone."""
 _NOT_TRIED = "actuator.restitution"
 """Parameter observable only when the vane reaches a stop; a replay starts between the stops."""
-_OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
+_OF_SUPPLY = {PRESSURE_PATH: SUPPLY, SECOND_PRESSURE_PATH: DORSIFLEXION_SUPPLY}
 
 
 def of_numbers(request: Replay) -> Iterator[Cause]:
@@ -336,18 +336,21 @@ def of_numbers(request: Replay) -> Iterator[Cause]:
         elif path in _OF_GASES:
             trials = tuple((np.geomspace(*_OF_GASES[path], _OF_A_GAS) / value).tolist())
         trials = tuple(size for size in trials if quantity.minimum <= size * base <= quantity.maximum)
-        if len(trials) > 2:
-            is_ratio = min(trials) > 0.0
-            yield Cause(
-                path,
-                words,
-                partial(_scaled, "", {}, {path: base}),
-                trials,
-                is_ratio=is_ratio,
-                usual=math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0,
-                is_off=value == 0.0 and is_ratio,
-                unit=quantity.unit or "-",
-            )
+        # Two regulators of one pressure are set together; one of them may be off alone.
+        is_first = path == PRESSURE_PATH and device.supply.has_one_pressure
+        for alone, others in (("", {}), (" alone", {SECOND_PRESSURE_PATH: value}))[: 1 + is_first]:
+            if len(trials) > 2:
+                is_ratio = min(trials) > 0.0
+                yield Cause(
+                    path + alone,
+                    words.replace(path, path + alone),
+                    partial(_scaled, "", others, {path: base}),
+                    trials,
+                    is_ratio=is_ratio,
+                    usual=math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0,
+                    is_off=value == 0.0 and is_ratio,
+                    unit="" if others else quantity.unit or "-",
+                )
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
     atmosphere = device.supply.atmospheric_pressure
 

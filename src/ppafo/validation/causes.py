@@ -447,7 +447,8 @@ class CauseSearch:
         """
         if not slopes:
             return False
-        errors, step = first.residuals.errors, _SMALL * min(map(abs, first.grid))
+        # A tangent: of a logarithm the sizes themselves are no measure.
+        errors, step = first.residuals.errors, _DIFFERENCE * float(np.diff(sorted(first.grid)).min())
         moved = self._slopes([(first, first.at(first.size + step), errors, 1.0)])
         along_first = moved[0][1] if moved else np.zeros_like(errors)
         along_first /= max(float(np.linalg.norm(along_first)), _SMALLEST)
