@@ -14,6 +14,8 @@ from typing import Literal, TypeVar
 
 Value = TypeVar("Value")
 
+_SMALLEST_FRACTION = 1.0e-4
+"""Smallest fraction that is printed as a number [-]."""
 LONGEST_SHOWN = 40
 """Largest number of characters quoted in a message from a name or cell."""
 
@@ -56,7 +58,12 @@ def without_exponent(value: float, form: str) -> str:
 
 
 def percentage(fraction: float, digits: int) -> str:
-    """Format a fraction [-] as a percentage with ``digits`` significant digits, without exponent: ``120 %``."""
+    """Format a fraction [-] as a percentage with ``digits`` significant digits, without exponent: ``120 %``.
+
+    One that is no more than rounding error counts as small: ``below 0.01 %``.
+    """
+    if 0.0 < abs(fraction) < _SMALLEST_FRACTION:
+        return f"below {100.0 * _SMALLEST_FRACTION:g} %"
     return f"{float(f'{100.0 * fraction:.{digits}g}'):.12g} %"
 
 

@@ -16,7 +16,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
-from ppafo.wording import count_of, nearest_name, one_line
+from ppafo.wording import count_of, nearest_name, one_line, percentage
 
 if TYPE_CHECKING:
     from pandas import DataFrame  # type: ignore[import-untyped]
@@ -238,7 +238,7 @@ def verdict(validation: Validation) -> str:
         fitted = " once the state at the start is fitted" if worst.in_noise > _OF_START else ""
         texts = [f"nothing but noise is left{fitted}"]
     else:
-        share = f"{100 * worst.fraction:.2g} % of full range"
+        share = f"{percentage(worst.fraction, 2)} of full range"
         texts = [f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"]
         if not passes and causes.found is None and any(row.motion == "free" for row in validation.recordings):
             texts.append("the vane was taken to be free")
@@ -247,12 +247,15 @@ def verdict(validation: Validation) -> str:
     explanation = "; ".join(filter(None, texts))
     if not passes:
         failed = ", ".join(
-            f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
+            f"{channel.channel} in {agreement.file} ({percentage(channel.fraction, 3)}, limit "
+            f"{percentage(channel.limit, 3)})"
             for channel, agreement in pairs
             if not channel.passes
         )
         return f"{name} does not agree: {failed}; {explanation}"
-    wide = f" ({worst.channel}: {100 * worst.limit:.3g} %, which is wider than the noise and may hide a wrong number)"
+    wide = (
+        f" ({worst.channel}: {percentage(worst.limit, 3)}, which is wider than the noise and may hide a wrong number)"
+    )
     limit = f"every RMS error is within its limit{'' if causes.is_noise else wide}"
     return f"{name} agrees with {count_of(len(validation.recordings), 'recording')}: {limit}; {explanation}"
 
@@ -404,7 +407,7 @@ def _panels(agreement: RecordingAgreement, across: int) -> list[Panel]:
         curve = FittedCurve(
             time=time,
             level=Kind(quantity.title, "", "pressure" if name in looks else quantity.quantity),
-            change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", quantity.quantity),
+            change=Kind(f"Measured - model, RMS {percentage(channel.fraction, 2)}", "", quantity.quantity),
             times=scale * measured.time,
             samples=channel.values,
             # The measurement is late by the delay, so the model is read that much earlier.
