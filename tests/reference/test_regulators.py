@@ -23,7 +23,7 @@ from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.simulation.tracking.case import Case
-from ppafo.simulation.tracking.shortfall import available_torque
+from ppafo.simulation.tracking.rule import available_torque
 
 LOCKED = {"kind": "locked", "angle": "75 deg"}
 CONSTANT = {"kind": "constant", "command": 0.6, "rate": "1 kHz"}

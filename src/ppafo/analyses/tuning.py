@@ -39,7 +39,7 @@ from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.numbers import NOISE_SEED, changes_in, with_numbers
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.simulation.simulate import Result, simulate
-from ppafo.simulation.tracking.shortfall import shortfall
+from ppafo.simulation.tracking.rule import shortfall
 from ppafo.studies.distributions import Distribution, Floats
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.limits import MetricLimit, atmosphere_of, check_metrics, difference_of, level_of

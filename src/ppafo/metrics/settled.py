@@ -62,8 +62,8 @@ WHERE_REQUESTED, IN_PUSH_OFF = -1.0, -2.0
 """In place of the start of a judged part, for a walk."""
 FEWEST_PERIODS = 0.5
 """Periods of a reference in the settled part, below which the part may hold no peak of the reference [-]."""
-SUSTAINED = 4
-"""Number of reversals on the hold from which a loop counts as oscillating; settling takes one or two."""
+MOST_REVERSALS = 3.0
+"""Number of reversals on the hold above which a loop counts as oscillating; settling takes one or two."""
 _TINY = 1.0e-300
 """Divisor in place of 0."""
 
@@ -119,7 +119,7 @@ class SettledPart(NamedTuple):
     largest_error: float = 0.0
     """Largest absolute error [SI]."""
     error_reversals: float = 0.0
-    """Number of reversals of the error beyond those of a lag behind a moving reference; 0 below ``SUSTAINED``."""
+    """Number of reversals of the error beyond those of a lag behind a moving reference."""
     value_range: float = 0.0
     """Range of the controlled quantity over the whole run [SI]."""
     peak: float = 0.0
@@ -188,8 +188,7 @@ def numbers_of(
     inverse = 1.0 / part.taken if part.taken > 0.0 else math.nan
     mean, square, mean_ahead = part.total * inverse, part.squares * inverse, part.reference_total * inverse
     rests = 1.0 if part.rests > 0.0 or part.path == 0.0 else 0.0
-    of_lag = 0.0 if rests > 0.0 else max(float(int(max(abs(part.lag_swing.turns) - 1.0, 0.0))), turns)
-    reversals = float(int(max(abs(part.swing.turns) - 1.0, 0.0))) - of_lag
+    of_lag = 0.0 if rests > 0.0 else max(abs(part.lag_swing.turns) - 1.0, turns, 0.0)
     lag, way = math.sqrt(part.lag_squares * inverse), abs(part.last - part.first)
     wave = math.sqrt(max(part.reference_squares * inverse - mean_ahead * mean_ahead, 0.0))
     return SettledPart(
@@ -201,7 +200,7 @@ def numbers_of(
         error_deviation=math.sqrt(max(square - mean * mean, 0.0)),
         error_range=part.highest_error - part.lowest_error,
         largest_error=max(part.highest_error, -part.lowest_error),
-        error_reversals=reversals if reversals >= SUSTAINED else 0.0,
+        error_reversals=max(abs(part.swing.turns) - 1.0 - of_lag, 0.0),
         rests=rests,
         motion=min(lag / (LARGEST_LAG * max(change, _TINY)), 1.0),
         lag=lag,
@@ -258,7 +257,7 @@ def error_and_oscillation(part: SettledPart, limits: PartLimits) -> tuple[float,
     weighed = max(ratio, part.largest_error / limits.largest_error) * part.weight
     error = max(weighed, part.largest_error / (LARGEST_EXCUSED * part.way))
     # While the reference moves, an error that reverses is none to speak of if it is small.
-    turning = min(part.error_reversals / (SUSTAINED - 1.0), error / max(part.motion, _TINY))
+    turning = min(part.error_reversals / MOST_REVERSALS, error / max(part.motion, _TINY))
     # A joint that creeps has a range of its error, too, but a mean error above the standard deviation.
     swings = part.rests > 0.0 and part.error_deviation > abs(part.mean_error)
     return error, max(turning, span) if swings else turning
@@ -394,8 +393,8 @@ def next_part(state: SettledSums, course: ReferenceSummary, sample: Sample, late
         lag_squares=lag * lag + (0.0 if anew else before.lag_squares),
         lag_total=lag + (0.0 if anew else before.lag_total),
         # What motion excuses is no reversal.
-        swing=begun(next_swing(before.swing, error, least + lag), error, anew or is_new),
-        lag_swing=begun(next_swing(before.lag_swing, late, least), late, anew or is_new),
+        swing=begun(next_swing(before.swing, error, least + lag), error, anew),
+        lag_swing=begun(next_swing(before.lag_swing, late, least), late, anew),
         lowest_error=error
         if anew
         else error + joined * min(before.lowest_error - error, 0.0)
@@ -442,6 +441,12 @@ def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample)
     )
 
 
+def blended_swing(first: Swing, rest: Swing, of_first: float) -> Swing:
+    """Return the reversal state of a rest that goes on, with a share ``of_first`` of the reversals as in ``blend``."""
+    turns = of_first * (max(abs(first.turns) - 1.0, 0.0) + 2.0 * max(abs(rest.turns) - 1.0, 0.0))
+    return Swing(rest.play, (-1.0 if rest.turns < 0.0 else 1.0) * (1.0 + turns), rest.highest)
+
+
 def blend(first: PartSums, rest: PartSums, of_first: float) -> PartSums:
     """Return the sums with which a move after a rest begins: a share ``of_first`` of a move and of that rest."""
     # Only the second half of a rest was judged; a small part of a path that returns counts in full.
@@ -458,6 +463,8 @@ def blend(first: PartSums, rest: PartSums, of_first: float) -> PartSums:
         reference_total=of_first * first.reference_total + of_rest * rest.reference_total,
         lag_squares=of_first * first.lag_squares + of_rest * rest.lag_squares,
         lag_total=of_first * first.lag_total + of_rest * rest.lag_total,
+        swing=blended_swing(first.swing, rest.swing, of_first),
+        lag_swing=blended_swing(first.lag_swing, rest.lag_swing, of_first),
         lowest_error=min(first.lowest_error, rest.lowest_error),
         highest_error=max(first.highest_error, rest.highest_error),
         first=rest.last + of_path * (first.first - rest.last),

@@ -27,7 +27,7 @@ from ppafo.metrics.metric import (
     ramp,
     spans,
 )
-from ppafo.model.columns import choose, larger, truncated
+from ppafo.model.columns import choose, larger
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
 from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
@@ -117,8 +117,8 @@ class Swing(NamedTuple):
 
     ``play`` follows the signal with a backlash of one swing: it stays between the signal and one swing below, and moves
     only if the signal goes on or turns back by more. ``turns`` is positive while the signal rises and negative while it
-    falls; its absolute value is 1 plus the number of reversals. It starts at UNDECIDED: a first rise leads to an
-    absolute value between 1 and 2, which is no reversal yet, and a first fall to -1. ``highest`` is the highest value.
+    falls; its absolute value is 1 plus the number of reversals. It is UNDECIDED before the first rise or fall.
+    ``highest`` is the highest value.
     """
 
     play: float
@@ -126,7 +126,7 @@ class Swing(NamedTuple):
     highest: float
 
 
-UNDECIDED = -0.5
+UNDECIDED = 0.0
 
 
 def next_swing(state: Swing, value: float, swing: float) -> Swing:
@@ -135,14 +135,15 @@ def next_swing(state: Swing, value: float, swing: float) -> Swing:
     play = min(max(state.play, value - swing), value)
     turns_back = (play - state.play) * state.turns < 0.0
     turned = -state.turns + (1.0 if state.turns < 0.0 else -1.0)
-    falls_first = state.turns == UNDECIDED and value < state.highest - swing
-    turns = turned if turns_back else state.turns
-    return Swing(play, -1.0 if falls_first else turns, max(state.highest, value))
+    first = (1.0 if play > state.play else 0.0) - (1.0 if value < state.highest - swing else 0.0)
+    turns = first if state.turns == UNDECIDED else turned if turns_back else state.turns
+    return Swing(play, turns, max(state.highest, value))
 
 
 def count_of(turns: Floats) -> Floats:
     """Number of reversals (runs,) from ``Swing.turns``."""
-    return truncated(larger(abs(turns) - 1.0, 0.0))
+    found: Floats = larger(abs(turns) - 1.0, 0.0)
+    return found
 
 
 class _Oscillations(NamedTuple):

@@ -184,6 +184,8 @@ def advance_part(
     rested = course.rests > 0.0
     begins = is_slow and lasts and not goes_on
     ends = rested and not goes_on
+    # After its first half, a stretch may be followed by a pulse that leads back to its level.
+    waits = rested and goes_on and course.in_first_half > 0.0
     return course._replace(
         previous=reference,
         change=change,
@@ -191,7 +193,7 @@ def advance_part(
         part_start=line_start if begins or ends else course.part_start,
         rests=1.0 if begins or (rested and goes_on) else 0.0,
         is_new=1.0 if begins or ends else 0.0,
-        in_first_half=1.0 if lasts and (begins or (rested and goes_on)) else 0.0,
+        in_first_half=1.0 if lasts and (begins or waits) else 0.0,
     )
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Count
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.metrics import metric_kind
-from ppafo.metrics.settled import SUSTAINED, VERDICT_METRICS
+from ppafo.metrics.settled import MOST_REVERSALS, VERDICT_METRICS
 from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.simulation.clock import TIMES
@@ -23,7 +23,7 @@ from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking import most_reversals
-from ppafo.simulation.tracking.metered import TrackingExcess, command_turning, needed_metrics, tracking_excess
+from ppafo.simulation.tracking.rule import TrackingExcess, command_turning, needed_metrics, tracking_excess
 from ppafo.simulation.tracking.settled import smallest_change
 from ppafo.studies.distributions import Floats
 from ppafo.studies.limits import check_metrics
@@ -243,5 +243,5 @@ def settled(rows: Rows, metric: str) -> Floats:
     """Return a metric for evaluation; in sustained oscillation, a final error becomes the RMS error, if larger."""
     if metric not in ONE_INSTANT or "settled_turns" not in rows:
         return rows[metric]
-    swings = (rows["settled_turns"] >= SUSTAINED) & (rows["settled_error"] > rows[metric])
+    swings = (rows["settled_turns"] > MOST_REVERSALS) & (rows["settled_error"] > rows[metric])
     return np.where(swings, rows["settled_error"], rows[metric])

@@ -1,4 +1,4 @@
-"""Causes of a task that does not follow its reference, most certain first, each with numbers and remedies."""
+"""Causes of a task or walk that does not follow its reference, most certain first, with numbers and remedies."""
 
 from collections.abc import Callable
 from functools import partial
@@ -8,11 +8,12 @@ import numpy as np
 from ppafo.control.catalog import CONTROLLERS, switching_remedy
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import SAMPLES_LATE
-from ppafo.metrics.metric import Floats, followed
-from ppafo.metrics.settled import LARGEST_LAG, LARGEST_SHARE
+from ppafo.metrics.metric import Floats, controlled_in, followed
+from ppafo.metrics.settled import LARGEST_LAG, LARGEST_SHARE, MOST_REVERSALS
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, error_functions
 from ppafo.parameters.graph import Asked
+from ppafo.parameters.reach import supply_for
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.gains import loop_of
 from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
@@ -20,8 +21,11 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import LoopParts, quicker_at
 from ppafo.simulation.tracking.case import Case, TrackingCause, only_opens_fully
 from ppafo.simulation.tracking.load_causes import (
+    ONE_WAY,
     flung_at_start,
     load_beyond_reach,
+    reach_at_samples,
+    reach_text,
     stop_of,
     torque_at_its_limit,
     torque_beyond_reach,
@@ -44,7 +48,7 @@ from ppafo.simulation.tracking.remedies import (
     stiffer_laws,
     torque_asked,
 )
-from ppafo.simulation.tracking.rule import is_pair
+from ppafo.simulation.tracking.rule import LEAST_PEAK_WALK, is_pair
 
 _MOSTLY, _PARTLY = 0.5, 0.2
 """Fractions of the settled part that count as most of it, and as much of a move [-]."""
@@ -87,6 +91,12 @@ _MOVING = 0.02
 """Range of the angle [rad] above which the volumes of the chambers are not constant."""
 _QUICKER = 1.3
 """Loop rate at an angle, divided by the rate used for the gains, above which it causes oscillation [-]."""
+_OFTEN = 0.1
+"""Fraction of the samples of a walk with a request that counts as often [-]."""
+_VALVES_OF_WALK = (2.0, 4.0, 8.0, 32.0, 128.0, 1000.0)
+"""Factors by which the valve of a walk is enlarged in a trial; the last one for a unit mistaken by 1000 [-]."""
+_DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
+"""Settings of a walking controller that request a torque in dorsiflexion."""
 
 
 def _slope(case: Case) -> Floats:
@@ -132,25 +142,16 @@ def _late_device(case: Case, least: float = LARGEST_SHARE) -> TrackingCause | No
     return TrackingCause(text, remedies, "use a faster valve or controller, or a slower reference")
 
 
-def _late_text(case: Case) -> str:
-    """Words for a sensor delay that is long beside the time between two crossings of the reference; "" otherwise."""
-    scenario, delay = case.scenario, float(case.scenario.sensors.delay)
-    reference, value = followed(case.recording)
-    crossings = int(np.count_nonzero(np.diff((value > reference)[case.samples])))
-    if delay * max(crossings, 1) <= _LONG_DELAY * case.settled.duration:
-        return ""
-    return f"the measured {CONTROLLED[scenario.controlled].words} comes late (`{_DELAY} = {level_text('s', delay)}`)"
-
-
 def _shut_valve(case: Case) -> TrackingCause | None:
     """Cause: the command is 0, or stays within the dead band of the valve."""
     scenario, settled = case.scenario, case.settled
+    reverses = settled.error_reversals > MOST_REVERSALS
     command, band = np.abs(case.recording["command"][case.samples]), dead_band(scenario)
     # A loop that rests at the edge of the band is a little beyond it now and then.
     typical = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
-    if case.failure != "overshoots" and (np.max(command) if settled.error_reversals else typical) <= SHUT:
+    if case.failure != "overshoots" and (np.max(command) if reverses else typical) <= SHUT:
         return TrackingCause("the command stays 0: the gains are 0, or the dead zone is wider than the error")
-    if typical > _EDGE * band or settled.error_reversals or case.failure == "overshoots":
+    if typical > _EDGE * band or reverses or case.failure == "overshoots":
         return None
     known_band = float(scenario.controller.settings.get("dead_band", 0.0))
     if known_band >= band and case.is_settling:
@@ -167,12 +168,19 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     return TrackingCause(text, tuple(remedies), "give a larger gain")
 
 
-def oscillation(case: Case) -> TrackingCause | None:
+def _oscillation(case: Case) -> TrackingCause | None:
     """Cause: valves, gains or small chambers make the loop oscillate."""
     law, scenario = case.law, case.scenario
     names = [quantity.name for quantity in speed_settings(scenario, law).values()]
     may_be_late = scenario.follows_reference and only_opens_fully(case.recording) and not names
-    late = _late_text(case) if may_be_late else ""
+    late, delay = "", float(scenario.sensors.delay)
+    if may_be_late:
+        reference, value = followed(case.recording)
+        crossings = int(np.count_nonzero(np.diff((value > reference)[case.samples])))
+        if delay * max(crossings, 1) > _LONG_DELAY * case.settled.duration:
+            late = (
+                f"the measured {CONTROLLED[scenario.controlled].words} comes late ({stated_number(scenario, _DELAY)})"
+            )
     if not (case.oscillates or case.only_switches or late):
         return None
     if law is not None and case.only_switches:
@@ -182,7 +190,7 @@ def oscillation(case: Case) -> TrackingCause | None:
     if shipped is not None and _pair_step(case, shipped)[0] > _FINE * case.settled.wanted_change:
         return _step_of_valves(case, shipped)
     if law is not None and names:
-        return gains_of_another_device(case) or _fast_loop(case, law, names[0])
+        return _gains_of_another_device(case) or _fast_loop(case, law, names[0])
     name = "the user-defined controller" if law is None else f"`{law.name}`"
     if not only_opens_fully(case.recording):
         return TrackingCause(f"{name} is too fast for the delays of the loop", (), "reduce its gains, or slow it down")
@@ -212,29 +220,21 @@ def _step_of_valves(case: Case, law: ControllerKind) -> TrackingCause | None:
         f"{'' if law.only_switches else asks}the valves cause a step of {change_text(controlled, step)} in their dead "
         f"time of {1.0e3 * dead_time:.3g} ms, {ratio:.2g} times the requested change"
     )
+    # The longer of the valves' switching interval and the delay of sampling decides.
+    sampled = SAMPLES_LATE * scenario.controller.period
+    quicker = "a faster valve" if sampled <= 0.5 * dead_time else "a higher `controller.rate`"
+    if is_pair(scenario):
+        is_late = sampled > float(scenario.device.valve.settings["switching_interval"])
+        quicker = "faster valves" + " together with a higher `controller.rate`" * is_late
     # Where a valve has gradual openings, a law that uses them for an angle is the better remedy.
     gradual = (CASCADE,) if scenario.controlled == ANGLE else ()
-    return TrackingCause(
-        text,
-        (*gradual, *smaller_pair(scenario, ratio)),
-        f"take smaller valves, or {_quicker_text(scenario, dead_time)}",
-    )
+    return TrackingCause(text, (*gradual, *smaller_pair(scenario, ratio)), f"take smaller valves, or {quicker}")
 
 
 def _pair_step(case: Case, law: ControllerKind) -> tuple[float, float]:
     """Step R theta of on/off valves [SI] at the mean angle of the settled part, in their dead time theta [s]."""
     loop, angle = loop_of(case.scenario, law), float(np.mean(case.recording["angle"][case.samples]))
     return loop.rate * loop.dead_time * _loop_rate(case.scenario, angle), loop.dead_time
-
-
-def _quicker_text(scenario: Scenario, dead_time: float) -> str:
-    """Words for what reduces the dead time [s] of an on/off loop: its valves, the rate of its controller, or both."""
-    sampled = SAMPLES_LATE * scenario.controller.period
-    if not is_pair(scenario):
-        return "a higher `controller.rate`" if sampled > 0.5 * dead_time else "a faster valve"
-    # The longer of the valves' switching interval and the delay of sampling decides.
-    interval = float(scenario.device.valve.settings["switching_interval"])
-    return "faster valves together with a higher `controller.rate`" if sampled > interval else "faster valves"
 
 
 def _wide_zone(case: Case, begin: str, end: str = "") -> TrackingCause:
@@ -318,14 +318,14 @@ def _static_friction(case: Case) -> TrackingCause | None:
     return TrackingCause(text, tuple(remedies), "increase `controller.angle_stiffness`")
 
 
-def open_share(case: Case) -> float:
+def _open_share(case: Case) -> float:
     """Share of the settled part in which the valve is fully open [-]."""
     return float(np.mean(case.is_fully_open[case.samples]))
 
 
 def _small_valve(case: Case) -> TrackingCause | None:
     """Cause: the valve is fully open for much of the settled part, and too small for this task."""
-    scenario, settled, share = case.scenario, case.settled, open_share(case)
+    scenario, settled, share = case.scenario, case.settled, _open_share(case)
     if share <= (_MOSTLY if settled.rests or case.oscillates else _PARTLY) or case.is_for_reach:
         return None
     # A valve larger by wanted over reached change gives the wanted change in the same time.
@@ -413,7 +413,7 @@ def _lag(case: Case) -> TrackingCause | None:
     return TrackingCause(text, tuple(remedies), "use larger gains, less delay or a slower reference")
 
 
-def gains_of_another_device(case: Case) -> TrackingCause | None:
+def _gains_of_another_device(case: Case) -> TrackingCause | None:
     """Cause: a gain differs from the default gain of the device."""
     default_gains = default_gain_remedies(case.scenario, case.law)
     if not default_gains:
@@ -511,10 +511,10 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _within_tolerance,
     _static_friction,
     _shut_valve,
-    oscillation,
+    _oscillation,
     _small_valve,
     torque_beyond_reach,
-    gains_of_another_device,
+    _gains_of_another_device,
     _lag,
     _still_approaching,
     _law_without_torque_loop,
@@ -526,3 +526,97 @@ CAUSES_OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     *(partial(_flaw_of_valve, names, False) for names in _FLAWS_OF_VALVE),
 )
 """Causes of a task, most certain first; ``_not_settled`` always applies."""
+
+
+def _request_beyond_reach(case: Case) -> TrackingCause | None:
+    """Cause: the controller of a walk often requests more torque than the actuator gives at the current angle."""
+    scenario, samples = case.scenario, case.samples
+    if case.failure == "overshoots" or controlled_in(case.recording) is None:
+        return None
+    reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
+    places, reaches = reach_at_samples(case)
+    above, below = reference[places] - reaches[:, 1], reaches[:, 0] - reference[places]
+    share = float(np.mean((above > 0.0) | (below > 0.0)))
+    lacks_peak = case.settled.given_peak < LEAST_PEAK_WALK * case.settled.requested_peak
+    if share <= (0.0 if lacks_peak else _OFTEN):
+        return None
+    if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():
+        # Dorsiflexion torque requested from an actuator that pushes in plantarflexion only.
+        asked, lowest = float(reference[places].min()), float(reaches[:, 0].min())
+        text = (
+            f"the controller requests {level_text('N m', asked)}, but the actuator gives {reach_text(lowest, False)}: "
+            "it acts in one direction only"
+        )
+        settings = scenario.controller.settings
+        unasked = {f"controller.{name}": 0.0 for name in _DORSIFLEXION if settings.get(name, 0.0) > 0.0}
+        omission = (remedy(scenario, unasked),) if unasked else ()
+        advice = "request no dorsiflexion torque, or add a spring that lifts the foot"
+        return TrackingCause(text, omission, advice)
+    at = int(np.argmax(np.maximum(above, below)))
+    asked, given = float(reference[places][at]), float(reaches[at, 1 if above[at] > 0.0 else 0])
+    text = (
+        f"for {100.0 * share:.0f} % of the time the controller requests more torque than the actuator gives, such as "
+        f"{level_text('N m', asked)} where the actuator gives {level_text('N m', given)}"
+    )
+    numbers: dict[str, float] = {}
+    for path, lacking in (("supply.pressure", above), ("supply.dorsiflexion_pressure", below)):
+        place = places[int(np.argmax(lacking))]
+        needed = supply_for(scenario.device, float(angle[place]), 1.05 * float(reference[place]))
+        if needed is not None and lacking.max() > 0.0:
+            numbers[path] = needed
+    remedies = [remedy(scenario, numbers)] if numbers else []
+    least = float(np.quantile(np.where(reference[places] > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
+    if min(least, scenario.controller.settings.get("largest_torque", 0.0)) > 0.0:
+        remedies.append(remedy(scenario, {"controller.largest_torque": least}))
+    advice = "increase `supply.pressure` or request less torque"
+    return TrackingCause(text, tuple(remedies), advice)
+
+
+def _speed_of_gait(case: Case) -> TrackingCause:
+    """Cause: the gait moves the joint faster than the torque loop follows."""
+    scenario = case.scenario
+    volumes = {path: number_at(scenario, path) for path in ("actuator.dead_volume_1", "actuator.dead_volume_2")}
+    remedies = [] if case.law is None else [*sized_valves(scenario, (0.5, 2.0))]
+    if min(volumes.values()) > 0.0:
+        larger = [{path: factor * number for path, number in volumes.items()} for factor in (2.0, 4.0)]
+        remedies += [remedy(scenario, numbers) for numbers in larger]
+    text = "the gait moves the joint faster than the torque loop can follow"
+    return TrackingCause(text, tuple(remedies), "use larger dead volumes or a faster valve")
+
+
+def _dead_band_of_walk(case: Case) -> TrackingCause | None:
+    """Cause: the command of a walk often stays within the valve's dead band, without compensation by its controller."""
+    scenario = case.scenario
+    band = dead_band(scenario) - float(scenario.controller.settings.get("dead_band", 0.0))
+    command = np.abs(case.recording["command"][case.samples])
+    share = float(np.mean((command > SHUT) & (command <= band)))
+    if share <= _OFTEN or case.failure == "overshoots":
+        return None
+    text = f"the command stays within `valve.dead_band = {band:.2g}` for {100.0 * share:.0f} % of the time"
+    advice = "use a valve without dead band, or a controller that compensates the dead band"
+    return TrackingCause(text, rescaled_gains(scenario, case.law, (2.0, 4.0, 8.0)), advice)
+
+
+def _small_valve_of_walk(case: Case) -> TrackingCause | None:
+    """Cause: the valve of a walk is often fully open, and too small for the speed of the joint."""
+    share, settled = _open_share(case), case.settled
+    # An oscillating loop, and on/off valves, are fully open for other reasons, unless they give too little.
+    lacks = settled.given_peak < LEAST_PEAK_WALK * settled.requested_peak
+    if share <= _OFTEN or ((case.oscillates or case.only_switches) and not lacks):
+        return None
+    text = f"the valve is fully open for {100.0 * share:.0f} % of the time: it is too small for the speed of this gait"
+    return TrackingCause(text, sized_valves(case.scenario, _VALVES_OF_WALK), "use a larger valve")
+
+
+CAUSES_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
+    _request_beyond_reach,
+    # Gains that make a walk oscillate, or a pair of valves whose step exceeds the torque limit.
+    lambda case: (
+        _oscillation(case) if case.oscillates or (case.failure == "overshoots" and case.only_switches) else None
+    ),
+    _dead_band_of_walk,
+    _small_valve_of_walk,
+    _gains_of_another_device,
+    _speed_of_gait,
+)
+"""Causes of a walk, most certain first; the last one always applies."""

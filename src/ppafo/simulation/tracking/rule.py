@@ -1,28 +1,40 @@
-"""Tracking rule: limits of the numbers of a settled part (``settled.py``), and the kind of failure beyond them.
+"""Tracking rule: what an actuator can give, numbers of judged parts over their limits, and the kind of failure.
 
-"SI" is the SI unit of the controlled quantity.
+Parts are records (``settled.py``) of a recording, or made of the metrics of runs without one. "SI" is the SI unit of
+the controlled quantity.
 """
 
 import math
+from collections.abc import Iterable, Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
 from ppafo.engine.in_python import over_samples
+from ppafo.engine.scheme.actuators import torque_of
 from ppafo.metrics.metric import Floats
 from ppafo.metrics.settled import (
     LARGEST_SHARE,
     LARGEST_SHARE_OF_WAVE,
+    MOST_REVERSALS,
+    SETTLED_METRICS,
+    WALK_PEAKS,
     PartLimits,
     SettledPart,
     error_and_oscillation,
     gradual_limits,
 )
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import first
+from ppafo.model.controlled import TORQUE
+from ppafo.parameters.plant import plant_parameters
+from ppafo.parameters.reach import reaching_pressures
 from ppafo.simulation.profiles import profile_bounds, profile_values
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.settled import settled_parts
 
 LARGEST_SHARE_SWITCHED = 0.25
 """RMS error divided by the wanted change, above which an on/off controller, which swings by design, does not follow."""
@@ -51,6 +63,14 @@ SMALLEST_MOVE = 0.01
 """Change of the value divided by the wanted change, below which the value does not move [-]."""
 REVERSALS = "command_reversals"
 """Metric that counts reversals of the command."""
+_ANGLES = 9
+"""Number of angles between the stops at which the torque of a moving joint is evaluated."""
+_LEAST_REACH = 1.0e-9
+"""Torque within reach that is judged at least [N m]: an actuator without a supply gives none."""
+_PHASES = np.sin(np.linspace(0.0, 2.0 * math.pi, 32, endpoint=False))[:, None]
+"""Course of a moving reference about its mean, divided by its amplitude [-]."""
+_OF_WALK = ("torque_error", "requested_torque", "peak_torque", *WALK_PEAKS)
+"""Metrics by which a walk is judged, in addition to the reversals of its command."""
 Failure = Literal["does not move", "oscillates", "overshoots", "does not follow"]
 """Kind of failure."""
 Criterion = Literal[
@@ -184,7 +204,7 @@ def excess_of_part(settled: SettledPart, is_switched: bool, beyond: Floats | flo
     overshoot = (settled.peak / wanted - 1.0) / (LARGEST_PEAK - 1.0) * (1.0 - motion)
     if is_switched:
         # A limit cycle beside the reference has a large mean error, and reverses.
-        swings = (settled.error_deviation > mean_error) | (np.asarray(settled.error_reversals) > 0.0)
+        swings = (settled.error_deviation > mean_error) | (np.asarray(settled.error_reversals) > MOST_REVERSALS)
         oscillation, overshoot = np.where(swings, error, 0.0), np.zeros_like(motion)
     share = np.asarray(settled.rms_error / wanted)
     is_still = (share > LARGEST_SHARE) & (settled.value_range <= SMALLEST_MOVE * wanted)
@@ -210,3 +230,170 @@ def failure_of_task(excess: _TaskExcess, turning: float) -> Failure | None:
     if excess.error > 1.0 or (excess.reach > 1.0 and excess.overshoot <= 1.0):
         return "does not follow"
     return "overshoots" if excess.overshoot > 1.0 else None
+
+
+def shortfall(scenario: Scenario) -> Floats:
+    """Largest reference minus the available torque [N m] in each run (runs,); 0 if the torque suffices."""
+    if scenario.controlled != TORQUE:
+        return np.zeros(1)
+    lowest, highest = available_torque(scenario)
+    least, most = profile_bounds(scenario.reference)
+    return np.atleast_1d(np.maximum(0.0, np.maximum(most - highest, lowest - least)))
+
+
+def available_torque(scenario: Scenario) -> tuple[Floats, Floats]:
+    """Lowest and highest torque of the actuator [N m] in each run (runs,).
+
+    One chamber is at its supply and the other vented, independent of the controller. For a moving joint the angle with
+    the largest torque counts.
+    """
+    device = scenario.device
+    actuator, locked = device.actuator, scenario.motion.locked_angle
+    fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
+    first, travel = (actuator.angle_min, actuator.angle_max - actuator.angle_min) if locked is None else (locked, 0.0)
+    model, plant = ACTUATORS[actuator.kind].model, plant_parameters(device)
+    at_lowest, at_highest = reaching_pressures(device)
+    angles = [first + fraction * travel for fraction in fractions]
+    highest = [torque_of(model, plant, angle, *at_highest) for angle in angles]
+    lowest = [torque_of(model, plant, angle, *at_lowest) for angle in angles]
+    return np.min(lowest, axis=0), np.max(highest, axis=0)
+
+
+def misses_for_reach(scenario: Scenario, parts: Iterable[SettledPart], turning: Floats | float) -> NDArray[np.bool_]:
+    """True for each run (runs,) that reach alone keeps from its reference: it gives what the actuator can give.
+
+    ``parts`` are the judged parts, ``turning`` is the number of command reversals divided by its limit.
+    """
+    lacking, switches = shortfall(scenario) > 0.0, only_switches(scenario, scenario.law)
+    if not lacking.any():
+        return lacking
+    reach = available_torque(scenario)
+    found = np.fmax.reduce([excess_of_part(_within_reach(part, *reach), switches).largest for part in parts])
+    return np.asarray(lacking & (np.fmax(found, turning) <= 1.0))
+
+
+def _within_reach(part: SettledPart, lowest: Floats, highest: Floats) -> SettledPart:
+    """Judged part with the errors that are left of a reference cut at the lowest and highest torque [N m].
+
+    A moving reference is taken for a wave of the same mean and deviation.
+    """
+    reference = part.reference_mean + math.sqrt(2.0) * np.asarray(part.reference_deviation) * _PHASES
+    cut = np.clip(reference, lowest, highest)
+    beyond = reference - cut
+    mean = part.mean_error + beyond.mean(axis=0)
+    deviation = np.maximum(part.error_deviation - beyond.std(axis=0), 0.0)
+    farthest = np.abs(beyond).max(axis=0)
+    left: dict[str, Any] = part._asdict() | {
+        "wanted_change": np.minimum(part.wanted_change, np.maximum(np.maximum(highest, -lowest), _LEAST_REACH)),
+        "rms_error": np.hypot(mean, deviation),
+        "mean_error": mean,
+        "error_deviation": deviation,
+        "error_range": np.maximum(part.error_range - np.ptp(beyond, axis=0), 0.0),
+        "largest_error": np.maximum(part.largest_error - farthest, 0.0),
+        # The error of a wave whose peaks are cut reverses more often than the wave.
+        "error_reversals": np.where((np.asarray(part.rests) > 0.0) | (farthest == 0.0), part.error_reversals, 0.0),
+        "reference_deviation": cut.std(axis=0),
+    }
+    return SettledPart._make(np.broadcast_arrays(*left.values()))
+
+
+def needed_metrics(scenario: Scenario) -> tuple[str, ...]:
+    """Names of the metrics by which runs of a scenario without recording are judged; none without a reference."""
+    if scenario.controller.is_open_loop:
+        return ()
+    return (*(SETTLED_METRICS if scenario.follows_reference else _OF_WALK), REVERSALS)
+
+
+def command_turning(scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float) -> Floats:
+    """Command reversals of each run divided by their limit (runs,): above 1 the loop oscillates; 0 if unknown.
+
+    Under sensor noise the reversals in the settled part count, if known. Arguments as in
+    ``tracking_excess``.
+    """
+    none = np.zeros(next(iter(metrics.values())).size)
+    if not is_noisy(scenario) or "settled_reversals" not in metrics:
+        return np.nan_to_num(metrics.get(REVERSALS, none)) / most_reversals
+    often = most_reversals / max(float(first(scenario.run.duration)), 1.0)
+    return np.nan_to_num(metrics["settled_reversals"]) / often
+
+
+class TrackingExcess(NamedTuple):
+    """Numbers of each run divided by their limits (runs,); nan if unknown.
+
+    With ``largest`` up to 1 the run follows its reference, with ``oscillation`` up to 1 its loop does not oscillate.
+    ``beyond_reach`` [N m] is the requested torque that the actuator cannot reach (runs,), which the limits allow in
+    part. A run that does not reach it on purpose is ``excused``.
+    """
+
+    largest: Floats
+    oscillation: Floats
+    beyond_reach: Floats
+    excused: NDArray[np.bool_]
+
+    @property
+    def follows(self) -> Floats:
+        """1 for each run (runs,) that follows its reference, 0 for the others, nan if unknown."""
+        return np.where(np.isnan(self.largest), np.nan, self.largest <= 1.0)
+
+    @property
+    def passes(self) -> Floats:
+        """1 for each run (runs,) that follows its reference or misses it on purpose, 0 for others, nan if unknown."""
+        return np.where(self.excused, 1.0, self.follows)
+
+    @property
+    def oscillates(self) -> Floats:
+        """1 for each run (runs,) whose loop oscillates, 0 for the others, nan if unknown."""
+        return np.where(np.isnan(self.oscillation), np.nan, self.oscillation > 1.0)
+
+
+def tracking_excess(
+    scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float, least: float
+) -> TrackingExcess:
+    """Numbers of each run by which its tracking is judged, divided by their limits.
+
+    Numbers of the scenario may be arrays (runs,). ``metrics`` are the available ``needed_metrics``; ``most_reversals``
+    is the number of command reversals above which the loop oscillates; ``least`` is the ``smallest_change``.
+    """
+    none = np.full(next(iter(metrics.values())).size, np.nan)
+    turning = command_turning(scenario, metrics, most_reversals)
+    counted = np.isfinite(metrics.get(REVERSALS, none)) & np.isfinite(most_reversals)
+    numbers = {name: metrics.get(name, none) for name in needed_metrics(scenario)}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if not scenario.follows_reference:
+            error, requested, peak = (numbers[name] for name in _OF_WALK[:3])
+            limit = np.asarray(scenario.controller.settings.get("largest_torque", 0.0))
+            of_walk: dict[str, Any] = {
+                "wanted_change": np.nan_to_num(requested, nan=np.inf),
+                "rms_error": np.nan_to_num(error),
+                "peak": peak,
+                "requested_peak": np.nan_to_num(numbers["requested_peak"]),
+                "given_peak": np.nan_to_num(numbers["given_peak"]),
+            }
+            asks = np.isfinite(error)
+            if not np.any(asks):
+                highest = np.minimum(limit, available_torque(scenario)[1])
+                of_walk |= {"requested_peak": highest, "given_peak": np.nan_to_num(numbers["push_off_peak"])}
+            settled = SettledPart(**of_walk)
+            # A law that requests no torque is judged by the peak alone.
+            excess = excess_of_walk(settled, turning, limit)
+            known = (asks & (requested > 0.0)) | (~asks & np.isfinite(peak) & (limit > 0.0))
+            known_turning = np.where(counted | known, turning, np.nan)
+            zeros = np.zeros(none.size)
+            return TrackingExcess(np.where(known, excess, np.nan), known_turning, zeros, zeros > 0.0)
+        parts = settled_parts(scenario, numbers, least)
+        beyond, is_switched = shortfall(scenario), only_switches(scenario, scenario.law)
+        found = [excess_of_part(part, is_switched, beyond) for part in parts]
+        explained = bool(scenario.beyond_reach) & misses_for_reach(scenario, parts, turning)
+    known = np.isfinite(numbers["settled_error"])
+    # Without an earlier part its numbers are nan.
+    largest = np.fmax.reduce([turning, *(part.largest for part in found)])
+    known_verdict = known & ~(parts[0].is_undecided & (largest <= 1.0))
+    # A value that does not move is no oscillation, however far it is from the reference, and a cut wave is none either.
+    swings = (np.where((each.standstill > 1.0) | (each.reach > 1.0), 0.0, each.oscillation) for each in found)
+    beyond = np.where(parts[0].ends_on_ramp, 0.0, beyond) + np.zeros(none.size)
+    return TrackingExcess(
+        largest=np.where(known_verdict, largest, np.nan),
+        oscillation=np.where(counted | known, np.fmax.reduce([turning, *swings]), np.nan),
+        beyond_reach=beyond,
+        excused=(beyond > 0.0) & (largest > 1.0) & explained,
+    )

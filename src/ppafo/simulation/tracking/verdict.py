@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ppafo.metrics.metric import controlled_in, extent
-from ppafo.metrics.settled import IN_PUSH_OFF, LARGEST_EXCUSED, LARGEST_SHARE, LARGEST_SHARE_OF_WAVE, SUSTAINED
+from ppafo.metrics.settled import IN_PUSH_OFF, LARGEST_EXCUSED, LARGEST_SHARE, LARGEST_SHARE_OF_WAVE, MOST_REVERSALS
 from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.case import Case, TrackingCause
-from ppafo.simulation.tracking.causes import CAUSES_OF_TASK
+from ppafo.simulation.tracking.causes import CAUSES_OF_TASK, CAUSES_OF_WALK
 from ppafo.simulation.tracking.load_causes import cuts_wave, torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text, rank
 from ppafo.simulation.tracking.rule import (
@@ -25,17 +25,18 @@ from ppafo.simulation.tracking.rule import (
     SMALLEST_MOVE,
     Criterion,
     Failure,
+    available_torque,
     excess_of_part,
     failure_of_task,
     failure_of_walk,
     is_noisy,
+    misses_for_reach,
     most_reversals,
     only_switches,
     part_limits,
+    shortfall,
 )
 from ppafo.simulation.tracking.settled import settled_walk, task_parts
-from ppafo.simulation.tracking.shortfall import available_torque, misses_for_reach, shortfall
-from ppafo.simulation.tracking.walk_causes import CAUSES_OF_WALK
 from ppafo.units.shown import in_units, units_in_force
 from ppafo.wording import override_text, without_exponent
 
@@ -54,6 +55,8 @@ _MOST_DOUBLINGS = 11
 
 OPEN_LOOP, NO_REFERENCE, TOO_SHORT = "open loop", "no reference", "too short"
 """Reasons for no verdict."""
+_Judged = tuple[Criterion, float, float]
+"""Criterion, number and limit [SI; of reversals per second or stride]."""
 NOTHING_TO_FOLLOW = (OPEN_LOOP, NO_REFERENCE)
 """Reasons of runs that have nothing to follow."""
 
@@ -224,7 +227,7 @@ def _failing(case: Case, turning: float, rate: float) -> Tracking:
     )
 
 
-def _decided(case: Case, turning: float, rate: float) -> tuple[Criterion, float, float]:
+def _decided(case: Case, turning: float, rate: float) -> _Judged:
     """Criterion of a failure, with the number that decided and its limit [SI; of reversals per second or stride]."""
     settled, failure, per = case.settled, case.failure, case.scenario.motion.stride_time or 1.0
     if failure == "does not move":
@@ -239,8 +242,8 @@ def _decided(case: Case, turning: float, rate: float) -> tuple[Criterion, float,
             return "reversals" if is_noisy(case.scenario) else "command reversals", rate * per, rate / turning * per
         swing = next(each for each in criteria if each[0] == "swing")
         is_swing = swing[1] > swing[2] and (not case.only_switches or criteria[0][1] <= criteria[0][2])
-        if settled.error_reversals and not is_swing and not case.only_switches:
-            return "reversals", settled.error_reversals / settled.duration, (SUSTAINED - 1) / settled.duration
+        if settled.error_reversals > MOST_REVERSALS and not is_swing and not case.only_switches:
+            return "reversals", settled.error_reversals / settled.duration, MOST_REVERSALS / settled.duration
         if is_swing:
             return swing
     return next((each for each in criteria if each[1] > each[2]), criteria[-1])
@@ -283,15 +286,13 @@ def _following(case: Case, _turning: float, _rate: float) -> Tracking:
     return replace(verdict, said=said if beyond is None else f"{said}; {beyond.text}")
 
 
-def _criteria(case: Case) -> tuple[tuple[Criterion, float, float], ...]:
+def _criteria(case: Case) -> tuple[_Judged, ...]:
     """Errors of the judged part that may be above their limits: name, number and limit [SI], most telling first."""
     scenario, settled, switches = case.scenario, case.settled, case.only_switches
     mean, wanted, asked = abs(settled.mean_error), settled.wanted_change, settled.requested_peak
     if not scenario.follows_reference:
-        peak: tuple[Criterion, float, float]
-        peak = ("missing peak torque", asked - settled.given_peak, (1.0 - LEAST_PEAK_WALK) * asked)
-        of_request: tuple[Criterion, float, float]
-        of_request = ("RMS error", settled.rms_error, LARGEST_SHARE_OF_WAVE * wanted)
+        peak: _Judged = ("missing peak torque", asked - settled.given_peak, (1.0 - LEAST_PEAK_WALK) * asked)
+        of_request: _Judged = ("RMS error", settled.rms_error, LARGEST_SHARE_OF_WAVE * wanted)
         return (peak,) if settled.start == IN_PUSH_OFF else (of_request, peak)
     beyond = float(np.max(shortfall(scenario)))
     is_cut = beyond > mean and not settled.rests
