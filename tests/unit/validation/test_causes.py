@@ -520,8 +520,9 @@ def with_late_valve(bench: Recording) -> Recording:
 
 DECLARED = [fault for valve in LOOPS for fault in declared_faults(valve)]
 LIKE_A_VALVE = [fault for fault in FAULTS if "valve" in fault.title]
-FAULTS_OF_VALVES = [one for one in DECLARED if "valve." in one.title or "line_resistance" in one.title] + LIKE_A_VALVE
-QUICK = ("dead_band", "closing", "solenoid, effects.line", "Cd of the valve")
+OF_VALVES = ("valve.", "line_resistance", "supply.pressure")
+FAULTS_OF_VALVES = [one for one in DECLARED if any(part in one.title for part in OF_VALVES)] + LIKE_A_VALVE
+QUICK = ("dead_band", "solenoid, supply.pressure", "closing", "solenoid, effects.line", "Cd of the valve")
 
 
 @pytest.mark.parametrize(
@@ -532,7 +533,7 @@ QUICK = ("dead_band", "closing", "solenoid, effects.line", "Cd of the valve")
     ],
     ids=lambda fault: fault.title,
 )
-def test_each_number_of_a_valve_is_named_first_or_with_what_does_the_same(fault: Fault) -> None:
+def test_each_number_of_a_valve_and_its_supply_is_named_first_or_with_what_does_the_same(fault: Fault) -> None:
     recording, is_seen = moved(fault, 4712) if fault.valve else (recorded(fault, 4712), True)
     found = validated(recording, fault.valve)
     # Without a spool its damping does nothing.
